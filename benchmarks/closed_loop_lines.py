@@ -11,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from closed_loop_plain import Plain, plain_run
 
-from ringbalance.controller.ensemble.compiled_transfer import linear_fill
 from ringbalance.controller.ensemble.monte_carlo import (
     ensemble_transfer,
     simulate_ensemble,
     simulate_members,
 )
-from ringbalance.controller.ensemble.run import ensemble_plan
-from ringbalance.controller.ensemble.samples import members_alike
+from ringbalance.controller.ensemble.run import EnsemblePlan
+from ringbalance.controller.ensemble.samples import Members
+from ringbalance.controller.ensemble.transfer import linear_fill
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
@@ -184,8 +184,8 @@ def run_lines(scene: Scene, model: BalancerModel, rivals: Rivals, repeats: int) 
     Returns: Three lines for each rival.
     """
     still = replace(scene, sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0))
-    plan = ensemble_plan(scene=still, model=model, transfer=ensemble_transfer(still, model))
-    alone = members_alike(still, size=1)
+    plan = EnsemblePlan.of(scene=still, model=model, transfer=ensemble_transfer(still, model))
+    alone = Members.alike(still, size=1)
     ours = (
         ("a whole run", least_seconds(lambda: plan.run(alone, seed=0), repeats, 20), 20),
         (

@@ -25,9 +25,8 @@ from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_motion import begin
 from ringbalance.controller.ensemble.transfer import RELATIVE_ERROR
 from ringbalance.controller.formulas.gas_flow import flow_shape
-from ringbalance.controller.liquid_ring.column import lift_of
 from ringbalance.controller.liquid_ring.compiled_march import advance, command
-from ringbalance.controller.liquid_ring.motion import Dynamics
+from ringbalance.controller.liquid_ring.motion import Dynamics, Lift
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
@@ -64,7 +63,7 @@ class Rival:
         self.crest, self.hump_head = model.flow.path.crest, model.flow.heads.hump_head
         self.ambient = scene.gas.ambient_pressure
         self.upstream = crest_span(scene.tube)[1] * scene.tube.length
-        lift = lift_of(scene, law=model.flow)
+        lift = Lift.of(scene, law=model.flow)
         assert lift is not None
         self.entrance, self.span = lift.entrance, crest_span(scene.tube)
         self.risen = self.span[0]

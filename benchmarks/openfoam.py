@@ -39,7 +39,7 @@ from openfoam_waves import (
 
 from ringbalance.mesh.bent_tube import Segment
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.convergence import gci
 from ringbalance.physics.sloshing.modes import sloshing_modes
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.physics.tube.numbers import rotation_reynolds_number

@@ -16,15 +16,9 @@ from ringbalance.verification.navier_stokes.meshes import (
     tensor_patch,
     with_midpoints,
 )
-from ringbalance.verification.navier_stokes.newton import (
-    Coefficients,
-    Dirichlet,
-    FlowSolution,
-    FlowSystem,
-    flow_system,
-    solve_flow,
-)
+from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.space import taylor_hood
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
 
 Field = Callable[[FloatArray], FloatArray]
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.compare_rotor import OneRotor, own_scene, rotor_of, scene_on
+from ringbalance.controller.compare_rotor import OneRotor, own_scene
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import advised
 from ringbalance.controller.loop import simulate
@@ -142,10 +142,10 @@ def compare(first: AnyScene, second: AnyScene, *, model_of: _ModelOf, runs: int 
     to the recommended ones.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
-    rotor = rotor_of(first)
+    rotor = OneRotor.of(first)
     try:
         # Whether the second can work there at all is known before anything is run.
-        scenes = own_scene(first), scene_on(rotor, second)
+        scenes = own_scene(first), rotor.scene(second)
         span = max(_span(scene) for scene in scenes)
         one, other = (_side(rotor, scene, model_of, span=span, runs=runs) for scene in scenes)
     except SceneError as error:

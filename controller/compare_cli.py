@@ -18,8 +18,7 @@ from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import results_console
+from ringbalance.scene.platform.terminal import activity, results_console
 
 SETTLED = 0
 NOT_SETTLED = 1

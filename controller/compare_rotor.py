@@ -17,10 +17,9 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
-from ringbalance.controller.eccentric_mass.plant.whirl import influence as rotor_influence
-from ringbalance.controller.rotor import influence, initial_unbalance, wrapped
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant.speed import speed_at
+from ringbalance.controller.rotor import wrapped
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene, SpeedPoint
 from ringbalance.scene.faults import Fault, SceneError
@@ -57,16 +56,25 @@ class OneRotor:
         """Vibration before balancing, m zero-to-peak."""
         return abs(self.influence * self.unbalance)
 
+    def scene(self, scene: AnyScene) -> AnyScene:
+        """Put a scene's balancer on another scene's rotor, at constant speed and in its own steady vibration.
 
-def rotor_of(scene: AnyScene) -> OneRotor:
-    """Take the rotor out of a scene; of eccentric masses the speed counts at which their strategy starts.
+        Raises: SceneError: the rotor cannot be this scene's.
+        """
+        return _liquid_on(self, scene) if isinstance(scene, Scene) else _driven_on(self, scene)
 
-    Raises: SceneError: the rotor stands still, turns backwards, or does not vibrate at all.
-    """
-    found = _liquid_rotor(scene) if isinstance(scene, Scene) else _driven_rotor(scene)
-    if found.amplitude == 0:
-        raise _refusal(scene, "rotor", "", "it does not vibrate: there is nothing to compare", "an unbalance")
-    return found
+    @classmethod
+    def of(cls, scene: AnyScene) -> OneRotor:
+        """Take the rotor out of a scene; of eccentric masses the speed counts at which their strategy starts.
+
+        Raises: SceneError: the rotor stands still, turns backwards, or does not vibrate at all.
+        """
+        found = _liquid_rotor(scene) if isinstance(scene, Scene) else _driven_rotor(scene)
+        if found.amplitude == 0:
+            raise _refusal(
+                scene, "rotor", "", "it does not vibrate: there is nothing to compare", "an unbalance"
+            )
+        return found
 
 
 def _liquid_rotor(scene: Scene) -> OneRotor:
@@ -74,8 +82,8 @@ def _liquid_rotor(scene: Scene) -> OneRotor:
     return OneRotor(
         source=scene.source,
         speed=rotor.speed,
-        influence=influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle),
-        unbalance=initial_unbalance(rotor=rotor),
+        influence=rotor.influence,
+        unbalance=rotor.initial_unbalance,
         mass=None,
         noise=scene.sensor.amplitude_noise,
         limit=scene.controller.limit,
@@ -83,11 +91,11 @@ def _liquid_rotor(scene: Scene) -> OneRotor:
 
 
 def _driven_rotor(scene: EccentricScene) -> OneRotor:
-    speed, _ = speed_at(*profile_arrays(scene.rotor), scene.supervisor.start)
+    speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
     if speed <= 0:
         problem = "the rotor does not turn forwards when balancing starts"
         raise _refusal(scene, "rotor", "speed_profile", problem, "a speed above 0 rpm at that time")
-    parameters = plant_parameters(scene)
+    parameters = PlantParameters.of(scene)
     if parameters.damping == 0:
         problem = "without damping the vibration before balancing never becomes steady"
         raise _refusal(scene, "rotor", "damping", problem, "a damping coefficient above 0 N*s/m")
@@ -95,7 +103,7 @@ def _driven_rotor(scene: EccentricScene) -> OneRotor:
     return OneRotor(
         source=scene.source,
         speed=speed,
-        influence=rotor_influence(parameters, speed),
+        influence=parameters.influence(speed),
         unbalance=cmath.rect(imbalance.mass * imbalance.radius, imbalance.phase),
         mass=parameters.mass,
         noise=scene.sensor.position_noise,
@@ -111,16 +119,8 @@ def own_scene(scene: AnyScene) -> AnyScene:
     """
     if isinstance(scene, Scene):
         return scene
-    speed, _ = speed_at(*profile_arrays(scene.rotor), scene.supervisor.start)
+    speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
     return _steady_start(scene, speed)
-
-
-def scene_on(rotor: OneRotor, scene: AnyScene) -> AnyScene:
-    """Put a scene's balancer on another scene's rotor, at constant speed and in its own steady vibration.
-
-    Raises: SceneError: the rotor cannot be this scene's.
-    """
-    return _liquid_on(rotor, scene) if isinstance(scene, Scene) else _driven_on(rotor, scene)
 
 
 def _liquid_on(rotor: OneRotor, scene: Scene) -> Scene:

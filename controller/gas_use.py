@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.plant import Operation
-from ringbalance.physics.gas.column import compression_work, normal_volume, nozzle_flow
-from ringbalance.physics.gas.supply import gas_line
+from ringbalance.physics.gas import compression_work, gas_line, normal_volume, nozzle_flow
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.models import Scene
@@ -60,40 +59,40 @@ class GasUse:
             "or fill in more liquid"
         )
 
+    @classmethod
+    def of(cls, *, scene: Scene, model: BalancerModel, operations: Sequence[Operation]) -> GasUse:
+        """Gas consumption of the operations of a run.
 
-def gas_use(*, scene: Scene, model: BalancerModel, operations: Sequence[Operation]) -> GasUse:
-    """Gas consumption of the operations of a run.
-
-    Gas through a chamber that has run dry is bounded by a choked nozzle of the tube's section and by the
-    line.
-    Source: (p_1 - p_a) V of each filling at closing; `compression_work`, `nozzle_flow`.
-    """
-    gas = scene.gas
-    supply = gas.pressure + gas.ambient_pressure
-    through = nozzle_flow(pressure=supply, area=model.tube_area, temperature=gas.temperature)
-    line = gas_line(gas)
-    if line is not None:
-        # Filled volume over the time constant is the most that the line passes.
-        through = min(through, supply / line.time_constant(volume=1.0))
-    passed = through * math.fsum(operation.run_dry for operation in operations)
-    dead = gas.dead_volume or 0.0
-    content = math.fsum(
-        # A vented chamber is full of ambient gas, which no supply has to deliver.
-        done.closing_pressure * ((1 - done.fill_after) * model.chamber_volume + dead)
-        for done in operations
-    )
-    total = content + passed
-    residual = residual_fill_ratio(scene, law=model.flow)
-    return GasUse(
-        fillings=len(operations),
-        normal_volume=normal_volume(pressure_volume=total, temperature=gas.temperature),
-        energy=compression_work(
-            pressure_volume=total, pressure=supply, ambient_pressure=gas.ambient_pressure
-        ),
-        run_dry=sum(operation.run_dry > 0 for operation in operations),
-        residual_fill_ratio=residual,
-        below_residual=sum(
-            done.run_dry > 0 or done.fill_after < residual - NEAR_RESIDUAL for done in operations
-        ),
-        passed_through=normal_volume(pressure_volume=passed, temperature=gas.temperature),
-    )
+        Gas through a chamber that has run dry is bounded by a choked nozzle of the tube's section and by the
+        line.
+        Source: (p_1 - p_a) V of each filling at closing; `compression_work`, `nozzle_flow`.
+        """
+        gas = scene.gas
+        supply = gas.pressure + gas.ambient_pressure
+        through = nozzle_flow(pressure=supply, area=model.tube_area, temperature=gas.temperature)
+        line = gas_line(gas)
+        if line is not None:
+            # Filled volume over the time constant is the most that the line passes.
+            through = min(through, supply / line.time_constant(volume=1.0))
+        passed = through * math.fsum(operation.run_dry for operation in operations)
+        dead = gas.dead_volume or 0.0
+        content = math.fsum(
+            # A vented chamber is full of ambient gas, which no supply has to deliver.
+            done.closing_pressure * ((1 - done.fill_after) * model.chamber_volume + dead)
+            for done in operations
+        )
+        total = content + passed
+        residual = residual_fill_ratio(scene, law=model.flow)
+        return cls(
+            fillings=len(operations),
+            normal_volume=normal_volume(pressure_volume=total, temperature=gas.temperature),
+            energy=compression_work(
+                pressure_volume=total, pressure=supply, ambient_pressure=gas.ambient_pressure
+            ),
+            run_dry=sum(operation.run_dry > 0 for operation in operations),
+            residual_fill_ratio=residual,
+            below_residual=sum(
+                done.run_dry > 0 or done.fill_after < residual - NEAR_RESIDUAL for done in operations
+            ),
+            passed_through=normal_volume(pressure_volume=passed, temperature=gas.temperature),
+        )

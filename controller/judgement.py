@@ -1,4 +1,4 @@
-"""Overshoots, misadjustments and settling, from what was sampled and what was true."""
+"""Overshoots and misadjustments, from what was sampled."""
 
 from __future__ import annotations
 
@@ -7,12 +7,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
 
-import numpy as np
-
-from ringbalance.controller.algorithms.algorithm import Measurement, usable
 from ringbalance.controller.formulas.stopping import has_risen, has_turned
 from ringbalance.controller.simulation import Sample
-from ringbalance.scene.arrays import FloatArray
 
 ROUND_OFF: Final = 1e-9
 """Relative to the initial amplitude: a smaller rise is arithmetic."""
@@ -29,53 +25,24 @@ def noise_floor(*, amplitude_noise: float, initial_amplitude: float) -> float:
     return NOISE_DEVIATIONS * math.sqrt(2) * amplitude_noise + ROUND_OFF * initial_amplitude
 
 
-def rose(before: Measurement, after: Measurement, *, floor: float) -> bool:
-    """Whether the amplitude rose by more than the noise floor.
-
-    Args: `before`: earlier sample. `after`: later sample. `floor`: m.
-    Returns: True when it did.
-    """
-    return has_risen(before.amplitude, after.amplitude, floor)
-
-
-def turned(before: Measurement, after: Measurement, *, limit: float) -> bool:
-    """Whether the residual turned by more than 90 degrees and is still above the limit.
-
-    Args: `before`: earlier sample. `after`: later sample. `limit`: m.
-    Returns: True when it did; a jump of the phase by a whole turn is no turn.
-    """
-    return after.amplitude > limit and has_turned(before.phase, after.phase)
-
-
 def overshoots(samples: Sequence[Sample], *, limit: float) -> int:
     """Times that the residual turned by more than 90 degrees between usable samples while above the limit.
 
     Args: `samples`: of one run, in order. `limit`: m.
-    Returns: The number.
     """
-    seen = [s.measurement for s in samples if usable(s.measurement, needs_phase=True)]
-    return sum(turned(a, b, limit=limit) for a, b in pairwise(seen) if a is not None and b is not None)
+    seen = [m for s in samples if (m := s.measurement) is not None and m.usable(needs_phase=True)]
+    return sum(b.amplitude > limit and has_turned(a.phase, b.phase) for a, b in pairwise(seen))
 
 
 def misadjustments(samples: Sequence[Sample], *, floor: float) -> int:
     """Operations after which the measured amplitude was higher by more than the noise floor.
 
     Args: `samples`: of one run, in order; one without a usable amplitude is passed over. `floor`: m.
-    Returns: The number.
     """
-    count, before, operated = 0, None, False
+    count, before, operated = 0, math.inf, False
     for sample in samples:
-        if sample.measurement is not None and usable(sample.measurement, needs_phase=False):
-            count += before is not None and operated and rose(before, sample.measurement, floor=floor)
-            before, operated = sample.measurement, False
+        if sample.measurement is not None and sample.measurement.usable(needs_phase=False):
+            count += operated and has_risen(before, sample.measurement.amplitude, floor)
+            before, operated = sample.measurement.amplitude, False
         operated = operated or bool(sample.command.valves)
     return count
-
-
-def settling_time(*, time: FloatArray, amplitude: FloatArray, limit: float) -> float | None:
-    """Recorded instant from which on the amplitude is not above the limit to the end; None: it ends above."""
-    above = np.flatnonzero(amplitude > limit)
-    if above.size == 0:
-        return float(time[0])
-    last = int(above[-1])
-    return None if last == time.size - 1 else float(time[last + 1])

@@ -9,18 +9,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement, usable
+from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
-from ringbalance.controller.formulas.stopping import Cause, has_held, stop_cause
-from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots, rose
+from ringbalance.controller.formulas.stopping import Cause, has_held, has_risen, stop_cause
+from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
-from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing, initial_state, longest
+from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
-from ringbalance.controller.outcome import VERDICTS, Facts, outcome_of, status_text
-from ringbalance.controller.rotor import chamber_letters, disc_unbalance, vibration
-from ringbalance.controller.sensor import Sensor, noisy_sensor
+from ringbalance.controller.outcome import VERDICTS, Facts
+from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
@@ -108,7 +107,7 @@ def simulate(
         controller=used_controller,
         sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
         exact=sensor is None and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0,
-        state=initial_state(disc=scene.disc),
+        state=DiscState.initial(disc=scene.disc),
     )
     cause = run.go(progress or _silent)
     name = getattr(quasi_steady, "__name__", "custom") if dynamics is None else RUNGE_KUTTA
@@ -201,7 +200,7 @@ class _Run:
         fills = self.state.fills()
         if self.seen is None or self.seen[0] != fills:
             moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=fills)
-            self.seen = fills, complex(vibration(rotor=self.scene.rotor, moment=moment))
+            self.seen = fills, complex(self.scene.rotor.vibration(moment))
         return self.seen[1]
 
     @property
@@ -214,10 +213,10 @@ class _Run:
 
     def _watch(self, measurement: Measurement | None) -> None:
         """Count the rises in a row; a sample without a usable amplitude is passed over."""
-        if measurement is None or not usable(measurement, needs_phase=False):
+        if measurement is None or not measurement.usable(needs_phase=False):
             return
         if self.last_usable is not None and self.operated:
-            higher = rose(self.last_usable, measurement, floor=self.floor)
+            higher = has_risen(self.last_usable.amplitude, measurement.amplitude, self.floor)
             self.rises = self.rises + 1 if higher else 0
         self.last_usable, self.operated = measurement, False
 
@@ -228,7 +227,9 @@ class _Run:
                 self._held and self.loop.stays and not self.to_time_limit,
                 self.rises,
                 self.controller.rises_tolerated,
-                first is not None and last is not None and rose(first, last, floor=self.floor),
+                first is not None
+                and last is not None
+                and has_risen(first.amplitude, last.amplitude, self.floor),
                 self.idle,
                 IDLE_OPERATIONS + self.plant.chambers,
                 command.resting and self.exact and self.state.rests and not (self.cut or self.to_time_limit),
@@ -265,7 +266,7 @@ class _Run:
         change = abs(self._vibration() - before)
         # Noise keeps opening the other valve a little; what counts is the one that should do the work.
         done = [injection.operation for injection in self.injections[-len(advance.operations) :]]
-        working = longest(done).moved or change > self.scene.controller.limit
+        working = max(done, key=lambda one: one.duration).moved or change > self.scene.controller.limit
         self.idle = 0 if working else self.idle + 1
         if self.plant.dynamics is None:
             self._wait()
@@ -312,7 +313,7 @@ class _Run:
 
     def _keep(self, time: FloatArray, fill_ratio: FloatArray) -> None:
         moment = disc_unbalance(moment=self.plant.model.moment, fill_ratio=fill_ratio)
-        seen = vibration(rotor=self.scene.rotor, moment=moment)
+        seen = self.scene.rotor.vibration(moment)
         self.times.append(time)
         self.fills.append(fill_ratio)
         self.vibrations.append(seen)
@@ -329,7 +330,7 @@ def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, 
     time, fills = np.concatenate(run.times), np.concatenate(run.fills, axis=1)
     seen = np.concatenate(run.vibrations)
     facts = _facts(run, cause, np.abs(seen))
-    outcome = outcome_of(facts)
+    outcome = facts.outcome
     settled = outcome is Outcome.SETTLED
     return Simulation(
         scene=run.scene,
@@ -342,7 +343,7 @@ def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, 
         settling_time=facts.settling_time if settled else None,
         hold_time=run.scene.controller.hold_time,
         loop=run.loop,
-        status=status_text(facts, outcome),
+        status=facts.status,
         time=time,
         amplitude=np.abs(seen),
         phase=np.angle(seen),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 from ringbalance.controller.formulas.stopping import NOTICEABLE, Cause, has_grown
@@ -15,12 +16,9 @@ from ringbalance.controller.liquid_ring.reach import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,
     RUNS_BACK,
-    largest_pair_moment,
     starting_pressure,
-    unreachable_vibration,
 )
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.controller.rotor import initial_unbalance
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Verdict
 from ringbalance.controller.tuning.dead_time import standing_remedy
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
@@ -69,7 +67,7 @@ class Facts:
     @property
     def unreachable_amplitude(self) -> float:
         """Vibration that remains with the liquid at its best, m."""
-        return unreachable_vibration(plant=self.plant, state=self.state, rotor=self.scene.rotor)
+        return self.plant.unreachable_vibration(state=self.state, rotor=self.scene.rotor)
 
     @property
     def settling_time(self) -> float | None:
@@ -83,33 +81,45 @@ class Facts:
         """The injections of the last command; empty when there was none."""
         return tuple(i for i in self.injections if i.time == self.injections[-1].time)
 
+    @cached_property
+    def outcome(self) -> Outcome:
+        """How the run ended.
 
-def outcome_of(facts: Facts) -> Outcome:
-    """Classify how a run ended.
-
-    SETTLED takes a true amplitude that held within the limit for the hold time in a loop that is expected to
-    stay there, or a run in which nothing can change any more.  Both are known when they happen, so that a
-    later time limit gives the same answer.
-    """
-    limit = facts.scene.controller.limit
-    if facts.settling_time is not None:
-        return Outcome.SETTLED
-    if facts.unreachable_amplitude > limit and not facts.loop.unstable:
-        return Outcome.CAPACITY_EXCEEDED
-    higher = facts.final_amplitude > facts.initial_amplitude + facts.noise_floor
-    if has_grown(facts.cause, higher):
-        return Outcome.DRIFTING if facts.drift > NOTICEABLE else Outcome.DIVERGING
-    if facts.loop.unstable:
-        return Outcome.UNSTABLE
-    if min(facts.since, facts.held_since) < math.inf:
-        return Outcome.HOLD_INCOMPLETE if facts.loop.stays else Outcome.HOVERING
-    if facts.refused and facts.cause is Cause.IDLE:
-        return Outcome.CHAMBER_EMPTY
-    if facts.last_command and not _longest(facts).operation.moved:
-        if _longest(facts).operation.event in {Event.EMPTY, Event.FULL}:
+        SETTLED takes a true amplitude that held within the limit for the hold time in a loop that is expected
+        to stay there, or a run in which nothing can change any more.  Both are known when they happen, so
+        that a later time limit gives the same answer.
+        """
+        limit = self.scene.controller.limit
+        if self.settling_time is not None:
+            return Outcome.SETTLED
+        if self.unreachable_amplitude > limit and not self.loop.unstable:
+            return Outcome.CAPACITY_EXCEEDED
+        higher = self.final_amplitude > self.initial_amplitude + self.noise_floor
+        if has_grown(self.cause, higher):
+            return Outcome.DRIFTING if self.drift > NOTICEABLE else Outcome.DIVERGING
+        if self.loop.unstable:
+            return Outcome.UNSTABLE
+        if min(self.since, self.held_since) < math.inf:
+            return Outcome.HOLD_INCOMPLETE if self.loop.stays else Outcome.HOVERING
+        if self.refused and self.cause is Cause.IDLE:
             return Outcome.CHAMBER_EMPTY
-        return Outcome.GAS_TIME_TOO_SHORT if _over_too_soon(facts) else Outcome.STALLED
-    return Outcome.TOO_MANY_SAMPLES if facts.cause is Cause.SAMPLES else _out_of_time(facts)
+        if self.last_command and not _longest(self).operation.moved:
+            if _longest(self).operation.event in {Event.EMPTY, Event.FULL}:
+                return Outcome.CHAMBER_EMPTY
+            return Outcome.GAS_TIME_TOO_SHORT if _over_too_soon(self) else Outcome.STALLED
+        return Outcome.TOO_MANY_SAMPLES if self.cause is Cause.SAMPLES else _out_of_time(self)
+
+    @property
+    def status(self) -> str:
+        """One or two sentences: how the run ended, with its numbers, and what to do next."""
+        text = _TEXTS[self.outcome](self)
+        if not self.shortened:
+            return text
+        injections = "injection was" if self.shortened == 1 else "injections were"
+        return (
+            f"{text}; {self.shortened} {injections} shortened or left out to keep the residual fill of "
+            f"{self.plant.residual_fill:.3g} in the driven chamber"
+        )
 
 
 def _longest(facts: Facts) -> Injection:
@@ -144,20 +154,6 @@ def _out_of_time(facts: Facts) -> Outcome:
     if not last.resting and not last.valves and last.reason.startswith("the valve-open time"):
         return Outcome.GAS_TIME_TOO_SHORT
     return Outcome.TIME_LIMIT
-
-
-def status_text(facts: Facts, outcome: Outcome) -> str:
-    """One or two sentences: how the run ended, with its numbers, and what to do next.
-
-    Args: `outcome`: as classified.
-    """
-    if not facts.shortened:
-        return _TEXTS[outcome](facts)
-    return (
-        f"{_TEXTS[outcome](facts)}; {facts.shortened} "
-        f"{'injection was' if facts.shortened == 1 else 'injections were'} shortened or left out to keep the "
-        f"residual fill of {facts.plant.residual_fill:.3g} in the driven chamber"
-    )
 
 
 def _um(length: float) -> str:
@@ -264,8 +260,8 @@ def _stalled(facts: Facts) -> str:
 
 
 def _capacity(facts: Facts) -> str:
-    needed = abs(initial_unbalance(rotor=facts.scene.rotor)) / GRAM_MILLIMETRE
-    pair = abs(largest_pair_moment(plant=facts.plant, state=facts.state)) / GRAM_MILLIMETRE
+    needed = abs(facts.scene.rotor.initial_unbalance) / GRAM_MILLIMETRE
+    pair = abs(facts.plant.largest_pair_moment(state=facts.state)) / GRAM_MILLIMETRE
     return (
         f"{_not_settled(facts)}; capacity exceeded: the unbalance is {needed:.4g} g mm, one pair of chambers "
         f"can form {pair:.4g} g mm along its axis, so at best {_um(facts.unreachable_amplitude)} remain: "
@@ -314,7 +310,7 @@ def _too_short(facts: Facts) -> str:
         last = _longest(facts)
         return (
             f"{_not_settled(facts)}; {last.operation.duration * 1e3:.4g} ms of gas into chamber "
-            f"{last.chamber} are over before its pressure has pushed any liquid over: "
+            f"{last.chamber} end before the pressure has moved any liquid: "
             f"{_standing(facts) or _pushed(facts)}"
         )
     return (

@@ -1,4 +1,4 @@
-"""Frames and signs of the closed loop: chamber directions, the disc's unbalance, and the rotor's response.
+"""Frames and signs of the closed loop: chamber directions, the disc's unbalance, rotor's response and sensor.
 
 Chamber A lies at angle 0, angles grow with the rotation, letters go counter-clockwise, and the opposite of
 chamber i is i + n/2.  Vectors are complex numbers in the frame of the disc; amplitudes are zero-to-peak.
@@ -6,18 +6,23 @@ chamber i is i + n/2.  Vectors are complex numbers in the frame of the disc; amp
 
 from __future__ import annotations
 
+import cmath
 import math
+from collections.abc import Callable
 from string import ascii_uppercase
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.reduced_model.law.model import MomentCurve
+from ringbalance.scene import loop_models
 from ringbalance.scene.arrays import ComplexArray
-from ringbalance.scene.loop_models import Rotor
 
 MAX_CHAMBERS: Final = len(ascii_uppercase)
+Sensor = Callable[[float, complex], Measurement | None]
+"""Takes the time (s) and the vibration (m, complex); None is a dropped sample."""
 
 
 def chamber_letters(chambers: int) -> tuple[str, ...]:
@@ -60,34 +65,24 @@ def disc_unbalance(*, moment: MomentCurve, fill_ratio: npt.ArrayLike) -> Complex
     return np.asarray(np.tensordot(directions, pair, axes=1), dtype=np.complex128)
 
 
-def influence(*, coefficient: float, lag_angle: float) -> complex:
-    """Vibration per unbalance as a vector, K = kappa exp(-j lag), m/(kg m).
-
-    Source: Eq. 23 of the liquid-ring paper; the sign of the lag is a convention of this program.
-    """
-    return complex(coefficient * np.exp(-1j * lag_angle))
-
-
-def initial_vibration(*, rotor: Rotor) -> complex:
-    """Vibration with every pair level, V0 = v0 exp(j theta0), m zero-to-peak."""
-    return complex(rotor.initial_amplitude * np.exp(1j * rotor.initial_phase))
-
-
-def initial_unbalance(*, rotor: Rotor) -> complex:
-    """Moment that the initial vibration answers to, V0/K, kg m; the disc cancels it with its negative."""
-    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
-    return initial_vibration(rotor=rotor) / k
-
-
-def vibration(*, rotor: Rotor, moment: npt.ArrayLike) -> ComplexArray:
-    """Vibration of the rotor with the disc's moment U, V1 = V0 + K U, m zero-to-peak.
-
-    Source: Eq. 23 of the liquid-ring paper.
-    """
-    k = influence(coefficient=rotor.influence_coefficient, lag_angle=rotor.lag_angle)
-    return np.asarray(initial_vibration(rotor=rotor) + k * np.asarray(moment), dtype=np.complex128)
-
-
 def wrapped(angle: float) -> float:
     """The same angle, rad, within (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))
+
+
+def noisy_sensor(*, sensor: loop_models.Sensor, seed: int) -> Sensor:
+    """A sensor with independent Gaussian noise on amplitude and phase from numpy's default generator.
+
+    An amplitude that noise would make negative is folded back, as a rectifying instrument shows it.
+    """
+    random = np.random.default_rng(seed)
+
+    def measure(time: float, vibration: complex) -> Measurement:
+        amplitude_noise, phase_noise = random.standard_normal(2)
+        return Measurement(
+            time=time,
+            amplitude=abs(abs(vibration) + sensor.amplitude_noise * float(amplitude_noise)),
+            phase=cmath.phase(vibration) + sensor.phase_noise * float(phase_noise),
+        )
+
+    return measure

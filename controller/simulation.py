@@ -8,7 +8,7 @@ from enum import StrEnum
 from functools import cached_property
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.gas_use import GasUse, gas_use
+from ringbalance.controller.gas_use import GasUse
 from ringbalance.controller.liquid_ring.plant import Operation
 from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.physics.results import Status
@@ -140,7 +140,7 @@ class Simulation:
     def gas(self) -> GasUse:
         """Gas consumption of all injections."""
         done = [injection.operation for injection in self.injections]
-        return gas_use(scene=self.scene, model=self.model, operations=done)
+        return GasUse.of(scene=self.scene, model=self.model, operations=done)
 
     @cached_property
     def gas_line(self) -> tuple[LineAnswer, ...]:

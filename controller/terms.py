@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from ringbalance.controller.liquid_ring.column import column_of, lift_of
-from ringbalance.controller.liquid_ring.motion import Dynamics
-from ringbalance.physics.gas.supply import VENTED, gas_line
+from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Lift
+from ringbalance.physics.gas import VENTED, gas_line
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG, term_estimates
@@ -46,7 +45,7 @@ def known_dynamics(
     """`dynamics_of` terms that are known to have numbers, for the many scenes that differ in values alone."""
     line = gas_line(scene.gas) if FILLING in modelled else None
     gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
-    column = column_of(law=model.flow, tube=scene.tube, gas_off=gas_off)
+    column = Column.of(law=model.flow, tube=scene.tube, gas_off=gas_off)
     if not modelled or column is None:
         return None
     return Dynamics(
@@ -61,20 +60,20 @@ def known_dynamics(
         chamber_volume=model.chamber_volume,
         max_fill_ratio=model.flow.max_fill_ratio,
         residual=residual_fill,
-        lift=lift_of(scene, law=model.flow) if HELD in modelled else None,
+        lift=Lift.of(scene, law=model.flow) if HELD in modelled else None,
     )
 
 
 def can_carry(scene: Scene, model: BalancerModel) -> bool:
     """Whether a law gives the forces that terms of an injection need."""
-    return column_of(law=model.flow, tube=scene.tube) is not None
+    return Column.of(law=model.flow, tube=scene.tube) is not None
 
 
 def _check(scene: Scene, model: BalancerModel, asked: Collection[str]) -> None:
     for term in asked:
         if term not in IN_INJECTIONS:
             raise ValueError(f"no term {term!r}; there are {', '.join(IN_INJECTIONS)}")
-        unknown = term not in (INERTIA, HELD) and term_estimates(scene)[term].contribution is None
+        unknown = term not in (INERTIA, HELD) and term_estimates(scene)[term].value is None
         no_crest = term == HELD and isinstance(model.flow, PaperLaw)
         if unknown or no_crest or not can_carry(scene, model):
             raise ValueError(f"{term} cannot be modelled: the scene or the law gives no numbers for it")

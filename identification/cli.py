@@ -6,7 +6,7 @@ import json as json_format
 from collections.abc import Sequence
 from pathlib import Path
 
-from ringbalance.identification.criticism.review import review
+from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.reading import read_observations
 from ringbalance.identification.data.template import template as template_of
 from ringbalance.identification.documents import fit_document
@@ -16,11 +16,10 @@ from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.saving import save_result
 from ringbalance.identification.show import fit_view
-from ringbalance.scene.faults import Fault, SceneError, did_you_mean, option_error
+from ringbalance.scene.faults import Fault, SceneError, did_you_mean
 from ringbalance.scene.loader import read_scene
 from ringbalance.scene.platform.files import check_file
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 
 DONE, FAILED = 0, 1
 _USAGE = (
@@ -81,7 +80,7 @@ def fit(
     except FitError as error:
         fault = Fault(file=given.file, table="", key="", value="", problem=str(error), allowed="")
         raise SceneError([fault]) from error
-    told, following = review(result), next_measurement(result, chosen)
+    told, following = Review.of(result), next_measurement(result, chosen)
     if json:
         document = fit_document(result, data=observations, told=told, following=following)
         print(json_format.dumps(document, allow_nan=False))
@@ -98,7 +97,7 @@ def fit(
 def _fitted_name(name: str | None, fitted: Sequence[str]) -> str | None:
     if name is not None and name not in fitted:
         problem = f"this parameter is not fitted{did_you_mean(name, fitted)}"
-        raise option_error(option="--next", value=name, problem=problem, allowed=", ".join(fitted))
+        raise SceneError.of_option(option="--next", value=name, problem=problem, allowed=", ".join(fitted))
     return name
 
 
@@ -107,7 +106,9 @@ def _keep_inputs(save: Path, inputs: Sequence[Path]) -> None:
     for each in inputs:
         if save.exists() and each.exists() and save.samefile(each):
             problem = "the fitted scene would replace a file that is read here"
-            raise option_error(option="--save", value=str(save), problem=problem, allowed="another file")
+            raise SceneError.of_option(
+                option="--save", value=str(save), problem=problem, allowed="another file"
+            )
 
 
 def _usage(file: str, problem: str) -> SceneError:
@@ -120,5 +121,5 @@ def _names(text: str) -> list[str]:
     if not all(names) or len(set(names)) < len(names):
         problem = "it is not a list of different names with commas between"
         allowed = 'such as "bore,extra_loss"'
-        raise option_error(option="--parameters", value=text, problem=problem, allowed=allowed)
+        raise SceneError.of_option(option="--parameters", value=text, problem=problem, allowed=allowed)
     return names

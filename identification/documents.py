@@ -4,27 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
-from ringbalance.identification.balancers import exact_for, nearby
+from ringbalance.identification.balancers import exact_inputs
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
-
-
-def exact_inputs(result: FitResult) -> list[str]:
-    """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
-    problem, t = result.optimum.residuals.problem, result.optimum.t
-    fitted, predicted = [parameter.name for parameter in result.parameters], problem.at(t)
-    return [
-        name
-        for name in exact_for(problem.scene, fitted)
-        if np.any(replace(problem, scene=nearby(problem.scene, name)).at(t) != predicted)
-    ]
 
 
 def fit_document(

@@ -11,11 +11,11 @@ from ringbalance.identification.balancers import both_sides, held_for, informed,
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
-from ringbalance.identification.intervals import Profile, covariance, profile, student
-from ringbalance.identification.likelihood import Problem, block_of, held_effects
+from ringbalance.identification.intervals import Profile, covariance, profiles
+from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import FitError, Parameter
-from ringbalance.identification.predict.kinds import PREDICTED, rows_of
+from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.uncertain import NORMAL_95
@@ -47,7 +47,7 @@ def fit(
     held = held_for(scene, names)
     nothing = np.zeros((problem.measured.size, 0))
     first = optimum(problem, nothing, loss=loss, starts=starts)
-    effects = held_effects(problem, first.t, [both_sides(scene, name, sd) for name, sd in held.items()])
+    effects = problem.held_effects(first.t, [both_sides(scene, name, sd) for name, sd in held.items()])
     counts = np.linalg.norm(first.residuals.scale[:, None] * effects, axis=0) > _NO_EFFECT
     best = optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first)
     kept = {name: sd for (name, sd), one in zip(held.items(), counts, strict=True) if one}
@@ -70,17 +70,17 @@ def problem_of(
         scene=scene,
         models=models_for(scene),
         parameters=parameters_for(scene, names),
-        blocks=tuple(block_of(each) for each in data),
+        blocks=tuple(Block.of(each) for each in data),
     )
 
 
 def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
     problem, spread = best.residuals.problem, covariance(best.slopes)
     data = best.slopes[: best.slopes.shape[0] - int(np.count_nonzero(problem.with_prior))]
-    profiles = [profile(best, i, float(f), spread) for i, f in enumerate(student(best))]
-    found = verdicts(problem.parameters, best.t, data, profiles)
-    products = combinations(problem.parameters, best.t, data, found, profiles)
-    each = zip(problem.parameters, best.t.tolist(), profiles, found, strict=True)
+    intervals = profiles(best, spread)
+    found = verdicts(problem.parameters, best.t, data, intervals)
+    products = combinations(problem.parameters, best.t, data, found, intervals)
+    each = zip(problem.parameters, best.t.tolist(), intervals, found, strict=True)
     size = np.sqrt(np.diag(spread))
     return FitResult(
         parameters=tuple(_fitted(*one, products) for one in each),
@@ -159,13 +159,13 @@ def _residuals(best: Optimum) -> tuple[FileResiduals, ...]:
     for block in problem.blocks:
         mine = slice(at, at + block.measured.size)
         at += block.measured.size
-        weights = rows_of(block.observations, residuals.weights[mine])
+        weights = block.observations.rows_of(residuals.weights[mine])
         found.append(
             FileResiduals(
                 file=block.observations.file,
                 kind=block.observations.kind,
                 lines=block.observations.lines,
-                normalised=rows_of(block.observations, whole[mine]),
+                normalised=block.observations.rows_of(whole[mine]),
                 down_weighted=np.asarray(np.min(weights, axis=1) < _HALF),
             )
         )

@@ -69,11 +69,6 @@ class Combination:
     """Expanded (95 %), by the data alone: of its logarithm."""
 
 
-def rank(slopes: FloatArray) -> int:
-    """Number of independent directions that the data see. Args: `slopes`: J, without priors."""
-    return int(np.count_nonzero(_normalised(slopes)[1] > DEPENDENT))
-
-
 def _normalised(slopes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Norms of the columns, singular values of the columns of norm one, and right singular vectors."""
     norms = np.linalg.norm(slopes, axis=0)
@@ -102,7 +97,7 @@ def verdicts(
     _, s, vt = _normalised(slopes)
     null = vt[s <= DEPENDENT]
     lost = np.any(np.abs(null) > 1e-2, axis=0) if null.size else np.zeros(t.size, dtype=np.bool_)
-    alone = np.linalg.norm(data_root(slopes), axis=1)
+    alone = np.linalg.norm(_data_root(slopes), axis=1)
     allowed = _allowed_widths(parameters, t)
     found = []
     for i, (parameter, profile) in enumerate(zip(parameters, profiles, strict=True)):
@@ -114,7 +109,7 @@ def verdicts(
     return tuple(found)
 
 
-def data_root(slopes: FloatArray, *, unseen: float = _UNSEEN) -> FloatArray:
+def _data_root(slopes: FloatArray, *, unseen: float = _UNSEEN) -> FloatArray:
     """H of the covariance H H' of t by the data alone.
 
     Args: `unseen`: singular value along what they do not see: small, or infinite to leave that out.
@@ -143,13 +138,13 @@ def combinations(
     flat = _flattened(slopes, t, allowed, [p for p, one in zip(profiles, weak, strict=True) if one])
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
     # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.
-    root = data_root(flat)
+    root = _data_root(flat)
     # A profile is never wider than its prior, so that a direction counts from a root of two, as above.
     strong = vt[s > math.sqrt(2) * factor]
     rows = [_simple(row, root) for row in _echelon(strong / allowed)]
     rows = [row for row in rows if np.count_nonzero(row) > 1 and np.any(row[weak] != 0)]
     # What rounding of the exponents lets in of directions that are not seen at all is no width.
-    seen = data_root(slopes, unseen=math.inf)
+    seen = _data_root(slopes, unseen=math.inf)
     widths = [factor * float(np.linalg.norm(row @ seen)) for row in rows]
     return tuple(_combination(parameters, t, row, width) for row, width in zip(rows, widths, strict=True))
 

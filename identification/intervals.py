@@ -65,7 +65,12 @@ def covariance(slopes: FloatArray) -> FloatArray:
     return np.asarray(scaled @ scaled.T)
 
 
-def student(optimum: Optimum) -> FloatArray:
+def profiles(optimum: Optimum, spread: FloatArray) -> list[Profile]:
+    """Interval of each parameter. Args: `spread`: `covariance` at the optimum."""
+    return [_profile(optimum, i, float(factor), spread) for i, factor in enumerate(_student(optimum))]
+
+
+def _student(optimum: Optimum) -> FloatArray:
     """t(0.975) of each parameter, with what the estimated weights add."""
     problem, slopes = optimum.residuals.problem, optimum.slopes
     n = problem.measured.size
@@ -94,11 +99,8 @@ def _by_weights(optimum: Optimum) -> FloatArray:
     return np.asarray(np.maximum(added, 0.0) / np.diag(whole)[:count])
 
 
-def profile(optimum: Optimum, which: int, factor: float, spread: FloatArray) -> Profile:
-    """Interval of one parameter.
-
-    Args: `factor`: Student's t. `spread`: `covariance` at the optimum.
-    """
+def _profile(optimum: Optimum, which: int, factor: float, spread: FloatArray) -> Profile:
+    """Args: `factor`: Student's t."""
     least = float(np.sum(optimum.at**2))
     low, high = (_end(optimum, which, sign, factor, spread, least) for sign in (-1.0, 1.0))
     points = sorted([*low.points, (float(optimum.t[which]), 0.0), *high.points])

@@ -26,7 +26,8 @@ import numpy as np
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.parameters import Parameter
-from ringbalance.identification.predict.kinds import PREDICTED, PredictedKind
+from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.predict.predicted import PredictedKind
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
 STEP: Final = 1e-3
@@ -60,18 +61,18 @@ class Block:
         """Whether its noise is estimated from the residuals."""
         return not self.kind.noise_given(self.observations)
 
-
-def block_of(observations: Observations) -> Block:
-    """A data set with its whitening."""
-    kind = PREDICTED[observations.kind]
-    lower = np.linalg.cholesky(kind.covariance(observations))
-    return Block(
-        observations=observations,
-        kind=kind,
-        measured=kind.measured(observations),
-        whiten=np.linalg.inv(lower),
-        free=np.zeros((len(lower), 0)) if kind.free is None else kind.free(observations),
-    )
+    @classmethod
+    def of(cls, observations: Observations) -> Block:
+        """A data set with its whitening."""
+        kind = PREDICTED[observations.kind]
+        lower = np.linalg.cholesky(kind.covariance(observations))
+        return cls(
+            observations=observations,
+            kind=kind,
+            measured=kind.measured(observations),
+            whiten=np.linalg.inv(lower),
+            free=np.zeros((len(lower), 0)) if kind.free is None else kind.free(observations),
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -203,6 +204,21 @@ class Problem:
         """Which parameters have a prior."""
         return np.array([bool(p.prior) for p in self.parameters])
 
+    def held_effects(self, t: FloatArray, changes: Sequence[tuple[Any, Any]]) -> FloatArray:
+        """L^-1 J: change of the prediction per standard deviation of each held input, shape (n, inputs).
+
+        Args: `changes`: the problem's scene with each input one standard deviation lower, or as it is, and
+            higher.
+        """
+        columns = [np.zeros((self.measured.size, 0))]
+        for low, high in changes:
+            above = replace(self, scene=high).at(t)
+            if low == self.scene:
+                columns.append((above - self.at(t))[:, None])
+            else:
+                columns.append((above - replace(self, scene=low).at(t))[:, None] / 2)
+        return np.concatenate(columns, axis=1)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Residuals:
@@ -274,19 +290,3 @@ def basis_of(columns: FloatArray) -> FloatArray:
     """Orthonormal basis of the space of some columns."""
     left, size, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(left[:, size > _RANK * np.max(size, initial=1e-300)])
-
-
-def held_effects(problem: Problem, t: FloatArray, changes: Sequence[tuple[Any, Any]]) -> FloatArray:
-    """L^-1 J: change of the prediction per standard deviation of each held input, shape (n, inputs).
-
-    Args: `changes`: the problem's scene with each input one standard deviation lower, or as it is, and
-        higher.
-    """
-    columns = [np.zeros((problem.measured.size, 0))]
-    for low, high in changes:
-        above = replace(problem, scene=high).at(t)
-        if low == problem.scene:
-            columns.append((above - problem.at(t))[:, None])
-        else:
-            columns.append((above - replace(problem, scene=low).at(t))[:, None] / 2)
-    return np.concatenate(columns, axis=1)

@@ -6,7 +6,7 @@ data.  Their noise is that of the fit; a kind that was not measured has an assum
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Final
@@ -16,16 +16,14 @@ import numpy as np
 from ringbalance.identification.balancers import both_sides
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.expected_gain import Candidate, Gain, expected_gains
 from ringbalance.identification.identifiability import Verdict
-from ringbalance.identification.likelihood import Block, Problem, block_of, held_effects
+from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.units import format_quantity
+from ringbalance.scene.units import DIMENSIONS, format_quantity
 
 ASSUMED_NOISE: Final = 0.01
 """Standard deviation of a kind that was not measured, relative to the largest that is predicted."""
@@ -47,6 +45,7 @@ _WORTHWHILE: Final = 0.9
 """Ratio of widths up to which one measurement is advised; beyond it, many of them would be needed."""
 _AT_ALL: Final = 0.99
 Grid = Mapping[str, Sequence[float]]
+_RANK: Final = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,9 +101,9 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
     scene, measured = problem.scene_at(t), {block.observations.kind: block for block in problem.blocks}
     of_kinds = {kind: measured[kind].observations if kind in measured else None for kind in _grids(scene)}
     offered = [offered_rows(scene, kind, before) for kind, before in of_kinds.items()]
-    asked = replace(problem, blocks=tuple(block_of(each) for each in offered if len(each)))
+    asked = replace(problem, blocks=tuple(Block.of(each) for each in offered if len(each)))
     changed = [(problem.scene, both_sides(problem.scene, n, sd)[1]) for n, sd in result.held.items()]
-    by_parameters, by_held = asked.quick_slopes(t), held_effects(asked, t, changed)
+    by_parameters, by_held = asked.quick_slopes(t), asked.held_effects(t, changed)
     at = 0
     for block in asked.blocks:
         mine, count = slice(at, at + block.measured.size), len(block.observations)
@@ -236,3 +235,62 @@ def words_of(offered: Observations, row: int) -> str:
             text = format_quantity(value, column.dimension, column.unit, digits=3)
         said.append(f"{column.words} {text}")
     return f"{offered.kind.replace('_', ' ')} with {', '.join(said)}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """A measurement that could be made."""
+
+    text: str
+    derivatives: FloatArray
+    """Of its predictions by the parameters, each row over its standard deviation, shape (m, p)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gain:
+    """What a candidate does to one parameter."""
+
+    candidate: str
+    before: float
+    """Standard deviation; infinite where nothing is known."""
+    after: float
+
+    @property
+    def ratio(self) -> float:
+        """Width of the interval after over before; zero where it was infinite and is no longer."""
+        return 1.0 if self.after == self.before else self.after / self.before
+
+
+def expected_gains(
+    information: FloatArray, *, parameter: int, candidates: Iterable[Candidate]
+) -> tuple[Gain, ...]:
+    """Gains of all candidates, largest first.
+
+    sigma'^2 = [(F + J^T J)^-1]_ii against sigma^2 = [F^-1]_ii.
+    Args: `information`: F of the fit with its priors, shape (p, p); may be singular. `parameter`: i.
+    Source: linear propagation; exact for predictions that are linear in the parameters.
+    """
+    before = _deviation(information, parameter)
+    gains = [
+        Gain(
+            candidate=each.text,
+            before=before,
+            after=_deviation(information + each.derivatives.T @ each.derivatives, parameter),
+        )
+        for each in candidates
+    ]
+    return tuple(sorted(gains, key=lambda gain: (gain.after, gain.candidate)))
+
+
+def _deviation(information: FloatArray, parameter: int) -> float:
+    """Standard deviation of one parameter; infinite where a direction with it in is not determined."""
+    scale = np.sqrt(np.diag(information))
+    if not scale[parameter] > 0:
+        return float("inf")
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    part = vectors[parameter] ** 2
+    lost = values <= _RANK * values[-1]
+    if float(np.sum(part[lost])) > 1e-8:
+        return float("inf")
+    return float(np.sqrt(np.sum(part[~lost] / values[~lost])) / scale[parameter])

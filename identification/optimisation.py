@@ -217,7 +217,7 @@ def _size(whole: FloatArray, freedom: float, loss: str) -> float:
 
 def searched(
     residuals: Residuals, t: FloatArray, slopes: FloatArray, *, gain: float, fixed: int | None = None
-) -> Search:
+) -> _Search:
     """Least sum of squares nearby, by Gauss-Newton steps with Broyden's updates of the slopes.
 
     Where these come to no end, slopes are found again by differences.
@@ -225,7 +225,7 @@ def searched(
         nearby. `gain`: of the sum of squares, below which a step is not taken.
     Source: Broyden, Math. Comput. 19 (1965) 577.
     """
-    search = Search(residuals=residuals, fixed=fixed, t=t, at=residuals.at(t), slopes=slopes)
+    search = _Search(residuals=residuals, fixed=fixed, t=t, at=residuals.at(t), slopes=slopes)
     if not search.descends(gain):
         search.slopes = residuals.slopes(search.t, residuals.problem.slopes(search.t))
         search.descends(gain)
@@ -233,7 +233,7 @@ def searched(
 
 
 @dataclass(kw_only=True, eq=False)
-class Search:
+class _Search:
     """Where a search stands, and what it knows of the slopes there."""
 
     residuals: Residuals

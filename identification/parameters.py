@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from ringbalance.identification.predict.device import device_of, models_of
+from ringbalance.identification.predict.device import Device, Models
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import (
@@ -29,6 +29,12 @@ from ringbalance.scene.uncertain import (
 
 class FitError(ValueError):
     """A fit that cannot be made; the text says why, and what to change."""
+
+    @classmethod
+    def unknown(cls, name: str, allowed: Sequence[str]) -> FitError:
+        """The error for a name that cannot be fitted."""
+        hint = did_you_mean(name, allowed)
+        return cls(f'"{name}" cannot be fitted{hint}; allowed: {", ".join(allowed)}')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +72,42 @@ class Parameter:
         """dx/dt."""
         return math.exp(inner) / self.gain if self.scale is None else self.scale
 
+    @classmethod
+    def of(cls, scene: Scene, name: str) -> Parameter:
+        """A quantity of a liquid-ring scene as a parameter.
+
+        Raises: FitError: no such quantity, or one that the scene gives no value to start from.
+        """
+        if name in START:
+            return _of_start(scene, name)
+        if name not in UNCERTAIN_QUANTITIES:
+            raise FitError.unknown(name, sorted((*UNCERTAIN_QUANTITIES, *START)))
+        if scene.disc.geometry is not None and name in SHAPE:
+            raise FitError(f"{name} follows from the mesh of the chamber; fit lambda_factor in its place")
+        value = nominal_value(scene=scene, quantity=name)
+        start = _NATURAL.get(name) if value is None else value
+        if start is None:
+            raise FitError(
+                f"the scene has no {UNCERTAIN_QUANTITIES[name]}.{name}: give a value to start from to fit it"
+            )
+        width = half_widths(scene).get(name)
+        (offset, gain), scale = _loss_scale(scene, name), _scale(scene, name)
+        if offset == 0 and scale is None and start <= 0:
+            raise FitError(f"{UNCERTAIN_QUANTITIES[name]}.{name} is zero: give a value above zero to fit it")
+        low, high = _range(scene, name, start, offset)
+        return cls(
+            name=name,
+            symbol=_SYMBOLS.get(name, name),
+            start=start,
+            lowest=low,
+            highest=high,
+            prior=None if width is None else width / NORMAL_95,
+            offset=offset,
+            gain=gain,
+            scale=scale,
+            change=lambda to, value: with_value(scene=to, quantity=name, value=value),
+        )
+
 
 _NATURAL: Final[Mapping[str, float]] = {"lambda_factor": 1.0}
 """Start of quantities that a scene need not give."""
@@ -83,48 +125,6 @@ _FAR: Final = 1000.0
 START: Final = ("initial_amplitude", "initial_phase")
 """Parameters that belong to the measurement and not to the device."""
 _LOSS_STEP: Final = 0.01
-
-
-def unknown_name(name: str, allowed: Sequence[str]) -> FitError:
-    """The error for a name that cannot be fitted."""
-    hint = did_you_mean(name, allowed)
-    return FitError(f'"{name}" cannot be fitted{hint}; allowed: {", ".join(allowed)}')
-
-
-def scene_parameter(scene: Scene, name: str) -> Parameter:
-    """A quantity of a liquid-ring scene as a parameter.
-
-    Raises: FitError: no such quantity, or one that the scene gives no value to start from.
-    """
-    if name in START:
-        return _of_start(scene, name)
-    if name not in UNCERTAIN_QUANTITIES:
-        raise unknown_name(name, sorted((*UNCERTAIN_QUANTITIES, *START)))
-    if scene.disc.geometry is not None and name in SHAPE:
-        raise FitError(f"{name} follows from the mesh of the chamber; fit lambda_factor in its place")
-    value = nominal_value(scene=scene, quantity=name)
-    start = _NATURAL.get(name) if value is None else value
-    if start is None:
-        raise FitError(
-            f"the scene has no {UNCERTAIN_QUANTITIES[name]}.{name}: give a value to start from to fit it"
-        )
-    width = half_widths(scene).get(name)
-    (offset, gain), scale = _loss_scale(scene, name), _scale(scene, name)
-    if offset == 0 and scale is None and start <= 0:
-        raise FitError(f"{UNCERTAIN_QUANTITIES[name]}.{name} is zero: give a value above zero to fit it")
-    low, high = _range(scene, name, start, offset)
-    return Parameter(
-        name=name,
-        symbol=_SYMBOLS.get(name, name),
-        start=start,
-        lowest=low,
-        highest=high,
-        prior=None if width is None else width / NORMAL_95,
-        offset=offset,
-        gain=gain,
-        scale=scale,
-        change=lambda to, value: with_value(scene=to, quantity=name, value=value),
-    )
 
 
 def _of_start(scene: Scene, name: str) -> Parameter:
@@ -157,7 +157,7 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
         return 0.0, 1.0
     here = scene.tube.extra_loss
     speeds = [
-        models_of(with_value(scene=scene, quantity=name, value=here + step)).velocity
+        Models.of(with_value(scene=scene, quantity=name, value=here + step)).velocity
         for step in (0.0, _LOSS_STEP)
     ]
     if speeds[1] <= 0 or speeds[0] <= speeds[1]:
@@ -170,7 +170,7 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
 def _driving_head(scene: Scene) -> float:
     """H at equal fills, m^2/s^2."""
     fill = scene.disc.initial_fill
-    ends = device_of(scene, models_of(scene)).law.ends(
+    ends = Device.of(scene, Models.of(scene)).law.ends(
         fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure
     )
     return float(ends.driving_pressure()) / scene.liquid.density

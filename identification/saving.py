@@ -22,14 +22,13 @@ from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, FittedParameter
 from ringbalance.scene import deferred
 from ringbalance.scene.describe import usual_unit
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.loader import scene_from
-from ringbalance.scene.measured import MeasuredFile, MeasuredFinding
+from ringbalance.scene.origins import MeasuredFile, MeasuredFinding
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.toml_writing import toml_bytes
-from ringbalance.scene.units import format_quantity, unit_of
+from ringbalance.scene.units import DIMENSIONS, format_quantity, unit_of
 
 _DIGITS: Final = 9
 """Of a saved number: far more than any fit has, so that saving changes nothing."""

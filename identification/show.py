@@ -12,13 +12,12 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.identification.balancers import MODEL_ERRORS, causes, exact_inputs
 from ringbalance.identification.criticism.law_comparison import summaries
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.documents import exact_inputs
 from ringbalance.identification.identifiability import Verdict
-from ringbalance.identification.model_errors import MODEL_ERRORS, causes
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FitResult, FittedParameter, Noise
 from ringbalance.reduced_model.budget import rounded

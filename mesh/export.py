@@ -14,8 +14,7 @@ from skfem.io.meshio import to_meshio
 from ringbalance.mesh.chamber import SIDES, ChamberMesh
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import CellKind
-from ringbalance.scene.platform.drafts import draft_folder
-from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.platform.files import draft_folder, write_whole
 
 # Order in which scikit-fem takes the axes so that its cells come out right-handed in a VTK file.
 _CELL_AXES = {2: (1, 0), 3: (0, 1, 2)}

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.facets import boundary_facets, corners_of, edges_of
+from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, edges_of
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 _OFF_NODES: Final = 1e-7

@@ -13,8 +13,15 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.chamber_file.elements import CORNERS, between, faces, reference_nodes, shape_values
-from ringbalance.scene.chamber_file.facets import key_of, repeats
+from ringbalance.scene.chamber_file.elements import (
+    CORNERS,
+    between,
+    faces,
+    key_of,
+    reference_nodes,
+    repeats,
+    shape_values,
+)
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 NAMELESS: Final = "other_walls"

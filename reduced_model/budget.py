@@ -36,7 +36,14 @@ UNITS: Final = {
     "priming_pressure_trapped": "Pa",
     "stall_pressure": "Pa",
 }
+UNSTATED: Final = (
+    "The scene states no uncertainty of its inputs: what theirs would add is in no ±, and a value without "
+    "one is as good as they are."
+)
 _DIGITS: Final = 9
+_UNSTATED_DIGITS: Final = 4
+_INPUT_ROUNDING: Final = 5e-4
+"""Relative half-width of an input of three digits, the fewest that scene files have."""
 _NEGLIGIBLE: Final = 1e-12
 """Relative change of a quantity that counts as rounding, not as an effect of an input."""
 
@@ -99,11 +106,23 @@ def last_place(total: float) -> int:
     return width.quantize(Decimal(1).scaleb(width.adjusted() - 1)).adjusted() - 1
 
 
-def rounded(value: float, total: float) -> str:
+def believed(value: float | None, total: float | None, *, stated: bool) -> float | None:
+    """A value's total uncertainty; None where it is finer than inputs of which the scene says nothing.
+
+    Args: `stated`: whether the scene states the uncertainty of any input.
+    """
+    fine = value is not None and total and total <= _INPUT_ROUNDING * abs(value)
+    return None if fine and not stated else total
+
+
+def rounded(value: float, total: float | None) -> str:
     """A value, or its uncertainty, to the place of the second digit of the total uncertainty.
 
-    Nine digits of the value at most, and that many without an uncertainty; an exact zero has none.
+    Nine digits of the value at most, and that many where the uncertainty is zero; four where it is None, as
+    `believed` has it. An exact zero has none.
     """
+    if total is None:
+        total = 10.0 ** (Decimal(f"{value:.{_UNSTATED_DIGITS - 1}e}").adjusted() + 2 - _UNSTATED_DIGITS)
     if not total > 0 or value == 0:
         return f"{value + 0.0:.{_DIGITS}g}"
     exact = Decimal(repr(float(value)))
@@ -111,6 +130,12 @@ def rounded(value: float, total: float) -> str:
     shown = exact.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
     plain = shown if shown else abs(shown)
     return f"{plain:f}" if place > -_DIGITS else f"{plain:e}"
+
+
+def measured(value: float, total: float | None) -> str:
+    """Value ± total uncertainty, both to the second digit of that; the value alone where it is None."""
+    shown = rounded(value, total)
+    return shown if total is None else f"{shown} ± {rounded(total, total)}"
 
 
 def budgets(*, scene: Scene, calibration: _Calibrated) -> Mapping[str, Budget]:

@@ -117,7 +117,7 @@ def calibrate(scene: AnyScene) -> Calibration:
         laminar tube, correlations beyond; see the parts.
     """
     scene = with_tube_models(liquid_ring_scene(scene))
-    chamber, law = _chamber_and_law(scene)
+    chamber, law = chamber_and_law(scene)
     heads, point = law.heads, operating_point(scene=scene, law=law)
     return Calibration(
         scene=scene,
@@ -150,7 +150,7 @@ def calibrated_model(scene: Scene) -> BalancerModel:
 
     Raises: SceneError, ValueError: as `calibrate`.
     """
-    return balancer_model(_chamber_and_law(with_tube_models(scene))[1])
+    return balancer_model(chamber_and_law(with_tube_models(scene))[1])
 
 
 def law_by_name(scene: Scene, law: str) -> BalancerModel:
@@ -163,7 +163,11 @@ def law_by_name(scene: Scene, law: str) -> BalancerModel:
     return paper_model(scene) if law == "paper" else balancer_model(load_law(Path(law)))
 
 
-def _chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
+def chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
+    """The chamber, and the law with the tube's models that the scene has.
+
+    Raises: SceneError, ValueError: as `calibrate`.
+    """
     check_ring(scene)
     chamber = calibrate_chamber(scene)
     return chamber, calibrated_law(scene=scene, chamber=chamber, heads=tube_heads(scene))

@@ -11,8 +11,7 @@ from ringbalance.reduced_model.show import calibration_view
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.platform.files import check_file
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 
 DONE = 0
 

@@ -1,12 +1,15 @@
-"""Estimated contribution of one thing that a model may leave out."""
+"""Estimated contribution of one physical term, or of anything else that a model may leave out."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
 
+from ringbalance.scene.accuracy import FINEST
+
 NEGLIGIBLE: Final = 1e-3
 """Of the tolerance: a smaller contribution is left out unchecked."""
+_NO_BASIS: Final = "the scene gives no basis for an estimate"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,10 +17,39 @@ class Contribution:
     """What leaving one thing out is worth, judged before anything is solved."""
 
     term: str
-    """Name, as in `Fidelity.leaves_out`."""
     value: float | None
-    """Relative to the quantity; None where the scene gives no basis for an estimate."""
+    """Relative to the quantity that it changes; None where the scene gives no basis for an estimate."""
     formula: str
-    source: str
+    """How it is estimated, with its numbers."""
+    source: str = ""
     rough: bool = False
     """Whether it may be far too large, so that no model is ruled out by it alone."""
+    time: float | None = None
+    """Valve-open time that it costs of a long injection, s; None for a term that is no time."""
+    default_range: tuple[float, float] | None = None
+    """Value at both ends of a default range, where the scene does not give the numbers."""
+
+    def above(self, tolerance: float) -> bool:
+        """Whether it exceeds a tolerance."""
+        return self.value is not None and self.value > tolerance
+
+    def reason(self, tolerance: float) -> str:
+        """Formula, and comparison with a tolerance; the same text in every command."""
+        return f"{self.formula}; {self._comparison(tolerance)}"
+
+    def _comparison(self, tolerance: float) -> str:
+        if self.default_range is not None:
+            low, high = (percent(end) for end in self.default_range)
+            return f"not in the scene: {low if low == high else f'{low} to {high}'} over a default range"
+        if self.value is None:
+            return _NO_BASIS
+        if tolerance == FINEST:
+            return f"{percent(self.value)}; every term is modelled that has a model"
+        side = "above" if self.above(tolerance) else "below"
+        return f"{percent(self.value)} is {side} the tolerance of {percent(tolerance)}"
+
+
+def percent(fraction: float) -> str:
+    """A fraction in per cent, to two digits."""
+    value = 100 * fraction
+    return f"{value:.0f} %" if 99.5 <= abs(value) < 1e6 else f"{value:.2g} %"

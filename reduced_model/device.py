@@ -10,8 +10,9 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
-from ringbalance.physics.gas.column import pressure_factor
+from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.draw_down import draw_down_depth
+from ringbalance.physics.tube.uncertainty import TUBE_INPUTS
 from ringbalance.reduced_model.chamber.inputs import measured_closed_forms
 from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.tube.heads import log_heads
@@ -19,20 +20,7 @@ from ringbalance.reduced_model.tube.regime import ColumnFlow, TubeEnds, TubePath
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
-HEAD_INPUTS: Final = frozenset(
-    {
-        "bore",
-        "length",
-        "roughness",
-        "extra_loss",
-        "drag_coefficient",
-        "kinematic_viscosity",
-        "speed",
-        "hump_position",
-        "hump_radius",
-        "port_radius",
-    }
-)
+HEAD_INPUTS: Final = frozenset({*TUBE_INPUTS, "hump_position", "hump_radius", "port_radius"})
 """Inputs that change the tube's heads; for others they may be passed on."""
 _SPAN: Final = (-5.0, 2.5)
 """Of the tabulated velocities, ln(u/near)."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any, Final
 
-from ringbalance.physics.gas.supply import GasLine, line_with
+from ringbalance.physics.gas import GasLine, line_with
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.short_injection import Fills, ShortInjection, short_injections
 from ringbalance.scene.loop_models import ControllerSettings

@@ -9,7 +9,7 @@ before is less, and depends on every millisecond.  A valve is not expected to op
 **Lift.**  The gas lifts the liquid in the leg as it fills the chamber; what it then pushes to the middle of
 the crest falls back in the end, so it is taken off what the column has moved.
 
-**Movement.**  With isothermal gas the times belong to the pressure (`physics.gas.supply`), so the liquid
+**Movement.**  With isothermal gas the times belong to the pressure (`physics.gas`), so the liquid
 moved is the integral of rho S u dt over filling and venting.  The column has its mass and moves by
     du/dt = B - c(u) u^2,
 c such that it keeps the flow law's steady velocity, B = c(u0) u0^2.  A full siphon of length L is driven by
@@ -31,7 +31,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.gas.supply import GasLine
+from ringbalance.physics.gas import GasLine
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.model import BalancerModel

@@ -12,11 +12,11 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.reduced_model.budget import Budget, rounded
+from ringbalance.reduced_model.budget import UNSTATED, believed, measured, rounded
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.chamber.row_status import REMEDIES
 from ringbalance.reduced_model.documents import (
     PRESSURE_FACTORS,
+    REMEDIES,
     chamber_status,
     paper_columns,
     velocity_status,
@@ -65,14 +65,25 @@ def _table(title: str, *columns: str, left: int = 1) -> Table:
     return table
 
 
-def _measured(value: float, total: float, unit: str, *, scale: float = 1.0) -> str:
-    """Value ± uncertainty and unit, both to the second digit of the uncertainty."""
-    width = scale * total
-    return f"{rounded(scale * value, width)} ± {rounded(width, width)} {unit}".rstrip()
+def _measured(
+    calibration: Calibration, value: float, total: float, unit: str = "", *, scale: float = 1.0
+) -> str:
+    """Value ± uncertainty and unit, as far as the scene's inputs can be believed."""
+    known = believed(value, total, stated=_stated(calibration))
+    return f"{measured(scale * value, None if known is None else scale * known)} {unit}".rstrip()
 
 
-def _shown(budget: Budget, unit: str, *, scale: float = 1.0) -> str:
-    return _measured(budget.value, budget.total, unit, scale=scale)
+def _shown(calibration: Calibration, name: str, unit: str = "", *, scale: float = 1.0) -> str:
+    budget = calibration.budgets[name]
+    return _measured(calibration, budget.value, budget.total, unit, scale=scale)
+
+
+def _rounded(calibration: Calibration, value: float, total: float) -> str:
+    return rounded(value, believed(value, total, stated=_stated(calibration)))
+
+
+def _stated(calibration: Calibration) -> bool:
+    return bool(calibration.scene.uncertainty)
 
 
 def _summary(calibration: Calibration) -> Table:
@@ -89,26 +100,26 @@ def _summary(calibration: Calibration) -> Table:
 def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
     chamber, point, told = calibration.chamber, calibration.operating_point, calibration.budgets
     lam = told["lambda"]
-    yield "chamber", _shown(told["chamber_volume"], "ml", scale=1e6)
+    yield "chamber", _shown(calibration, "chamber_volume", "ml", scale=1e6)
     yield (
         "lambda",
-        f"{_shown(lam, 'mm', scale=1e3)} per transferred mass "
-        f"({rounded(1e3 * lam.value / 2, 1e3 * lam.total / 2)} mm per mass difference), "
+        f"{_shown(calibration, 'lambda', 'mm', scale=1e3)} per transferred mass "
+        f"({_rounded(calibration, 1e3 * lam.value / 2, 1e3 * lam.total / 2)} mm per mass difference), "
         f"varies by {100 * calibration.lambda_variation:.2g} % over the fill range",
     )
     yield from _direction(calibration)
     yield "usable", _usable_text(calibration)
     yield "operating point", _point_text(calibration)
     if "drag_coefficient" in told:
-        yield "k there", f"{_shown(told['drag_coefficient'], '')} at {point.loss_velocity:.3g} m/s"
+        yield "k there", f"{_shown(calibration, 'drag_coefficient')} at {point.loss_velocity:.3g} m/s"
     stall = told["stall_pressure"]
-    paper = rounded(point.stall_paper / 1e6, stall.total / 1e6)
-    yield "full siphon stalls", f"at {_mpa(stall)} when empty (Eq. 19: {paper} MPa)"
+    paper = _rounded(calibration, point.stall_paper / 1e6, stall.total / 1e6)
+    yield "full siphon stalls", f"at {_mpa(calibration, 'stall_pressure')} when empty (Eq. 19: {paper} MPa)"
     if "priming_pressure_vented" in told:
         yield (
             "over the siphon crest",
-            f"{_mpa(told['priming_pressure_vented'])} vented, driven chamber empty; "
-            f"{_mpa(told['priming_pressure_trapped'])} trapped, equal fills",
+            f"{_mpa(calibration, 'priming_pressure_vented')} vented, driven chamber empty; "
+            f"{_mpa(calibration, 'priming_pressure_trapped')} trapped, equal fills",
         )
     if point.cavitation_margin is not None:
         yield "cavitation margin", _margin_text(calibration)
@@ -116,6 +127,8 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
     yield "gas line", line_text(calibration.gas_line)
     if line_warning(calibration.gas_line):
         yield "note", line_warning(calibration.gas_line)
+    if not _stated(calibration):
+        yield "note", UNSTATED[0].lower() + UNSTATED[1:].rstrip(".")
     if not chamber.status.ok:
         yield "note", chamber.status.text
     if calibration.instability is not None and calibration.instability.warning:
@@ -136,22 +149,23 @@ def _direction(calibration: Calibration) -> Iterator[tuple[str, str]]:
         yield "direction", text
 
 
-def _mpa(budget: Budget) -> str:
-    return _shown(budget, "MPa", scale=1e-6)
+def _mpa(calibration: Calibration, name: str) -> str:
+    return _shown(calibration, name, "MPa", scale=1e-6)
 
 
 def _usable_text(calibration: Calibration) -> str:
-    rest, told = calibration.residual, calibration.budgets["usable_moment"]
-    moment = f"{_shown(told, 'g mm', scale=1e6)} a pair"
+    rest, total = calibration.residual, calibration.budgets["usable_moment"].total
+    moment = f"{_shown(calibration, 'usable_moment', 'g mm', scale=1e6)} a pair"
     if rest.fill_ratio == 0:
         return f"{moment}; no gas enters the port before a chamber is empty"
+    by_geometry = _rounded(calibration, 1e6 * rest.pair_moment, 1e6 * total)
+    volume = _measured(calibration, rest.usable_volume, rest.usable_volume_uncertainty, "ml", scale=1e6)
+    depth = _measured(calibration, rest.depth, rest.depth_uncertainty, "mm", scale=1e3)
     return (
-        f"{moment} ({rounded(1e6 * rest.pair_moment, 1e6 * told.total)} by geometry) and "
-        f"{_measured(rest.usable_volume, rest.usable_volume_uncertainty, 'ml', scale=1e6)}, fills "
-        f"{_measured(rest.fill_ratio, rest.fill_ratio_uncertainty, '')} to "
-        f"{rounded(rest.largest_fill_ratio, rest.fill_ratio_uncertainty)}: below, with "
-        f"{_measured(rest.depth, rest.depth_uncertainty, 'mm', scale=1e3)} of liquid over the port, gas "
-        "passes through"
+        f"{moment} ({by_geometry} by geometry) and {volume}, fills "
+        f"{_measured(calibration, rest.fill_ratio, rest.fill_ratio_uncertainty)} to "
+        f"{_rounded(calibration, rest.largest_fill_ratio, rest.fill_ratio_uncertainty)}: below, with "
+        f"{depth} of liquid over the port, gas passes through"
     )
 
 
@@ -172,9 +186,9 @@ def _point_text(calibration: Calibration) -> str:
     where = f"{point.gas_pressure / 1e6:.4g} MPa, equal fills of {point.fill_ratio:g}"
     if point.regime is Regime.BLOCKED:
         names = ("priming_pressure_vented", "stall_pressure")
-        needed = max((told[name] for name in names if name in told), key=lambda budget: budget.value)
-        return f"{where}: blocked; raise gas.pressure towards {_mpa(needed)}"
-    return f"{where}: {point.regime.label}, {_shown(told['velocity'], 'm/s')}"
+        needed = max((name for name in names if name in told), key=lambda name: told[name].value)
+        return f"{where}: blocked; raise gas.pressure towards {_mpa(calibration, needed)}"
+    return f"{where}: {point.regime.label}, {_shown(calibration, 'velocity', 'm/s')}"
 
 
 def _margin_text(calibration: Calibration) -> str:
@@ -189,9 +203,9 @@ def _margin_text(calibration: Calibration) -> str:
     )
     if abs(margin) < width:
         verdict += ", within its uncertainty either way"
-    shown = _measured(margin, width, "MPa", scale=1e-6)
+    shown = _measured(calibration, margin, width, "MPa", scale=1e-6)
     sign = "+" if margin > 0 else ""
-    cavity = rounded((point.cavity_pressure or 0.0) / 1e6, width / 1e6)
+    cavity = _rounded(calibration, (point.cavity_pressure or 0.0) / 1e6, width / 1e6)
     return f"{sign}{shown} above {cavity} MPa: {verdict}"
 
 
@@ -214,11 +228,11 @@ def _chamber_table(calibration: Calibration) -> Table:
         table.add_row(
             f"{chamber.fill_ratio[i]:g}",
             f"{1e3 * chamber.ring.surface_radius[i]:.2f}",
-            rounded(p / 1e6, pressure_total[i] / 1e6),
-            rounded(paper_pressure[row] / 1e6, pressure_total[i] / 1e6),
+            _rounded(calibration, p / 1e6, pressure_total[i] / 1e6),
+            _rounded(calibration, paper_pressure[row] / 1e6, pressure_total[i] / 1e6),
             _off(float(paper_pressure[row]), p),
-            rounded(1e6 * u, 1e6 * moment_total[i]),
-            rounded(1e6 * paper_moment[row], 1e6 * moment_total[i]),
+            _rounded(calibration, 1e6 * u, 1e6 * moment_total[i]),
+            _rounded(calibration, 1e6 * paper_moment[row], 1e6 * moment_total[i]),
             _off(float(paper_moment[row]), u),
             *([str(states[row])] if limited else []),
         )
@@ -226,7 +240,9 @@ def _chamber_table(calibration: Calibration) -> Table:
 
 
 def _off(found: float, reference: float) -> str:
-    return f"{100 * (found / reference - 1):+.1f}" if reference else ""
+    """Percent, a zero without sign."""
+    shown = f"{100 * (found / reference - 1):+.1f}" if reference else ""
+    return "0.0" if shown in ("+0.0", "-0.0") else shown
 
 
 def _tube_table(calibration: Calibration) -> Table:
@@ -263,7 +279,7 @@ def _law_table(calibration: Calibration) -> Table:
         flow = calibration.flow_law.evaluate(fill_ratio=x, gas_pressure=p)
         by_paper = calibration.paper_law.evaluate(fill_ratio=x, gas_pressure=p).velocity
         cells = (
-            _cell(Regime(int(r)), *values)
+            _cell(calibration, Regime(int(r)), *values)
             for r, *values in zip(flow.regime, flow.velocity, flow.uncertainty, by_paper, strict=True)
         )
         table.add_row(f"{p / 1e6:.3g}", *cells)
@@ -276,8 +292,8 @@ def _law_table(calibration: Calibration) -> Table:
     return table
 
 
-def _cell(regime: Regime, velocity: float, total: float, by_paper: float) -> str:
-    shown = "-" if regime is Regime.BLOCKED else f"{rounded(velocity, total)}{_MARKS[regime]}"
+def _cell(calibration: Calibration, regime: Regime, velocity: float, total: float, by_paper: float) -> str:
+    shown = "-" if regime is Regime.BLOCKED else f"{_rounded(calibration, velocity, total)}{_MARKS[regime]}"
     return f"{shown} ({by_paper:.1f})"
 
 

@@ -12,8 +12,12 @@ injection.  What the column coasts after the gas is shut is not subtracted: the 
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+
+Number = TypeVar("Number", float, FloatArray)
 
 
 def first_gas_time(scene: Scene) -> float:
@@ -54,7 +58,7 @@ def _within_limits(scene: Scene, commanded: float) -> float:
     return min(max(commanded, scene.controller.minimum_gas_time), scene.controller.maximum_gas_time)
 
 
-def start_up_time(*, density: float, length: float, velocity: float, driving_pressure: float) -> float:
+def start_up_time(*, density: float, length: float, velocity: Number, driving_pressure: Number) -> Number:
     """Time scale tau on which the column in the tube starts, s: rho L u0/p = 2 L/((k + 1) u0)."""
     return density * length * velocity / driving_pressure
 

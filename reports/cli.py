@@ -21,11 +21,9 @@ from ringbalance.reports.traces import untraced
 from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.faults import option_error
-from ringbalance.scene.platform.clock import since_start
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import messages_console
+from ringbalance.scene.platform.terminal import activity, messages_console, since_start
 
 DONE: Final = 0
 NOT_SOUND: Final = 1
@@ -62,7 +60,9 @@ def report(
     told, text = read_scene(scene)
     if interactive and isinstance(told, EccentricScene):
         problem = "a scene of eccentric masses holds no liquid"
-        raise option_error(option="--interactive", value=True, problem=problem, allowed="to leave it out")
+        raise SceneError.of_option(
+            option="--interactive", value=True, problem=problem, allowed="to leave it out"
+        )
     console = messages_console()
     with activity("report", "reading") as shown:
         finished = write_report(

@@ -6,19 +6,18 @@ from datetime import date
 from typing import Any
 
 from ringbalance.controller.eccentric_mass.study import eccentric_study
-from ringbalance.reports.evidence import FORMAT, Progress, finished_cases, scene_record, versions
+from ringbalance.reports.evidence import FORMAT, Progress, cases_of_report, scene_record
 from ringbalance.reports.numbers import given, short, with_unit
-from ringbalance.reports.provenance import provenance
+from ringbalance.reports.provenance import provenance, versions
 from ringbalance.reports.section import Level, Record
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
 from ringbalance.scene.keys.declaration import Key, keys_of
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.platform.processes import Workers
-from ringbalance.verification.catalogue import load_cases
-from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
+from ringbalance.scene.units import DIMENSIONS
+from ringbalance.verification.runner import DRIVEN, paper_scene
 
 
 def collect_eccentric(
@@ -34,13 +33,10 @@ def collect_eccentric(
     Raises: SceneError: a run that takes too many samples or steps.
     """
     tell = progress or (lambda _: None)
-    cases = [case.id for case in load_cases() if case.paper == DRIVEN]
-    with cases_under_way(
-        cases, scene=paper_scene(), level=level, mutations=level == "heavy", pool=pool
-    ) as under_way:
+    with cases_of_report(scene=paper_scene(), level=level, only=DRIVEN, pool=pool) as judged_cases:
         tell("balanced and locked run")
         study = eccentric_study(scene).document()
-        verification = finished_cases(under_way, tell)
+        verification, kept = judged_cases(tell)
     run = study.pop("run")
     return {
         "format": FORMAT,
@@ -59,7 +55,7 @@ def collect_eccentric(
         "verification": verification,
         "provenance": provenance(),
         "pictures": {"drawn": True, "text": "", "files": []},
-        "times": {"date": date.today().isoformat()},
+        "times": {"date": date.today().isoformat(), "kept_cases": kept},
     }
 
 

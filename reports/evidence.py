@@ -6,11 +6,12 @@ versions.
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import date
-from importlib.metadata import PackageNotFoundError, version
+from functools import partial
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -18,30 +19,30 @@ import numpy as np
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.line_runs import line_runs, line_runs_document
 from ringbalance.controller.loop import simulate
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.pictures.imported_field import shown_field
-from ringbalance.reports.provenance import provenance
+from ringbalance.reports.provenance import provenance, versions
+from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene
 from ringbalance.reports.section import Level, Record, Work
-from ringbalance.reports.sections import collected
+from ringbalance.reports.sections import begun, collected, finished
 from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import paper_numbers
+from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.document import merge_saved, results_document
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult
-from ringbalance.verification.runner import cases_under_way
+from ringbalance.verification.runner import DRIVEN, cases_under_way
 
 Progress = Callable[[str], None]
 
 FORMAT: Final = 1
-PACKAGES: Final = (
-    *("numpy", "scipy", "scikit-fem", "pyamg", "fluids", "chemicals", "meshio", "pydantic"),
-    *("matplotlib", "pyvista", "vtk", "jinja2", "ziamath"),
-)
+_ELSEWHERE: Final[Mapping[Level, str]] = MappingProxyType({"light": DRIVEN, "heavy": ""})
+"""Paper whose claims stand in the reports on its own balancer; here only where everything is asked for."""
 LAW_POINTS: Final = 51
 """Fill ratios at which the flow law is drawn."""
 
@@ -63,7 +64,8 @@ def collect_evidence(
     Raises: SceneError: a scene that cannot be calibrated or simulated.
     """
     tell = progress or (lambda _: None)
-    with cases_under_way(scene=scene, level=level, mutations=level == "heavy", pool=pool) as under_way:
+    with cases_of_report(scene=scene, level=level, without=_ELSEWHERE[level], pool=pool) as judged_cases:
+        apart = begun(scene, level, pool)
         tell("pressure field")
         pressure = _pressure(scene)
         tell("calibration")
@@ -72,12 +74,13 @@ def collect_evidence(
         runs = _closed_loop(scene, calibration)
         tell("sections")
         work = Work(scene=scene, calibration=calibration, level=level)
-        sections = collected(work, last=False)
+        sections = collected(work, without=apart)
         tell("verification")
-        cases = merge_saved(finished_cases(under_way, tell), saved)
+        found, kept = judged_cases(tell)
+    cases = merge_saved(found, saved)
     if judged is not None:
         judged(cases)
-    sections |= collected(work, last=True)
+    sections |= finished(apart, pool, scene, level)
     # What a section measured by the clock does not reproduce.
     clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}
     return {
@@ -97,21 +100,8 @@ def collect_evidence(
         "verification": cases,
         "pictures": {"drawn": False, "text": "The 3-D pictures were not asked for.", "files": []},
         "provenance": provenance(),
-        "times": {"date": date.today().isoformat()} | clocked,
+        "times": {"date": date.today().isoformat(), "kept_cases": kept} | clocked,
     }
-
-
-def versions() -> Record:
-    """Versions of this program, of Python and of the packages that numbers come from."""
-    found = {"ringbalance": _version("ringbalance") or "not installed", "python": platform.python_version()}
-    return found | {name: told for name in PACKAGES if (told := _version(name))}
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return ""
 
 
 def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
@@ -124,6 +114,7 @@ def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
         "text": text,
         "origins": dict(scene.origins),
         "measured": asdict(scene.measured) if scene.measured.files else None,
+        "states_uncertainty": bool(scene.uncertainty),
         "table": rows,
     }
 
@@ -154,13 +145,60 @@ def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
     }
 
 
-def finished_cases(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:
+@contextmanager
+def cases_of_report(
+    *,
+    scene: Scene,
+    level: Level,
+    only: str = "",
+    without: str = "",
+    pool: Workers | None = None,
+) -> Iterator[Callable[[Progress], tuple[list[Record], dict[str, str]]]]:
+    """Start the cases of a report that no earlier one has kept; they run beside the body.
+
+    Args: `only`, `without`: a paper's name. `pool`: runs cases beside this process.
+    Yields: What waits for them, to be called in the body: records of all cases, and the date of each that an
+    earlier report has kept.
+    """
+    ids = [case.id for case in load_cases() if case.paper != without and only in ("", case.paper)]
+    kept = kept_cases() if level == "light" else {}
+    wanted = [name for name in ids if name not in kept]
+
+    def finished(under_way: Iterator[CaseResult], tell: Progress) -> tuple[list[Record], dict[str, str]]:
+        ran = {case["id"]: case for case in _finished(under_way, tell)}
+        if level == "light":
+            _keep(ran, kept)
+        found = {name: ran[name] if name in ran else kept[name]["record"] for name in ids}
+        return list(found.values()), {name: kept[name]["date"] for name in ids if name not in ran}
+
+    if not wanted:
+        yield partial(finished, iter(()))
+        return
+    with cases_under_way(
+        wanted, scene=scene, level=level, mutations=level == "heavy", pool=pool
+    ) as under_way:
+        yield partial(finished, under_way)
+
+
+def _finished(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:
     """Records of the cases as they come."""
     results = []
     for result in under_way:
         tell(f"verification: {result.definition.title}")
         results.append(result)
     return [_without_time(case) for case in results_document(results)]
+
+
+def _keep(ran: Mapping[str, Record], kept: Mapping[str, Record]) -> None:
+    """Keep what other scenes' reports need not run again; what broke down is run again."""
+    today = date.today().isoformat()
+    new = {
+        name: {"date": today, "record": case}
+        for name, case in ran.items()
+        if looks_at_no_scene(case) and not case["broken"]
+    }
+    if new:
+        keep_cases({**kept, **new})
 
 
 def _without_time(case: Record) -> Record:

@@ -17,8 +17,7 @@ from ringbalance.reports.pages.extremes import axis_rows, map_drawings
 from ringbalance.reports.section import Cells
 from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.processes import checked_workers
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import places_of
 from ringbalance.verification.extremes.study import (

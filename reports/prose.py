@@ -43,10 +43,14 @@ _UNITS: Final = {
     r" - ": " − ",
     r"'": "’",
 }
+_PLAIN: Final = re.compile(r"[^A-Za-z^%'*]*")
+"""What nothing here changes, unless it has a " - ": most cells of tables."""
 
 
 def typeset(text: str) -> str:
     """Sets plain prose such as "rho omega^2 R2^2 in um" with the signs that it means."""
+    if _PLAIN.fullmatch(text) and "- " not in text:
+        return text
     greek = _GREEK_WORD.sub(lambda match: _GREEK[match[1]], text)
     indexed = _INDEXED.sub(_index, greek)
     raised = _POWER.sub(lambda match: (match[1] or match[2]).translate(_SUPERSCRIPTS), indexed)

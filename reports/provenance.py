@@ -7,11 +7,16 @@ import os
 import platform
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
 from ringbalance.reports.section import Record
 
+_PACKAGES: Final = (
+    *("numpy", "scipy", "scikit-fem", "pyamg", "fluids", "chemicals", "meshio", "pydantic"),
+    *("matplotlib", "pyvista", "vtk", "jinja2", "ziamath"),
+)
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _LOCK: Final = _ROOT / "requirements" / "lock.txt"
 _PATIENCE: Final = 10.0
@@ -29,6 +34,19 @@ def provenance() -> Record:
         "command": " ".join([Path(sys.argv[0]).name, *map(_bare, sys.argv[1:])]),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} logical processors",
     }
+
+
+def versions() -> Record:
+    """Versions of this program, of Python and of the packages that numbers come from."""
+    found = {"ringbalance": _version("ringbalance") or "not installed", "python": platform.python_version()}
+    return found | {name: told for name in _PACKAGES if (told := _version(name))}
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""
 
 
 def _bare(argument: str) -> str:

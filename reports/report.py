@@ -95,7 +95,7 @@ class _Views:
         return views
 
     def _made(self, begun: Future[Record | None], here: Callable[[], Record | None]) -> Record | None:
-        return here() if self.pool is None or begun.cancel() else self.pool.result(begun, here)
+        return here() if self.pool is None else self.pool.taken(begun, here)
 
 
 def write_report(

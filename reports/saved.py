@@ -1,14 +1,25 @@
-"""Results of heavy cases kept from earlier runs: those of an output folder, and those packaged."""
+"""Results of cases kept from earlier runs, so that a report runs only what its scene requires.
+
+Heavy cases: those of an output folder, and those packaged.  Light cases that look at no scene: what this very
+program has found before, on the same packages and the same kind of processor.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import json
+import platform
 from collections.abc import Mapping
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+from ringbalance.controller.compilation.cache import OTHER, checked_content, discard, write_checked
+from ringbalance.controller.compilation.compiled import code_folder
+from ringbalance.reports.provenance import versions
 from ringbalance.scene.faults import toml_text
 
 Record = dict[str, Any]
@@ -95,3 +106,54 @@ def _problem(document: Any) -> str:
 
 def _shown(value: Any) -> str:
     return "missing" if value is None else toml_text(value)
+
+
+_PREFIX: Final = "cases-"
+_DECIDING: Final = (
+    *("scene", "mesh", "physics", "reduced_model", "controller", "identification"),
+    *("verification", "scenes"),
+)
+"""Rooms whose files decide what a case finds."""
+
+
+def looks_at_no_scene(case: Mapping[str, Any]) -> bool:
+    """Whether a case's record is the same for every scene, and cheap enough to be run again unasked."""
+    return bool(case["judged_on"] == "paper" and case["cost"] == "light")
+
+
+def kept_cases() -> dict[str, Record]:
+    """By its id, each light case that looks at no scene: its record and the date on which it was run."""
+    path = _kept_file()
+    try:
+        found: dict[str, Record] = json.loads(checked_content(path))
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError):
+        discard(path)
+        return {}
+    return found
+
+
+def keep_cases(kept: Mapping[str, Record]) -> None:
+    """Keep what `kept_cases` gives, in place of what another version of the program has kept."""
+    path = _kept_file()
+    for other in path.parent.glob(f"{_PREFIX}*{OTHER}"):
+        discard(other)
+    # Without them the next report runs the cases again.
+    with contextlib.suppress(OSError):
+        write_checked(path, json.dumps(kept, allow_nan=False).encode())
+
+
+def _kept_file() -> Path:
+    return code_folder() / f"{_PREFIX}{_program()}{OTHER}"
+
+
+@cache
+def _program() -> str:
+    """Digest of all that decides what a case finds: this program's files, its packages, the processor."""
+    total = hashlib.sha256(json.dumps([versions(), platform.machine()]).encode())
+    for room in _DECIDING:
+        folder = Path(str(files(f"ringbalance.{room}")))
+        for path in sorted(p for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
+            total.update(f"{path.relative_to(folder)}\n".encode() + path.read_bytes())
+    return total.hexdigest()[:16]

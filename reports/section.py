@@ -86,8 +86,8 @@ class Section:
     """Which of the two documents it stands in."""
     collect: Callable[[Work], Record | None] = _nothing
     """Plain numbers and texts for the evidence, under the section's name; None: nothing there."""
-    last: bool = False
-    """Whether it is collected after the cases have run, which then have compiled what it needs."""
+    apart: bool = False
+    """Whether a worker may collect it: it takes long, and needs no compiled code."""
     show: Callable[[Record, Record], Record | None] = _everything
     """From its own evidence and the whole to what the template calls `view`: texts, `Drawing`s, or None."""
     always: bool = False

@@ -6,7 +6,9 @@ A new one is a module with its `SECTION`, a template of its name, and a line in 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from concurrent.futures import Future
+from functools import partial
 from itertools import count
 from types import MappingProxyType
 from typing import Any, Final
@@ -31,7 +33,10 @@ from ringbalance.reports.pages import model_selection as trade
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside
-from ringbalance.reports.section import Place, Record, Section, Work
+from ringbalance.reports.section import Level, Place, Record, Section, Work
+from ringbalance.scene import Scene
+from ringbalance.scene.platform.processes import Workers
+from ringbalance.verification.loops import calibration_of
 
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
@@ -63,13 +68,39 @@ SECTIONS: Final[tuple[Section, ...]] = (
     measured.SECTION,
     Section(name="scene", title="Scene file, mesh and versions"),
 )
+Begun = dict[str, Future[Record | None]]
 PREFIXES: Final[Mapping[Place, str]] = MappingProxyType({"report": "", "annex": "A"})
 """Before the number of every section, figure, table and equation of a document."""
 
 
-def collected(work: Work, *, last: bool) -> Record:
+def begun(scene: Scene, level: Level, pool: Workers | None) -> Begun:
+    """Have a worker, where there is one, collect the evidence of sections apart."""
+    if pool is None:
+        return {}
+    apart = [section.name for section in SECTIONS if section.apart]
+    return {name: pool.submit(section_evidence, name, scene, level) for name in apart}
+
+
+def section_evidence(name: str, scene: Scene, level: Level) -> Record | None:
+    """What one section collects of a scene."""
+    work = Work(scene=scene, calibration=calibration_of(scene), level=level)
+    return next(section for section in SECTIONS if section.name == name).collect(work)
+
+
+def collected(work: Work, *, without: Collection[str]) -> Record:
     """The evidence of the sections that have some of their own."""
-    found = {section.name: section.collect(work) for section in SECTIONS if section.last is last}
+    found = {section.name: section.collect(work) for section in SECTIONS if section.name not in without}
+    return {name: record for name, record in found.items() if record is not None}
+
+
+def finished(begun: Begun, pool: Workers | None, scene: Scene, level: Level) -> Record:
+    """The evidence of sections `begun` apart; what no worker has begun is collected here."""
+    if pool is None:
+        return {}
+    found = {
+        name: pool.taken(future, partial(section_evidence, name, scene, level))
+        for name, future in reversed(begun.items())
+    }
     return {name: record for name, record in found.items() if record is not None}
 
 

@@ -19,13 +19,12 @@ from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reports.figures import deferred
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.faults import option_error
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, checked_law
 from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.progress import Activity, activity
-from ringbalance.scene.platform.terminal import results_console
+from ringbalance.scene.platform.terminal import Activity, activity, results_console
 
 SETTLED: Final = 0
 NOT_SETTLED: Final = 1
@@ -88,7 +87,7 @@ def _check_output(option: str, path: Path | None, ending: str) -> None:
         return
     if path.suffix.lower() != ending:
         problem = "this name does not say what is written"
-        raise option_error(
+        raise SceneError.of_option(
             option=option, value=str(path), problem=problem, allowed=f"a file name that ends in {ending}"
         )
     check_file(path)
@@ -98,7 +97,7 @@ def _with_seed(scene: AnyScene, seed: int | None) -> AnyScene:
     if seed is None:
         return scene
     if not 0 <= seed <= _LARGEST_SEED:
-        raise option_error(
+        raise SceneError.of_option(
             option="--seed", value=seed, problem="out of range", allowed="a whole number from 0 to 2^63 - 1"
         )
     return replace(scene, run=replace(scene.run, seed=seed))

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from markupsafe import Markup, escape
 
+from ringbalance.reduced_model.budget import believed
 from ringbalance.reports.numbers import shown
 from ringbalance.reports.prose import typeset
 
@@ -25,7 +26,7 @@ def traced(text: str, path: str) -> str:
 
 def untraced(text: str) -> str:
     """The text alone, for a terminal."""
-    return _TRACED.sub(r"\2", text)
+    return _TRACED.sub(r"\2", text) if _OPEN in text else text
 
 
 def marked_up(value: object) -> object:
@@ -51,8 +52,6 @@ def _lowered(text: str) -> str:
     return Markup(_INDEXED.sub(r"\1<sub>\2</sub>", str(escape(text)))) if _INDEXED.search(text) else text
 
 
-_ROUNDING: Final = 5e-4
-"""Relative half-width of an input of three digits, the fewest that scene files have."""
 _DIGITS: Final = 4
 
 
@@ -82,17 +81,10 @@ def found_at(evidence: Any, path: str) -> Any:
 def read(evidence: Any, path: str, unit: str, *, width: float | None = None, digits: int = 3) -> str:
     """The evidence's value at a place in the unit that suits it, with its half-width (95 %, SI), traced."""
     value = evidence_at(evidence, path)
-    known = believed(evidence, value, width)
+    known = believed(value, width, stated=states_uncertainty(evidence))
     return traced(shown(value, unit, known, digits=digits if known == width else _DIGITS), path)
 
 
 def states_uncertainty(evidence: Any) -> bool:
     """Whether the scene file says of any input how uncertain it is."""
-    rows = evidence.get("scene", {}).get("table") or []
-    return any(row.get("uncertainty") for row in rows if row.get("origin") != "default")
-
-
-def believed(evidence: Any, value: float | None, width: float | None) -> float | None:
-    """The half-width of a value; None where it is finer than inputs of which the scene says nothing."""
-    fine = value is not None and width and width <= _ROUNDING * abs(value)
-    return None if fine and not states_uncertainty(evidence) else width
+    return bool(evidence.get("scene", {}).get("states_uncertainty"))

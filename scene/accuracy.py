@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, Literal, TypeVar
 
-from ringbalance.scene.faults import SceneError, option_error
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.units import FieldError, parse_quantity
 
@@ -54,4 +54,4 @@ def _read_tolerance(text: str) -> float:
 
 
 def _error(value: str, problem: str, allowed: str) -> SceneError:
-    return option_error(option="--tolerance", value=value, problem=problem, allowed=allowed)
+    return SceneError.of_option(option="--tolerance", value=value, problem=problem, allowed=allowed)

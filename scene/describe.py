@@ -8,14 +8,13 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.scene import deferred
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import Fault, toml_text
 from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of, shown
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Bend, Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
-from ringbalance.scene.units import format_quantity
+from ringbalance.scene.units import DIMENSIONS, format_quantity
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,8 +6,12 @@ field's key takes and means stands in its annotation, see `ringbalance.scene.key
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, Literal
 
+import numpy as np
+
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_control_models import (
     FineTuning,
     FrictionFilter,
@@ -66,6 +70,12 @@ class EccentricRotor:
         needed("list of { time, speed }; the speed is linear in between, and constant before and after"),
         listed('[{ time = "0 s", speed = "100 rpm" }, ...]'),
     ]
+
+    @property
+    def profile(self) -> tuple[FloatArray, FloatArray]:
+        """Times, s, and speeds, rad/s, of the corners of the speed profile."""
+        times = np.array([corner.time for corner in self.speed_profile])
+        return times, np.array([corner.speed for corner in self.speed_profile])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,3 +165,15 @@ class EccentricScene(SceneFile):
     def balancer(self) -> Literal["eccentric_mass"]:
         """Kind of balancer, as the scene file names it."""
         return "eccentric_mass"
+
+    @property
+    def samples(self) -> int:
+        """Of a run that does not diverge."""
+        return round(self.run.time_limit / self.sensor.step) + 1
+
+    @property
+    def steady_until(self) -> float | None:
+        """Time at which the speed first changes, s; None: it keeps its first value to the end of the run."""
+        corners = pairwise(self.rotor.speed_profile)
+        changes = [here.time for here, after in corners if here.speed != after.speed]
+        return changes[0] if changes and 0 < changes[0] < self.run.time_limit else None

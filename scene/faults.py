@@ -66,13 +66,18 @@ class SceneError(Exception):
         """Rebuild from the list of errors, so that the error survives the way back from a worker process."""
         return type(self), (self.faults,)
 
-
-def option_error(*, option: str, value: object, problem: str, allowed: str) -> SceneError:
-    """The error of a command-line option that cannot be used."""
-    fault = Fault(
-        file="command line", table="", key=option, value=toml_text(value), problem=problem, allowed=allowed
-    )
-    return SceneError([fault])
+    @classmethod
+    def of_option(cls, *, option: str, value: object, problem: str, allowed: str) -> SceneError:
+        """The error of a command-line option that cannot be used."""
+        fault = Fault(
+            file="command line",
+            table="",
+            key=option,
+            value=toml_text(value),
+            problem=problem,
+            allowed=allowed,
+        )
+        return cls([fault])
 
 
 def closest(word: str, known: Iterable[str]) -> str:

@@ -1,4 +1,7 @@
-"""Known liquids by name and temperature, with their uncertainties; a temperature without data is refused."""
+"""Known liquids by name and temperature, with their uncertainties; a temperature without data is refused.
+
+`with_liquid` takes the liquid of a scene from them, or as given outright, or partly both.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,15 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from types import MappingProxyType
+from typing import Any
 
-from ringbalance.scene.faults import did_you_mean
+from chemicals.iapws import iapws95_Psat, iapws95_rho
+from chemicals.viscosity import mu_IAPWS
+
+from ringbalance.scene.faults import Fault, did_you_mean
+from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.models import Liquid
 from ringbalance.scene.units import FieldError
-from ringbalance.scene.water import COLDEST, HOTTEST, water_properties
 
 _ZERO_CELSIUS = 273.15
 _SAME_TEMPERATURE = 0.01
@@ -33,6 +40,13 @@ _ALIASES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
     }
 )
 """Name in the data file: name here, further names; the data file's own name is understood too."""
+COLDEST = 273.15
+"""K; water freezes below."""
+HOTTEST = 373.05
+"""K (99.9 degC); water boils at atmospheric pressure just above."""
+_ATMOSPHERIC_PRESSURE = 101325.0
+_DENSITY, _VISCOSITY, _VAPOUR = "liquid.density", "liquid.kinematic_viscosity", "liquid.vapour_pressure"
+_OUTRIGHT = "density and kinematic_viscosity given outright"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,13 +89,13 @@ def known_liquids() -> tuple[KnownLiquid, ...]:
     return tuple(liquid for liquid, _ in _library().values())
 
 
-def find_liquid(*, name: str) -> KnownLiquid | None:
+def _find_liquid(*, name: str) -> KnownLiquid | None:
     """The liquid of any of its names, such as "Silicone oil 100 cSt"; None when no liquid has it."""
     plain = _plain(name)
     return next((liquid for liquid in known_liquids() if plain in map(_plain, _names(liquid))), None)
 
 
-def unknown_liquid(*, name: str) -> FieldError:
+def _unknown_liquid(*, name: str) -> FieldError:
     """The error that a liquid is not known, and which ones are; to be raised or reported."""
     names = [each for liquid in known_liquids() for each in _names(liquid)]
     held = ", ".join(f'"{liquid.name}"' for liquid in known_liquids())
@@ -99,11 +113,11 @@ def liquid_at(*, name: str, temperature: float) -> Liquid:
     Args: `name`: any of the liquid's names. `temperature`: K.
     Returns: The liquid with its uncertainties.
     Raises: FieldError: an unknown name, or a temperature outside the data.
-    Source: the rows of `data/fluid_properties.csv`, each with its own; water, `water_properties`.
+    Source: the rows of `data/fluid_properties.csv`, each with its own; water, `_water_properties`.
     """
-    liquid = find_liquid(name=name)
+    liquid = _find_liquid(name=name)
     if liquid is None:
-        raise unknown_liquid(name=name)
+        raise _unknown_liquid(name=name)
     if not liquid.holds(temperature):
         shown = f"{temperature - _ZERO_CELSIUS:.6g} degC"
         raise FieldError(f"there are no data for {liquid.name} at {shown}", f"{liquid.name} at {liquid.held}")
@@ -125,7 +139,7 @@ def _properties(liquid: KnownLiquid, temperature: float) -> tuple[float, float, 
     low, high = liquid.temperatures[0], liquid.temperatures[-1]
     inside = min(max(temperature, low), high)
     if liquid.name == _WATER:
-        return water_properties(temperature=inside)
+        return _water_properties(temperature=inside)
     return _interpolated(_library()[liquid.name][1], inside)
 
 
@@ -189,3 +203,123 @@ def _row(line: Mapping[str, str]) -> _Row:
         viscosity=float(line["nu_m2_s"]),
         vapour_pressure=float(line["vapour_pressure_Pa"]),
     )
+
+
+def _water_properties(*, temperature: float) -> tuple[float, float, float]:
+    """Properties of water at atmospheric pressure.
+
+    Args: `temperature`: K.
+    Returns: Density, kg/m^3; kinematic viscosity, m^2/s; vapour pressure, Pa absolute.
+    Range: `COLDEST` to `HOTTEST`, 101 325 Pa; at 10 MPa the density is 0.5 % higher, which is left out.
+    Source: density and vapour pressure, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002) 387 (IAPWS-95);
+        viscosity, Huber et al., J. Phys. Chem. Ref. Data 38 (2009) 101 (IAPWS 2008); package `chemicals`.
+    """
+    density = float(iapws95_rho(temperature, _ATMOSPHERIC_PRESSURE))  # type: ignore[no-untyped-call]
+    viscosity = float(mu_IAPWS(temperature, density))
+    vapour_pressure = float(iapws95_Psat(temperature))  # type: ignore[no-untyped-call]
+    return density, viscosity / density, vapour_pressure
+
+
+def with_liquid(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
+    """The liquid's values, as far as they can be known, what is given outright first; and what is wrong."""
+    if "liquid" in reading.broken or not reading.given("liquid"):
+        return reading, ()
+    liquid = _find_liquid(name=reading.values["liquid.name"]) if reading.known("liquid.name") else None
+    faults = _faults(reading, liquid)
+    looked_up = None if faults or liquid is None else _looked_up(reading, liquid)
+    return reading.adding(_liquid_values(reading, looked_up)), faults
+
+
+def _incomplete(reading: Reading) -> bool:
+    return reading.lacks(_DENSITY) or reading.lacks(_VISCOSITY)
+
+
+def _faults(reading: Reading, liquid: KnownLiquid | None) -> tuple[Fault, ...]:
+    if liquid is not None:
+        return _temperature_faults(reading, liquid)
+    if not _incomplete(reading) or "liquid.name" in reading.broken:
+        return ()
+    if reading.known("liquid.name"):
+        error = _unknown_liquid(name=reading.values["liquid.name"])
+        return (reading.fault("liquid.name", problem=error.problem, allowed=error.allowed),)
+    if reading.lacks(_DENSITY) and reading.lacks(_VISCOSITY):
+        allowed = f"a known liquid's name with its temperature, or {_OUTRIGHT}"
+        return (reading.fault("liquid.name", problem="the liquid is not named", allowed=allowed),)
+    path = _DENSITY if reading.lacks(_DENSITY) else _VISCOSITY
+    allowed = f"{reading.allowed(path)}; or the name of a known liquid"
+    return (reading.fault(path, problem="it is needed for a liquid without a known name", allowed=allowed),)
+
+
+def _temperature_faults(reading: Reading, liquid: KnownLiquid) -> tuple[Fault, ...]:
+    held = f"{liquid.name} at {liquid.held}"
+    path = "liquid.temperature"
+    if reading.known(path):
+        temperature = reading.values[path]
+        if liquid.holds(temperature) or not (_incomplete(reading) or reading.lacks(_VAPOUR)):
+            return ()
+        problem = f"there are no data for {liquid.name} at this temperature"
+        allowed = f"{held}; or density, kinematic_viscosity and vapour_pressure given outright"
+        return (reading.fault(path, problem=problem, allowed=allowed),)
+    if len(liquid.temperatures) == 1 or not reading.lacks(path) or not _incomplete(reading):
+        return ()
+    problem = "the properties of a known liquid depend on it"
+    return (reading.fault(path, problem=problem, allowed=f"{held}; or {_OUTRIGHT}"),)
+
+
+def _looked_up(reading: Reading, liquid: KnownLiquid) -> Liquid | None:
+    temperature = reading.values.get("liquid.temperature")
+    if temperature is None and len(liquid.temperatures) == 1 and reading.lacks("liquid.temperature"):
+        temperature = liquid.temperatures[0]
+    if temperature is None or not liquid.holds(temperature):
+        return None
+    return liquid_at(name=liquid.name, temperature=temperature)
+
+
+def _liquid_values(reading: Reading, looked_up: Liquid | None) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    if looked_up is not None:
+        found = {
+            _DENSITY: looked_up.density,
+            _VISCOSITY: looked_up.kinematic_viscosity,
+            _VAPOUR: looked_up.vapour_pressure,
+            "liquid.temperature": looked_up.temperature,
+        }
+        values |= {path: value for path, value in found.items() if reading.lacks(path)}
+    elif reading.lacks(_VAPOUR):
+        values[_VAPOUR] = 0.0
+    if reading.lacks("liquid.name"):
+        values["liquid.name"] = "custom"
+    return (
+        values
+        | _uncertainties(reading, values, looked_up)
+        | {"liquid.source": _source_of(reading, looked_up)}
+    )
+
+
+def _uncertainties(reading: Reading, values: dict[str, Any], looked_up: Liquid | None) -> dict[str, float]:
+    known = (0.0, 0.0)
+    if looked_up is not None:
+        known = (looked_up.density_uncertainty, looked_up.viscosity_uncertainty)
+    keys = ("density", "kinematic_viscosity")
+    names = ("liquid.density_uncertainty", "liquid.viscosity_uncertainty")
+    merged = {**reading.values, **values}
+    return {
+        name: _relative(merged, key, otherwise=0.0 if reading.known(f"liquid.{key}") else uncertainty)
+        for name, key, uncertainty in zip(names, keys, known, strict=True)
+    }
+
+
+def _relative(values: dict[str, Any], key: str, *, otherwise: float) -> float:
+    if f"uncertainty.{key}" not in values or f"liquid.{key}" not in values:
+        return otherwise
+    width, relative = values[f"uncertainty.{key}"]
+    return float(width if relative else width / values[f"liquid.{key}"])
+
+
+def _source_of(reading: Reading, looked_up: Liquid | None) -> str:
+    named = {"density": _DENSITY, "kinematic viscosity": _VISCOSITY, "vapour pressure": _VAPOUR}
+    outright = [name for name, path in named.items() if reading.known(path)]
+    given = f"{', '.join(outright)} given outright" if outright else ""
+    if looked_up is None:
+        return given if _VAPOUR in reading.values else f"{given}; vapour pressure not given, taken as 0 Pa"
+    return looked_up.source if not given else f"{given}; otherwise {looked_up.source}"

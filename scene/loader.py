@@ -14,16 +14,15 @@ from typing import Any
 from ringbalance.scene import deferred
 from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
-from ringbalance.scene.keys.completion import completed, missing_faults
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.reading import Reading, read_document
 from ringbalance.scene.keys.schema import BALANCERS, LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.liquids import with_liquid
 from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import ShownOrigin
 from ringbalance.scene.rules import shape, working
 from ringbalance.scene.rules.check import failed_checks
-from ringbalance.scene.working_liquid import with_liquid
 
 _LARGEST_FILE = 2**20
 _DECIDE_NOTHING = ("requirement.", "measured.", "rotor.mass", "liquid.source")
@@ -165,16 +164,16 @@ def _read_liquid_ring(document: Mapping[str, Any], *, file: str) -> tuple[Readin
     if any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
         reading, mesh_faults = deferred.with_chamber(reading)
         faults = (*faults, *mesh_faults)
-    reading, liquid_faults = with_liquid(completed(reading))
+    reading, liquid_faults = with_liquid(reading.completed())
     failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS))
     uncertain = working.uncertainty_faults(reading)
-    return reading, (*faults, *missing_faults(reading), *liquid_faults, *failed, *uncertain)
+    return reading, (*faults, *reading.missing_faults(), *liquid_faults, *failed, *uncertain)
 
 
 def _read_eccentric_mass(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file, schema=deferred.ECCENTRIC_MASS)
-    reading = completed(reading)
-    return reading, (*faults, *missing_faults(reading), *failed_checks(reading, deferred.CHECKS))
+    reading = reading.completed()
+    return reading, (*faults, *reading.missing_faults(), *failed_checks(reading, deferred.CHECKS))
 
 
 def _kind(document: Mapping[str, Any]) -> str:

@@ -3,6 +3,10 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.keys.declaration import UNCERTAIN, derived, needed, shown, standard, unused
 from ringbalance.scene.keys.derivations import trial_sequence
 from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, chamber_letters, quantity, whole
@@ -52,6 +56,10 @@ class Vibration:
     phase: Annotated[Turn, needed("of the vibration, with the rotation")]
 
 
+def _influence(coefficient: float, lag_angle: float) -> complex:
+    return complex(coefficient * np.exp(-1j * lag_angle))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Rotor:
     """The rotor as the balancer sees it: V1 = V0 + K U with K = influence_coefficient at minus lag_angle."""
@@ -88,6 +96,31 @@ class Rotor:
         unused("no balance quality grade is stated", "of the rotor; for grades of ISO 21940-11 only"),
         shown("mass", "kg"),
     ] = None
+
+    @property
+    def influence(self) -> complex:
+        """Vibration per unbalance as a vector, K = kappa exp(-j lag), m/(kg m).
+
+        Source: Eq. 23 of the liquid-ring paper; the sign of the lag is a convention of this program.
+        """
+        return _influence(self.influence_coefficient, self.lag_angle)
+
+    @property
+    def initial_vibration(self) -> complex:
+        """Vibration with every pair level, V0 = v0 exp(j theta0), m zero-to-peak."""
+        return complex(self.initial_amplitude * np.exp(1j * self.initial_phase))
+
+    @property
+    def initial_unbalance(self) -> complex:
+        """Moment that the initial vibration answers to, V0/K, kg m; the disc cancels it with its negative."""
+        return self.initial_vibration / self.influence
+
+    def vibration(self, moment: npt.ArrayLike) -> ComplexArray:
+        """Vibration with the disc's moment U, V1 = V0 + K U, m zero-to-peak.
+
+        Source: Eq. 23 of the liquid-ring paper.
+        """
+        return np.asarray(self.initial_vibration + self.influence * np.asarray(moment), dtype=np.complex128)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,6 +246,11 @@ class ControllerSettings:
         standard("0.8 um", "trial algorithm: amplitude below which short steps are used"),
         shown("short steps below", "um", only_for="trial"),
     ]
+
+    @property
+    def assumed_influence(self) -> complex:
+        """Vibration per unbalance that the controller takes for the rotor's, m/(kg m)."""
+        return _influence(self.assumed_influence_coefficient, self.assumed_lag_angle)
 
     def offsets(self, chambers: int) -> tuple[float, ...]:
         """`gas_time_offset` of every chamber, s."""

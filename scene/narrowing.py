@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from ringbalance.scene.faults import Fault, SceneError, option_error
+from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def checked_law(scene: AnyScene, law: str) -> None:
     """Raises: SceneError: the option `--law` of a scene whose balancer has no flow law."""
     if not isinstance(scene, Scene) and law != CALIBRATED:
         problem = f"the balancer of {scene.source} has no flow law"
-        raise option_error(
+        raise SceneError.of_option(
             option="--law", value=law, problem=problem, allowed="this option with a liquid ring alone"
         )
 

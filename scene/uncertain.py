@@ -9,10 +9,12 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
-from ringbalance.scene.chamber_file.stretching import STRETCHED, stretched
+import numpy as np
+
+from ringbalance.scene.chamber_file.record import STRETCHED
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.schema import LIQUID_RING
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import InputUncertainty, Scene
 
 NORMAL_95: Final = 1.959963984540054
 """Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
@@ -60,7 +62,7 @@ def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
         if quantity not in STRETCHED:
             raise ValueError(f"the mesh of a chamber has no {quantity} of its own")
         dimensions = {each: getattr(disc, each) for each in STRETCHED}
-        changed["geometry"] = stretched(geometry, dimensions=dimensions, quantity=quantity, value=value)
+        changed["geometry"] = geometry.stretched(dimensions=dimensions, quantity=quantity, value=value)
     return replace(scene, **{table: replace(getattr(scene, table), **changed)})
 
 
@@ -144,3 +146,18 @@ def _table_of(quantity: str) -> str:
     if quantity not in UNCERTAIN_QUANTITIES:
         raise ValueError(f"{quantity!r} is none of {', '.join(UNCERTAIN_QUANTITIES)}")
     return UNCERTAIN_QUANTITIES[quantity]
+
+
+def eccentric_drawn(scene: EccentricScene, random: np.random.Generator) -> EccentricScene:
+    """The scene with every stated input drawn: relative ones log-normal, so that none changes its sign."""
+    for uncertain in scene.uncertainty:
+        move = _drawn(uncertain, random.standard_normal() / NORMAL_95)
+        scene = eccentric_moved(scene, uncertain.quantity, move)
+    return scene
+
+
+def _drawn(uncertain: InputUncertainty, part: float) -> Callable[[float], float]:
+    """Args: `part`: of the half-width, a normal deviate."""
+    if uncertain.relative:
+        return lambda value: value * math.exp(math.log1p(uncertain.half_width) * part)
+    return lambda value: value + uncertain.half_width * part

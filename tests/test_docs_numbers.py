@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import euler_step_limit
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl
 from ringbalance.physics.sloshing.modes import resonant_fills
 from ringbalance.physics.sloshing.response import sloshing_response
@@ -46,7 +45,7 @@ def rotor() -> EccentricScene:
 
 def stiffness(scene: EccentricScene, speed: float, *, more: float = 1.0, mass: float = 0.0) -> complex:
     """K_B - M W^2 + j C_B W, with the page's changes of stiffness and mass."""
-    plant, w = plant_parameters(scene), speed * RPM
+    plant, w = PlantParameters.of(scene), speed * RPM
     return more * plant.stiffness - (plant.mass + mass) * w**2 + 1j * plant.damping * w
 
 
@@ -56,7 +55,7 @@ def whirl(scene: EccentricScene, speed: float) -> complex:
 
 
 def test_critical_speeds(rotor: EccentricScene) -> None:
-    plant, page = plant_parameters(rotor), "eccentric-masses.md"
+    plant, page = PlantParameters.of(rotor), "eccentric-masses.md"
     speeds = np.linspace(125.0, 140.0, 15001)
     peak = speeds[np.argmax([abs(whirl(rotor, speed)) for speed in speeds])]
     bare, loaded, more = (
@@ -71,7 +70,7 @@ def test_critical_speeds(rotor: EccentricScene) -> None:
 
 def test_what_wrong_assumptions_do(rotor: EccentricScene) -> None:
     limits = [
-        1e3 * float(euler_step_limit(model=believed_whirl(rotor), angular_velocity=speed * RPM))
+        1e3 * float(believed_whirl(rotor).euler_step_limit(angular_velocity=speed * RPM))
         for speed in (100, 230)
     ]
     page = "eccentric-masses.md"
@@ -85,7 +84,7 @@ def test_what_wrong_assumptions_do(rotor: EccentricScene) -> None:
 
 
 def test_where_friction_holds_the_masses(rotor: EccentricScene) -> None:
-    plant, page = plant_parameters(rotor), "eccentric-masses.md"
+    plant, page = PlantParameters.of(rotor), "eccentric-masses.md"
     start = plant.unbalance * cmath.exp(1j * plant.phase)
 
     def held(speed: float) -> bool:

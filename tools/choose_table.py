@@ -15,9 +15,9 @@ from pathlib import Path
 from ringbalance.scene import bundled_scene, load_scene, write_whole
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.selection_studies.choice import Values, choose
-from ringbalance.verification.selection_studies.choices import hierarchies_for
-from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
+from ringbalance.verification.selection_studies.choice import choose
+from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy, Values
+from ringbalance.verification.selection_studies.study import hierarchies_of
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "how-to-choose.md"
 TOLERANCES = (0.1, 1e-2, 1e-3, 1e-4)
@@ -41,11 +41,10 @@ def scenes() -> dict[str, tuple[Scene, tuple[str, ...]]]:
 
 def row(hierarchy: ModelHierarchy) -> str:
     """One row: a quantity with the model for each tolerance and its measured error."""
-    values, points = Values(hierarchy), tuple(range(len(hierarchy.points)))
-    cells = []
+    cells, values = [], Values(hierarchy)
     for tolerance in TOLERANCES:
         fidelity = choose(hierarchy, tolerance, values=values).fidelity
-        error = values.error(fidelity, hierarchy.top, points)
+        error = values.error(fidelity)
         told = "as the finest" if error < 3e-8 else f"{error:.0e}"
         cells.append(f"{fidelity.name} ({told})")
     return f"| {hierarchy.title} | " + " | ".join(cells) + f" | {hierarchy.top_uncertainty:.0e} |"
@@ -55,7 +54,7 @@ def table(name: str, *, only: tuple[str, ...] | None = None) -> list[str]:
     """Rows of one scene's table."""
     scene, quantities = scenes()[name]
     wanted = tuple(q for q in quantities if only is None or q in only)
-    return [row(hierarchy) for hierarchy in hierarchies_for(scene, wanted)]
+    return [row(hierarchy) for hierarchy in hierarchies_of(scene, wanted)]
 
 
 def page(text: str) -> str:

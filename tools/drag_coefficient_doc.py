@@ -13,8 +13,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.numbers import number, percent, shown
 from ringbalance.reports.pages.drag_coefficient import SECTION, liquid_cells
 from ringbalance.reports.section import Record, Work

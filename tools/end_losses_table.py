@@ -19,7 +19,7 @@ from flow_at_points import probe
 from rich.console import Console
 from rich.progress import Progress
 
-from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.convergence import gci
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow
@@ -28,7 +28,8 @@ from ringbalance.verification.navier_stokes.end_losses import (
     EndMesh,
     solve_end,
 )
-from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings
+from ringbalance.verification.navier_stokes.system import FlowSystem
 
 ENDS: tuple[End, End] = ("entrance", "exit")
 REYNOLDS_SCALE, REYNOLDS_LIMIT = 5.0, 2000.0

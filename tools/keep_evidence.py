@@ -16,7 +16,8 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from ringbalance.reports.evidence import FORMAT, versions
+from ringbalance.reports.evidence import FORMAT
+from ringbalance.reports.provenance import versions
 from ringbalance.reports.saved import PACKAGED, Record, heavy_cases
 from ringbalance.scene import write_whole
 

@@ -23,7 +23,7 @@ from flow_at_points import transfer
 from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
 
-from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.convergence import gci
 from ringbalance.physics.tube.rotation_table import (
     KL_LIMIT,
     KL_SCALE,
@@ -37,13 +37,14 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow
-from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
     solve_section,
     solve_section_without_inertia,
 )
+from ringbalance.verification.navier_stokes.system import FlowSystem
 
 COLUMNS = ("table", "a", "b", "coarse", "medium", "fine", "uncertainty")
 

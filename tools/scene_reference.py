@@ -12,12 +12,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ringbalance.scene import known_liquids, write_whole
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import toml_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
-from ringbalance.scene.units import unit_names
+from ringbalance.scene.units import DIMENSIONS
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"
 BLOCK = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
@@ -97,10 +96,7 @@ def liquid_reference() -> str:
 
 def unit_reference() -> str:
     """Write a Markdown table of the units."""
-    rows = (
-        f"| {kind.noun} | `{kind.example}` | {_units(unit_names(name).split(', '))} |"
-        for name, kind in DIMENSIONS.items()
-    )
+    rows = (f"| {kind.noun} | `{kind.example}` | {_units([*kind.units])} |" for kind in DIMENSIONS.values())
     return "\n".join(["| quantity | example | units |\n|---|---|---|", *rows])
 
 

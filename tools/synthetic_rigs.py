@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.rotor import chamber_letters
+from ringbalance.identification.balancers import model_errors, with_model_error
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.model_errors import model_errors, with_model_error
-from ringbalance.identification.predict.device import Models, models_of
+from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
@@ -64,7 +64,7 @@ def rig(number: int) -> Rig:
     """One rig; all draws follow from its number."""
     random = np.random.default_rng([17, number])
     scene = _scene(SCENES[number % len(SCENES)], random)
-    truth, models = _drawn(scene, random), models_of(scene)
+    truth, models = _drawn(scene, random), Models.of(scene)
     kinds = THREE_KINDS[number // len(SCENES) % len(THREE_KINDS)]
     return Rig(
         scene=scene,
@@ -198,7 +198,7 @@ def counted(numbers: Sequence[int]) -> tuple[Counter[str], Counter[str]]:
 def timed() -> str:
     """Processor time of a fit of four kinds of data, on an idle machine below 5 s."""
     scene = liquid_ring_scene(load_scene(bundled_scene(SCENES[0])))
-    random, models = np.random.default_rng(0), models_of(scene)
+    random, models = np.random.default_rng(0), Models.of(scene)
     kinds = ("trial_weight", "flow", "transfer", "injection")
     data = [measured(kind, scene, models, random, times=7) for kind in kinds]
     names = [*FITTED, "extra_loss"]

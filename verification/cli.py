@@ -16,8 +16,7 @@ from rich.text import Text
 from ringbalance.identification.data.measurements import MeasurementsError
 from ringbalance.scene import load_scene
 from ringbalance.scene.platform.processes import checked_workers
-from ringbalance.scene.platform.progress import Activity, activity
-from ringbalance.scene.platform.terminal import messages_console, results_console
+from ringbalance.scene.platform.terminal import Activity, activity, messages_console, results_console
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.catalogue import UnknownCaseError, load_case, load_cases
 from ringbalance.verification.document import definition_document, results_document

@@ -12,14 +12,11 @@ import numpy as np
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
-from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
-from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.law.building import calibrated_law
+from ringbalance.reduced_model.calibration import Calibration, calibrate, chamber_and_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import balancer_model
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reduced_model.tube.heads import tube_heads
+from ringbalance.reduced_model.selection.range_flow import steady
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Found, Series, figure
@@ -67,9 +64,9 @@ def mistaken_lag(scene: Scene) -> Scene:
 
 @lru_cache(maxsize=512)
 def run_loop(scene: Scene, law: str = "paper") -> Simulation:
-    """One closed-loop run. Args: `law`: "paper" or "calibrated"."""
+    """One closed-loop run. Args: `law`: "paper" or "calibrated"; one calibrated law serves all runs."""
     paper = law == "paper"
-    return simulate(scene, paper_model(scene) if paper else balancer_model(flow_law_of(_plain(scene))))
+    return simulate(scene, paper_model(scene) if paper else balancer_model(flow_law_of(steady(scene))))
 
 
 @lru_cache(maxsize=16)
@@ -81,17 +78,7 @@ def calibration_of(scene: Scene) -> Calibration:
 @lru_cache(maxsize=64)
 def flow_law_of(scene: Scene) -> CalibratedLaw:
     """The law of `calibrate` without the rest, which takes half of the time; the tube's models the finest."""
-    check_ring(scene)
-    return calibrated_law(scene=scene, chamber=calibrate_chamber(scene), heads=tube_heads(scene))
-
-
-def _plain(scene: Scene) -> Scene:
-    """The calibration does not see rotor vibration, sensor and controller: one serves all runs."""
-    rotor = dataclasses.replace(scene.rotor, initial_amplitude=LARGEST, initial_phase=0.0)
-    controller = dataclasses.replace(
-        scene.controller, kind="target_vector", period=1.0, proportional=1.0, integral_time=None
-    )
-    return dataclasses.replace(scene, rotor=rotor, controller=controller)
+    return chamber_and_law(scene)[1]
 
 
 def sampled_amplitudes(run: Simulation) -> np.ndarray:

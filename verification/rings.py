@@ -6,7 +6,7 @@ import dataclasses
 from functools import lru_cache
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
-from ringbalance.physics.convergence.grid import GridConvergence, Verdict
+from ringbalance.physics.convergence import GridConvergence, Verdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate
 from ringbalance.scene.models import Disc, Scene

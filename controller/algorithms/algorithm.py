@@ -24,6 +24,11 @@ class Measurement:
     at_residual: tuple[bool, ...] = ()
     """Of every chamber, whether its last injection was shortened to keep its residual fill; empty: none."""
 
+    def usable(self, *, needs_phase: bool) -> bool:
+        """Whether it holds finite numbers in what the algorithm reads."""
+        finite = math.isfinite(self.time) and math.isfinite(self.amplitude)
+        return finite and (not needs_phase or math.isfinite(self.phase))
+
 
 @dataclass(frozen=True, kw_only=True)
 class ValveCommand:
@@ -64,13 +69,6 @@ class Controller(Protocol[StateT]):
     def step(self, state: StateT, measurement: Measurement | None) -> tuple[StateT, Command]:
         """Next state and command after one sample (None: dropped); a pure function."""
         ...
-
-
-def usable(measurement: Measurement | None, *, needs_phase: bool) -> bool:
-    """Whether a sample holds finite numbers in what the algorithm reads; a dropped one does not."""
-    if measurement is None or not math.isfinite(measurement.time):
-        return False
-    return math.isfinite(measurement.amplitude) and (not needs_phase or math.isfinite(measurement.phase))
 
 
 def valve_commands(

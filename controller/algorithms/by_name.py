@@ -9,9 +9,9 @@ from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.algorithms.target_vector import TargetVector
 from ringbalance.controller.algorithms.trial import Trial
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
-from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
-from ringbalance.controller.rotor import chamber_letters, influence
+from ringbalance.controller.rotor import chamber_letters
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.describe import scene_fault
@@ -86,10 +86,8 @@ def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
             integrator=closed_form if has_closed_form(model.flow) else quadrature,
             residual_fill=residual_fill_ratio(scene, law=model.flow),
         ),
-        initial=initial_state(disc=scene.disc),
-        influence=influence(
-            coefficient=settings.assumed_influence_coefficient, lag_angle=settings.assumed_lag_angle
-        ),
+        initial=DiscState.initial(disc=scene.disc),
+        influence=settings.assumed_influence,
         limit=settings.limit,
         amplitude_noise=scene.sensor.amplitude_noise,
         phase_noise=scene.sensor.phase_noise,

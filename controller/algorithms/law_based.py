@@ -9,13 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.algorithms.algorithm import (
-    Command,
-    Measurement,
-    ValveCommand,
-    usable,
-    valve_commands,
-)
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand, valve_commands
 from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
 from ringbalance.controller.liquid_ring.opening import gas_time
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
@@ -38,6 +32,33 @@ class InfluenceEstimate:
     """K, m/(kg m)."""
     variance: float
     """Mean square of its error, both components together, (m/(kg m))^2."""
+
+    def updated(
+        self,
+        *,
+        moment_change: complex,
+        vibration_change: complex,
+        noise_variance: float,
+        law_standard_deviation: float,
+        assumed_magnitude: float,
+    ) -> InfluenceEstimate:
+        """Learn from one operation, dV = K dU + noise, by a Kalman filter of one complex number.
+
+        gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with R =
+        `noise_variance` + (s |K dU|)^2, s = `law_standard_deviation` (relative): a response that noise could
+        have made moves K little, and no moment counts as better known than by s. P never falls below
+        (s |K|)^2, so the estimate keeps following. All SI; variances are of both components together.
+        Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", J. Basic Eng. 82 (1960).
+        """
+        k, p = self.value, self.variance
+        expected = abs(moment_change) ** 2 * p
+        if expected == 0:
+            return self
+        rest = noise_variance + abs(law_standard_deviation * k * moment_change) ** 2
+        gain = p * moment_change.conjugate() / (expected + rest)
+        value = _held(k + gain * (vibration_change - k * moment_change), k, assumed_magnitude)
+        left = p * rest / (expected + rest)
+        return InfluenceEstimate(value=value, variance=max(left, abs(law_standard_deviation * value) ** 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +135,7 @@ class LawBased:
         return _LawBasedState(disc=self.initial, influence=estimate)
 
     def step(self, state: _LawBasedState, measurement: Measurement | None) -> tuple[_LawBasedState, Command]:
-        if measurement is None or not usable(measurement, needs_phase=True):
+        if measurement is None or not measurement.usable(needs_phase=True):
             return state, Command(reason="no usable sample")
         seen = self._seen(state, measurement)
         if measurement.amplitude <= self.limit:
@@ -137,8 +158,7 @@ class LawBased:
         disc = self._advanced(state, now.time - before.time)
         if not state.valves:
             return replace(state, disc=disc, previous=now)
-        influence = updated(
-            state.influence,
+        influence = state.influence.updated(
             moment_change=self._moment(disc) - self._moment(state.disc),
             vibration_change=_vector(now) - _vector(before),
             noise_variance=self._noise(now) + self._noise(before),
@@ -222,34 +242,6 @@ class LawBased:
 
 def _vector(measurement: Measurement) -> complex:
     return cmath.rect(measurement.amplitude, measurement.phase)
-
-
-def updated(
-    estimate: InfluenceEstimate,
-    *,
-    moment_change: complex,
-    vibration_change: complex,
-    noise_variance: float,
-    law_standard_deviation: float,
-    assumed_magnitude: float,
-) -> InfluenceEstimate:
-    """Learn from one operation, dV = K dU + noise, by a Kalman filter of one complex number.
-
-    gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with R =
-    `noise_variance` + (s |K dU|)^2, s = `law_standard_deviation` (relative): a response that noise could have
-    made moves K little, and no moment counts as better known than by s. P never falls below (s |K|)^2, so the
-    estimate keeps following. All SI; variances are of both components together.
-    Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", J. Basic Eng. 82 (1960).
-    """
-    k, p = estimate.value, estimate.variance
-    expected = abs(moment_change) ** 2 * p
-    if expected == 0:
-        return estimate
-    rest = noise_variance + abs(law_standard_deviation * k * moment_change) ** 2
-    gain = p * moment_change.conjugate() / (expected + rest)
-    value = _held(k + gain * (vibration_change - k * moment_change), k, assumed_magnitude)
-    left = p * rest / (expected + rest)
-    return InfluenceEstimate(value=value, variance=max(left, abs(law_standard_deviation * value) ** 2))
 
 
 def _held(value: complex, before: complex, assumed: float) -> complex:

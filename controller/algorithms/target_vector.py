@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, usable, valve_commands
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, valve_commands
 from ringbalance.controller.formulas.control_law import vector_gas_time, vector_shares
 
 OnReversal = Literal["reset", "accumulate"]
@@ -82,7 +82,7 @@ class TargetVector:
     def step(
         self, state: TargetVectorState, measurement: Measurement | None
     ) -> tuple[TargetVectorState, Command]:
-        if measurement is None or not usable(measurement, needs_phase=True):
+        if measurement is None or not measurement.usable(needs_phase=True):
             return state, Command(reason="no usable sample")
         if measurement.amplitude <= self.limit:
             return TargetVectorState(), Command(resting=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, usable, valve_commands
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, valve_commands
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class Trial:
         return TrialState()
 
     def step(self, state: TrialState, measurement: Measurement | None) -> tuple[TrialState, Command]:
-        if measurement is None or not usable(measurement, needs_phase=False):
+        if measurement is None or not measurement.usable(needs_phase=False):
             return state, Command(reason="no usable sample")
         amplitude = measurement.amplitude
         if amplitude <= self.limit:

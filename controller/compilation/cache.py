@@ -1,4 +1,4 @@
-"""Compiled code kept in files: whatever cannot be read is discarded and compiled again.
+"""Compiled code kept in files, and what else saves time: what cannot be read is discarded and made again.
 
 The layout is numba's, an index for each function and a data file for each signature.  Different from numba's
 own, each file begins with a checksum of the rest, is written whole and brought to the disk, and a data file's
@@ -27,6 +27,8 @@ from ringbalance.scene.platform.files import write_whole
 
 INDEX: Final = ".nbi"
 DATA: Final = ".nbc"
+OTHER: Final = ".kept"
+"""What another room keeps beside the code, and makes again without it."""
 _SIZE: Final = hashlib.sha256().digest_size
 
 _dumps: Any = serialize.dumps
@@ -35,7 +37,7 @@ _NumbaCache: Any = getattr(caching, "FunctionCache", object)
 _NumbaFormat: Any = getattr(caching, "CompileResultCacheImpl", object)
 
 
-def _checked_content(path: Path) -> bytes:
+def checked_content(path: Path) -> bytes:
     """Content of a kept file without the checksum; OSError or ValueError when it cannot be used."""
     if path.exists() and not path.is_file():
         raise OSError(f"{path} is not a file")
@@ -56,7 +58,7 @@ def discard(path: Path) -> None:
 def is_damaged(path: Path) -> bool:
     """Whether a kept file would be discarded when it is needed."""
     try:
-        _checked_content(path)
+        checked_content(path)
     except (OSError, ValueError):
         return True
     return False
@@ -111,8 +113,8 @@ class _Files:
         """Keep an entry; OSError when that cannot be done."""
         content = _dumps(data)
         name = f"{self._name}.{hashlib.sha256(content).hexdigest()[:16]}{DATA}"
-        _write(self._folder / name, content)
-        _write(self._index_path, _dumps((self._stamp, {**self._index(), key: name})))
+        write_checked(self._folder / name, content)
+        write_checked(self._index_path, _dumps((self._stamp, {**self._index(), key: name})))
 
     def flush(self) -> None:
         """Forget every entry."""
@@ -126,7 +128,7 @@ class _Files:
 
     def _unpickled(self, path: Path) -> object:
         try:
-            return pickle.loads(_checked_content(path))
+            return pickle.loads(checked_content(path))
         except FileNotFoundError:
             return None
         except Exception:
@@ -135,7 +137,8 @@ class _Files:
             return None
 
 
-def _write(path: Path, content: bytes) -> None:
+def write_checked(path: Path, content: bytes) -> None:
+    """Keep a file that `checked_content` reads; OSError when that cannot be done."""
     if path.is_dir():
         discard(path)
     write_whole(path, hashlib.sha256(content).digest() + content)
@@ -199,5 +202,5 @@ def _note_unwritable(folder: Path, reason: str) -> None:
 
 
 def kept_files(folder: Path) -> Iterator[Path]:
-    """Index and data files below a folder, which may not exist."""
-    yield from (path for path in folder.rglob("*") if path.suffix in {INDEX, DATA})
+    """All files that are kept below a folder, which may not exist."""
+    yield from (path for path in folder.rglob("*") if path.suffix in {INDEX, DATA, OTHER})

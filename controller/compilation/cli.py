@@ -22,10 +22,10 @@ MEGABYTE = 1e6
 
 
 def cache(*, clear: bool = False, json: bool = False) -> int:
-    """Show the folder of compiled code, or remove what is in it.
+    """Show the folder of compiled code and results of cases, or remove what is in it.
 
     Args:
-        clear: remove all compiled code; the next run of eccentric masses compiles again, for about a minute.
+        clear: remove all of it; the next runs compile again, and the next report runs all its cases.
         json: print one JSON document instead of a table.
 
     Returns:
@@ -86,7 +86,11 @@ def _writable(root: Path) -> bool:
 
 def _show(told: dict[str, Any], console: Console) -> None:
     size = told["size_bytes"] / MEGABYTE
-    console.print(f"{told['folder']}: {size:.1f} MB of compiled code", highlight=False, markup=False)
+    console.print(
+        f"{told['folder']}: {size:.1f} MB of compiled code and results of cases",
+        highlight=False,
+        markup=False,
+    )
     if told["removed"]:
         console.print(f"removed: {told['removed']} versions", highlight=False)
     if not told["writable"]:
@@ -105,4 +109,4 @@ def _show(told: dict[str, Any], console: Console) -> None:
         table.add_row(name, str(version["files"]), str(version["damaged"]), shown, f"{days:.1f} days ago")
     console.print(table)
     if any(version["damaged"] for version in told["versions"]):
-        console.print("damaged files are discarded and compiled again when they are needed", highlight=False)
+        console.print("damaged files are discarded and made again when they are needed", highlight=False)

@@ -21,7 +21,7 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
     the largest vibration among them.
     Returns: Document that `json.dumps(..., allow_nan=False)` accepts.
     """
-    kept = thinned(run)
+    kept = _thinned(run)
     return {
         "balancer": run.balancer,
         "scene": run.scene,
@@ -91,10 +91,10 @@ def _each(name: str, values: FloatArray) -> dict[str, FloatArray]:
     return {name.format(mass): row for mass, row in enumerate(values, start=1)}
 
 
-def thinned(run: EccentricRun, *, rows: int = _MOST_ROWS) -> IntArray:
+def _thinned(run: EccentricRun) -> IntArray:
     """Numbers of samples to show: equally spaced, with the stages' edges and the largest vibration."""
     last = run.time.size - 1
-    even = np.linspace(0, last, min(rows, run.time.size)).round().astype(np.int64)
+    even = np.linspace(0, last, min(_MOST_ROWS, run.time.size)).round().astype(np.int64)
     edges = np.searchsorted(run.time, [time for stage in run.stages for time in (stage.start, stage.end)])
     extra = np.array([int(np.argmax(run.amplitude)), last], dtype=np.int64)
     return np.unique(np.concatenate([even, np.minimum(edges, last), extra]))

@@ -15,16 +15,16 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     start_estimate,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.substep_limit import longest_run
-from ringbalance.controller.eccentric_mass.plant.whirl import influence
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy, RunFacts
-from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
+from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
+from ringbalance.controller.eccentric_mass.run_status import RunFacts
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.strategy.plan import Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import (
     FRICTION_ERROR,
+    DriveLaw,
     believed_whirl,
-    drive_law,
     track_model,
 )
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -99,7 +99,7 @@ def _friction_sight(scene: EccentricScene, *, speed: float) -> tuple[float, floa
 
 def _friction_allowed(scene: EccentricScene, *, arm: float, speed: float) -> float:
     """Standard deviation of a friction arm, m, that lets the strategy proceed."""
-    torque = FRICTION_ERROR * drive_law(scene).position_gain * scene.supervisor.arrival_angle
+    torque = FRICTION_ERROR * DriveLaw.of(scene).position_gain * scene.supervisor.arrival_angle
     share = scene.friction_filter.gate * max(arm, 0.0)
     return max(share, torque / (track_model(scene).moment * speed**2)) if speed != 0 else math.inf
 
@@ -108,7 +108,7 @@ def found_beforehand(scene: EccentricScene) -> tuple[str, ...]:
     """Loops that are unstable, drives too weak and gates that cannot be reached, each with what would do."""
     if scene.supervisor.strategy == "locked":
         return ()
-    gains = recommended_gains(scene)
+    gains = RecommendedGains.of(scene)
     found = [
         f"the sampled loop of the {loop.name} is unstable (largest pole {loop.radius:.3g} per step): "
         f"{_remedy(scene, (loop.key, loop.recommended)).text}, "
@@ -130,9 +130,9 @@ def _weak_drive(scene: EccentricScene) -> list[str]:
 
 
 def _gates(scene: EccentricScene, speed: float) -> list[str]:
-    found, plant = [], plant_parameters(scene)
+    found, plant = [], PlantParameters.of(scene)
     deviation = expected_deviation(scene, speed=speed)
-    reach = abs(influence(plant, speed)) if plant.damping > 0 else math.inf
+    reach = abs(plant.influence(speed)) if plant.damping > 0 else math.inf
     needed = 2 * deviation * reach > 0.1 * scene.supervisor.limit
     if needed and deviation > scene.imbalance_filter.gate * plant.unbalance:
         remedy = _imbalance_remedy(scene, deviation=deviation, imbalance=plant.unbalance, reach=reach)
@@ -179,7 +179,7 @@ def _slower_walks(scene: EccentricScene, target: float, *, speed: float) -> list
 
 def _gain_remedy(scene: EccentricScene) -> Remedy | None:
     """Stable values of all gains whose loops are not; None when all are stable."""
-    gains = recommended_gains(scene)
+    gains = RecommendedGains.of(scene)
     changes = [(loop.key, loop.recommended) for loop in gains.loops if not loop.stable]
     if not gains.speed.stable and gains.pair.recommended >= gains.pair.value:
         changes = [change for change in changes if change[0] != gains.pair.key]
@@ -192,7 +192,7 @@ def _stall_remedy(scene: EccentricScene, *, margin: float = _MARGIN) -> Remedy |
     """Gain, drive speed and voltage whose torque is friction's with a margin; None when the scene's have
     it.
     """
-    plant, told, gains = plant_parameters(scene), scene.friction_filter, recommended_gains(scene)
+    plant, told, gains = PlantParameters.of(scene), scene.friction_filter, RecommendedGains.of(scene)
     speed = abs(scene.rotor.speed_profile[0].speed) + told.drive_speed
     volts = max(scene.masses.friction_arm) * plant.moment * speed**2 / plant.drive_gain
     changes: list[tuple[str, float]] = []
@@ -207,8 +207,9 @@ def _stall_remedy(scene: EccentricScene, *, margin: float = _MARGIN) -> Remedy |
     return _remedy(scene, *changes) if changes else None
 
 
-def remedies_of(facts: RunFacts, outcome: EccentricOutcome) -> tuple[Remedy, ...]:
+def remedies_of(facts: RunFacts) -> tuple[Remedy, ...]:
     """What would mend the run, the likeliest first.  An unstable loop comes before all else."""
+    outcome = facts.outcome
     if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
         return ()
     own = _REMEDIES[outcome](facts) if outcome in _REMEDIES else ()
@@ -298,7 +299,7 @@ def _arrival_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
     if scene.lqr.friction_compensation != "break_away":
         return (_remedy(scene, ("lqr.friction_compensation", "break_away")),)
     found = _more_volts(facts)
-    most, weight = recommended_gains(scene).regulator.recommended, scene.lqr.state_weight
+    most, weight = RecommendedGains.of(scene).regulator.recommended, scene.lqr.state_weight
     if most > 2 * weight:
         found.append(_remedy(scene, ("lqr.state_weight", min(30 * weight, most))))
     angle, rate = 4 * scene.supervisor.arrival_angle, 10 * scene.supervisor.arrival_rate
@@ -321,7 +322,7 @@ def _tuning_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
 
 
 def _imbalance_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
-    reach = abs(influence(plant_parameters(facts.scene), float(facts.speed[-1])))
+    reach = abs(PlantParameters.of(facts.scene).influence(float(facts.speed[-1])))
     told = (facts.deviation, facts.imbalance, reach)
     return (_imbalance_remedy(facts.scene, deviation=told[0], imbalance=told[1], reach=told[2]),)
 

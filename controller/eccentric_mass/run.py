@@ -4,56 +4,21 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import euler_step_limit
-from ringbalance.controller.eccentric_mass.plant.friction import STUCK
-from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant, stretches
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric_mass.plant.plant import rest_state, stuck_flags
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
+from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
-from ringbalance.controller.eccentric_mass.remedies import expected_deviation, remedies_of
-from ringbalance.controller.eccentric_mass.run_loop import (
-    NOISES,
-    Profile,
-    Record,
-    SensorNoise,
-    empty_record,
-    measure,
-    run_stretch,
-)
-from ringbalance.controller.eccentric_mass.run_record import (
-    EccentricEstimates,
-    EccentricRun,
-    RunFacts,
-    StageSpan,
-)
-from ringbalance.controller.eccentric_mass.run_status import outcome_of, status_text, warnings_of
-from ringbalance.controller.eccentric_mass.strategy.plan import (
-    RELEASED,
-    STAGE_NAMES,
-    Cause,
-    Findings,
-    Stage,
-)
-from ringbalance.controller.eccentric_mass.strategy.records import StrategySettings
-from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl, strategy_settings
-from ringbalance.controller.eccentric_mass.strategy.step import strategy_start
+from ringbalance.controller.eccentric_mass.remedies import expected_deviation, found_beforehand, remedies_of
+from ringbalance.controller.eccentric_mass.run_loop import Record, recorded
+from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
+from ringbalance.controller.eccentric_mass.run_status import RunFacts
+from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings, believed_whirl
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
-from ringbalance.controller.judgement import settling_time
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
-
-_LARGEST_WHIRL = 1e3
-"""Of the masses' own track.  The plant is linear in the displacement, which no bearing is far below this."""
-_LARGEST_TURN = 1e3
-"""Of a mass within one sample, rad: more than a hundred turns, which no sampled loop controls."""
-_LARGEST = 1e100
-"""Of any number, whatever its unit, so that squares and products of what is kept are finite."""
 
 
 def simulate_eccentric(
@@ -73,17 +38,17 @@ def simulate_eccentric(
     Source: Fig. 3 of the paper on eccentric masses.
     """
     check_substeps(scene)
-    record, findings, innovation = _recorded(
-        scene, seed, progress or _silent, settings or strategy_settings(scene)
+    record, findings, innovation = recorded(
+        scene, seed, progress or _silent, settings or StrategySettings.of(scene)
     )
     cause = Cause(int(record.cause[-1]))
-    times, speeds = profile_arrays(scene.rotor)
+    times, speeds = scene.rotor.profile
     time: FloatArray = np.arange(len(record.state), dtype=np.float64) * scene.sensor.step
     speed = np.interp(time, times, speeds)
     whirl = record.state[:, 0] + 1j * record.state[:, 1]
     facts = _facts(scene, record, cause, findings, innovation, speed, np.abs(whirl))
-    outcome = outcome_of(facts)
-    remedies = remedies_of(facts, outcome)
+    outcome = facts.outcome
+    remedies = remedies_of(facts)
     settled = facts.settling_time is not None and outcome.value in {"settled", "locked"}
     return EccentricRun(
         balancer="eccentric_mass",
@@ -91,8 +56,8 @@ def simulate_eccentric(
         outcome=outcome,
         settled=settled,
         settling_time=facts.settling_time if settled else None,
-        status=status_text(facts, outcome, remedies),
-        warnings=warnings_of(facts),
+        status=facts.status(remedies),
+        warnings=(*found_beforehand(scene), *facts.warnings),
         remedies=remedies,
         innovation=innovation,
         limit=scene.supervisor.limit,
@@ -127,82 +92,6 @@ def _silent(_: float, __: float) -> None:
     """No progress wanted."""
 
 
-def _samples(scene: EccentricScene) -> int:
-    return round(scene.run.time_limit / scene.sensor.step) + 1
-
-
-class _Start(NamedTuple):
-    """A plant before its first sample."""
-
-    parameters: PlantParameters
-    state: FloatArray
-    stuck: IntArray
-
-
-def _recorded(
-    scene: EccentricScene, seed: int | None, progress: Progress, settings: StrategySettings
-) -> tuple[Record, Findings, float | None]:
-    samples = _samples(scene)
-    if scene.supervisor.strategy == "locked":
-        return _locked(scene, empty_record(samples), progress), Findings(False, 0.0, np.inf, 0, 0), None
-    numbers = np.random.default_rng(scene.run.seed if seed is None else seed)
-    return _driven(scene, settings, numbers.standard_normal((samples, NOISES)), progress)
-
-
-def _locked(scene: EccentricScene, record: Record, progress: Progress) -> Record:
-    """The masses clamped to the track, no drive, no filter."""
-    states = run_plant(scene, locked=True, progress=progress).state
-    record.state[:], record.goal[:] = states, states[:, 4:6]
-    record.cause[:], record.hold[:] = int(Cause.LOCKED), RELEASED
-    return _meaningful(record, scene)
-
-
-def _driven(
-    scene: EccentricScene, settings: StrategySettings, numbers: FloatArray, progress: Progress
-) -> tuple[Record, Findings, float | None]:
-    start, record = _start(scene), empty_record(len(numbers))
-    profile, sensor = Profile(*profile_arrays(scene.rotor)), scene.sensor
-    noise = SensorNoise(
-        sensor.position_noise, sensor.velocity_noise, sensor.encoder_noise, sensor.encoder_rate_noise
-    )
-    first = measure(start.state, profile, 0.0, settings.laboratory, noise, numbers[0])
-    memory, state, stuck = strategy_start(settings, first), start.state, start.stuck
-    for begin, end in stretches(len(numbers)):
-        memory, state, stuck = run_stretch(
-            settings,
-            start.parameters,
-            profile,
-            noise,
-            numbers,
-            memory,
-            state,
-            stuck,
-            record,
-            begin,
-            end,
-        )
-        progress(end * settings.step, scene.run.time_limit)
-        kept = _meaningful(_cut(record, slice(end)), scene, since=begin)
-        if len(kept.state) < end:
-            record = kept
-            break
-    whirl = memory.whirl
-    innovation = whirl.surprise / (4 * whirl.judged) if whirl.judged else None
-    return _shifted(record), memory.plan.findings, innovation
-
-
-def _start(scene: EccentricScene) -> _Start:
-    rest = rest_state(scene.masses.initial_angle)
-    return _Start(plant_parameters(scene), rest, stuck_flags(STUCK))
-
-
-def _shifted(record: Record) -> Record:
-    """The energy of the last sample's voltage would be spent after the run."""
-    record.energy[1:] = record.energy[:-1]
-    record.energy[0] = 0.0
-    return record
-
-
 def _facts(
     scene: EccentricScene,
     record: Record,
@@ -213,7 +102,7 @@ def _facts(
     amplitude: FloatArray,
 ) -> RunFacts:
     time: FloatArray = np.arange(len(speed), dtype=np.float64) * scene.sensor.step
-    most = plant_parameters(scene).maximum_voltage
+    most = PlantParameters.of(scene).maximum_voltage
     at_limit = np.any(np.abs(record.voltage) >= most, axis=1)
     estimating = np.flatnonzero(record.stage == int(Stage.IMBALANCE))
     fastest = float(np.max(np.abs(speed[estimating]))) if estimating.size else 0.0
@@ -225,18 +114,18 @@ def _facts(
         stage=Stage(int(record.stage[-1])),
         findings=findings,
         time=float(time[-1]),
-        diverged=len(time) < _samples(scene),
+        diverged=len(time) < scene.samples,
         speed=speed,
         amplitude=amplitude,
         left=_left(record, amplitude, scene.supervisor.limit),
         innovation=innovation,
-        settling_time=settling_time(time=time, amplitude=amplitude, limit=scene.supervisor.limit),
+        settling_time=_settling_time(time=time, amplitude=amplitude, limit=scene.supervisor.limit),
         deviation=float(np.sqrt(np.max(np.linalg.eigvalsh(record.imbalance_covariance[-1])))),
         imbalance=float(np.hypot(*record.imbalance[-1])),
         saturation=float(np.count_nonzero(at_limit)) * scene.sensor.step,
         hold=int(record.hold[-1]),
         least_gap=float(np.min(_separations(angles))),
-        euler_limit=float(euler_step_limit(model=believed_whirl(scene), angular_velocity=fastest)),
+        euler_limit=float(believed_whirl(scene).euler_step_limit(angular_velocity=fastest)),
         predicted=expected_deviation(scene, speed=slowest) if cause is Cause.IMBALANCE_UNCERTAIN else 0.0,
     )
 
@@ -271,37 +160,20 @@ def _targets(scene: EccentricScene, record: Record) -> Targets | None:
         return None
     x, y = record.imbalance[-1]
     gap = scene.masses.arc_length / scene.masses.guide_radius
-    moment = plant_parameters(scene).moment
+    moment = PlantParameters.of(scene).moment
     return target_angles(float(np.hypot(x, y)), float(np.arctan2(y, x)), moment, gap)
 
 
 def _unbalanced(scene: EccentricScene, speed: float) -> float:
     if speed == 0:
         return 0.0
-    return abs(steady_whirl(plant_parameters(scene), speed, scene.masses.initial_angle))
+    return abs(PlantParameters.of(scene).steady_whirl(speed, scene.masses.initial_angle))
 
 
-def _meaningful(record: Record, scene: EccentricScene, *, since: int = 0) -> Record:
-    """The rows before the first that has diverged.
-
-    Returns: The record when nothing in it has diverged; else a shorter one, of at least one row: at the start
-    everything rests.
-    """
-    bad = np.flatnonzero(_diverged(_cut(record, slice(since, None)), scene))
-    return _cut(record, slice(max(since + int(bad[0]), 1))) if bad.size else record
-
-
-def _cut(record: Record, part: slice) -> Record:
-    return Record._make(values[part] for values in record)
-
-
-def _diverged(record: Record, scene: EccentricScene) -> BoolArray:
-    state = record.state
-    whirl = np.max(np.abs(state[:, :2]), axis=1)
-    turn = np.max(np.abs(state[:, 6:8]), axis=1) * scene.sensor.step
-    # A comparison with NaN is false.
-    usual = (whirl <= _LARGEST_WHIRL * scene.masses.guide_radius) & (turn <= _LARGEST_TURN)
-    for values in record:
-        if values.dtype == np.float64:
-            usual &= np.all(np.abs(values.reshape(len(values), -1)) <= _LARGEST, axis=1)
-    return np.asarray(~usual)
+def _settling_time(*, time: FloatArray, amplitude: FloatArray, limit: float) -> float | None:
+    """Recorded instant from which on the amplitude is not above the limit to the end; None: it ends above."""
+    above = np.flatnonzero(amplitude > limit)
+    if above.size == 0:
+        return float(time[0])
+    last = int(above[-1])
+    return None if last == time.size - 1 else float(time[last + 1])

@@ -1,4 +1,4 @@
-"""Plant, sensors and strategy together, sample by sample, all compiled."""
+"""Plant, sensors and strategy together, sample by sample: what a run records, up to where it diverges."""
 
 from __future__ import annotations
 
@@ -8,23 +8,30 @@ from typing import NamedTuple
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.eccentric_mass.plant.friction import STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
+from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant, stretches
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import electrical_energy
+from ringbalance.controller.eccentric_mass.plant.plant import electrical_energy, rest_state, stuck_flags
 from ringbalance.controller.eccentric_mass.plant.speed import speed_at, turned
-from ringbalance.controller.eccentric_mass.strategy.records import (
-    EccentricMeasurement,
-    StrategySettings,
-    StrategyState,
-)
-from ringbalance.controller.eccentric_mass.strategy.step import strategy_step
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Cause, Findings
+from ringbalance.controller.eccentric_mass.strategy.records import EccentricMeasurement, StrategyState
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.eccentric_models import EccentricScene
 
 NOISES = 8
 """Random numbers that one sample takes: four of vibration, two angles, two rates."""
+_LARGEST_WHIRL = 1e3
+"""Of the masses' own track.  The plant is linear in the displacement, which no bearing is far below this."""
+_LARGEST_TURN = 1e3
+"""Of a mass within one sample, rad: more than a hundred turns, which no sampled loop controls."""
+_LARGEST = 1e100
+"""Of any number, whatever its unit, so that squares and products of what is kept are finite."""
 
 
-class SensorNoise(NamedTuple):
+class _SensorNoise(NamedTuple):
     """Standard deviations of the sensors."""
 
     position: float
@@ -33,7 +40,7 @@ class SensorNoise(NamedTuple):
     rate: float
 
 
-class Profile(NamedTuple):
+class _Profile(NamedTuple):
     """The rotor's speed over time."""
 
     times: FloatArray
@@ -69,7 +76,97 @@ class Record(NamedTuple):
     """m^2, shape (n, 2)."""
 
 
-def empty_record(samples: int) -> Record:
+def recorded(
+    scene: EccentricScene, seed: int | None, progress: Progress, settings: StrategySettings
+) -> tuple[Record, Findings, float | None]:
+    """Every sample before the first that means nothing, and what the strategy found.
+
+    Returns: Last, the mean square of the imbalance filter's normalised innovations; None without any.
+    """
+    samples = scene.samples
+    if scene.supervisor.strategy == "locked":
+        return _locked(scene, _empty_record(samples), progress), Findings(False, 0.0, np.inf, 0, 0), None
+    numbers = np.random.default_rng(scene.run.seed if seed is None else seed)
+    return _driven(scene, settings, numbers.standard_normal((samples, NOISES)), progress)
+
+
+def _locked(scene: EccentricScene, record: Record, progress: Progress) -> Record:
+    """The masses clamped to the track, no drive, no filter."""
+    states = run_plant(scene, locked=True, progress=progress).state
+    record.state[:], record.goal[:] = states, states[:, 4:6]
+    record.cause[:], record.hold[:] = int(Cause.LOCKED), RELEASED
+    return _meaningful(record, scene)
+
+
+def _driven(
+    scene: EccentricScene, settings: StrategySettings, numbers: FloatArray, progress: Progress
+) -> tuple[Record, Findings, float | None]:
+    parameters, record = PlantParameters.of(scene), _empty_record(len(numbers))
+    state, stuck = rest_state(scene.masses.initial_angle), stuck_flags(STUCK)
+    profile, sensor = _Profile(*scene.rotor.profile), scene.sensor
+    noise = _SensorNoise(
+        sensor.position_noise, sensor.velocity_noise, sensor.encoder_noise, sensor.encoder_rate_noise
+    )
+    first = _measure(state, profile, 0.0, settings.laboratory, noise, numbers[0])
+    memory = strategy_start(settings, first)
+    for begin, end in stretches(len(numbers)):
+        memory, state, stuck = _run_stretch(
+            settings,
+            parameters,
+            profile,
+            noise,
+            numbers,
+            memory,
+            state,
+            stuck,
+            record,
+            begin,
+            end,
+        )
+        progress(end * settings.step, scene.run.time_limit)
+        kept = _meaningful(_cut(record, slice(end)), scene, since=begin)
+        if len(kept.state) < end:
+            record = kept
+            break
+    whirl = memory.whirl
+    innovation = whirl.surprise / (4 * whirl.judged) if whirl.judged else None
+    return _shifted(record), memory.plan.findings, innovation
+
+
+def _shifted(record: Record) -> Record:
+    """The energy of the last sample's voltage would be spent after the run."""
+    record.energy[1:] = record.energy[:-1]
+    record.energy[0] = 0.0
+    return record
+
+
+def _meaningful(record: Record, scene: EccentricScene, *, since: int = 0) -> Record:
+    """The rows before the first that has diverged.
+
+    Returns: The record when nothing in it has diverged; else a shorter one, of at least one row: at the start
+    everything rests.
+    """
+    bad = np.flatnonzero(_diverged(_cut(record, slice(since, None)), scene))
+    return _cut(record, slice(max(since + int(bad[0]), 1))) if bad.size else record
+
+
+def _cut(record: Record, part: slice) -> Record:
+    return Record._make(values[part] for values in record)
+
+
+def _diverged(record: Record, scene: EccentricScene) -> BoolArray:
+    state = record.state
+    whirl = np.max(np.abs(state[:, :2]), axis=1)
+    turn = np.max(np.abs(state[:, 6:8]), axis=1) * scene.sensor.step
+    # A comparison with NaN is false.
+    usual = (whirl <= _LARGEST_WHIRL * scene.masses.guide_radius) & (turn <= _LARGEST_TURN)
+    for values in record:
+        if values.dtype == np.float64:
+            usual &= np.all(np.abs(values.reshape(len(values), -1)) <= _LARGEST, axis=1)
+    return np.asarray(~usual)
+
+
+def _empty_record(samples: int) -> Record:
     """Room for a run. Returns: Record of zeros."""
     whole = [np.zeros(samples, dtype=np.int64) for _ in range(3)]
     return Record(
@@ -88,12 +185,12 @@ def empty_record(samples: int) -> Record:
 
 
 @compiled
-def measure(
+def _measure(
     state: FloatArray,
-    profile: Profile,
+    profile: _Profile,
     time: float,
     laboratory: bool,
-    noise: SensorNoise,
+    noise: _SensorNoise,
     numbers: FloatArray,
 ) -> EccentricMeasurement:
     """What the sensors show; `laboratory`: the vibration is measured in the fixed frame."""
@@ -118,11 +215,11 @@ def measure(
 
 
 @compiled
-def run_stretch(
+def _run_stretch(
     settings: StrategySettings,
     parameters: PlantParameters,
-    profile: Profile,
-    noise: SensorNoise,
+    profile: _Profile,
+    noise: _SensorNoise,
     numbers: FloatArray,
     memory: StrategyState,
     state: FloatArray,
@@ -139,7 +236,7 @@ def run_stretch(
     command = np.zeros(2)
     for i in range(first, after):
         time = i * settings.step
-        seen = measure(state, profile, time, settings.laboratory, noise, numbers[i])
+        seen = _measure(state, profile, time, settings.laboratory, noise, numbers[i])
         memory, voltage = strategy_step(settings, memory, seen)
         command[0], command[1] = voltage
         _keep(record, i, memory, state, command)

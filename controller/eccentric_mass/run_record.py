@@ -8,10 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.strategy.plan import Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
 
 _NOTHING: Final = 1e-6
 """Share of the limit below which a vibration is round-off."""
@@ -153,42 +151,3 @@ class EccentricRun:
     def worst_amplitude(self) -> float:
         """Largest true vibration on the way, m."""
         return float(np.max(self.amplitude))
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunFacts:
-    """What status, remedies and warnings are made of."""
-
-    scene: EccentricScene
-    cause: Cause
-    stage: Stage
-    """At the end of the run."""
-    findings: Findings
-    time: float
-    """End of the run, s."""
-    diverged: bool
-    """Whether it ended early, at the last sample that means anything."""
-    speed: FloatArray
-    """rad/s, shape (n,)."""
-    amplitude: FloatArray
-    """m, shape (n,)."""
-    left: int | None
-    """Sample of the largest vibration after the rotor was balanced, if that is above the limit."""
-    innovation: float | None
-    """Mean square of the normalised innovations."""
-    settling_time: float | None
-    """From when on the amplitude is within the limit, s; None when it is not at the end."""
-    deviation: float
-    """Standard deviation of the imbalance, kg m."""
-    imbalance: float
-    """Its estimated magnitude, kg m."""
-    saturation: float
-    """Seconds for which a voltage was at its limit."""
-    hold: int
-    """Of the drives at the end."""
-    least_gap: float
-    """Smallest angle between the masses on the way, rad."""
-    euler_limit: float
-    """Longest step of the paper's transition at the highest speed of the estimation, s."""
-    predicted: float
-    """Standard deviation of the imbalance to be expected after the longest estimation, kg m."""

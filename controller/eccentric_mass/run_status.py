@@ -1,15 +1,18 @@
-"""How a run ended, in a word and in a sentence that says what to do next; and what to be warned of."""
+"""What a finished run knows: how it ended, in a word and in a sentence that says what to do; warnings."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
-from ringbalance.controller.eccentric_mass.remedies import found_beforehand
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy, RunFacts
-from ringbalance.controller.eccentric_mass.strategy.plan import HELD, STAGE_NAMES, Cause, Stage
+from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
+from ringbalance.controller.eccentric_mass.strategy.plan import HELD, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.supervisor import STALLED_SHARE
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.eccentric_models import EccentricScene
 
 _MICROMETRE: Final = 1e-6
 _RPM: Final = 2 * math.pi / 60
@@ -20,17 +23,68 @@ _WRONG_MODEL: Final = 1.5
 within 1 +- 0.1 after 100 samples, by the chi-square distribution."""
 
 
-def outcome_of(facts: RunFacts) -> EccentricOutcome:
-    """SETTLED only when the strategy was content and the true amplitude stays within the limit ever after."""
-    if facts.diverged:
-        return EccentricOutcome.DIVERGED
-    kept = facts.settling_time is not None and facts.left is None
-    if facts.cause is Cause.BALANCED:
-        return EccentricOutcome.SETTLED if kept else EccentricOutcome.RISES_AGAIN
-    if facts.cause is Cause.SPEED_CHANGED and kept:
-        return EccentricOutcome.SETTLED
-    cause = _cause(facts)
-    return EccentricOutcome.TIME_LIMIT if cause is Cause.NONE else EccentricOutcome(cause.name.lower())
+@dataclass(frozen=True, kw_only=True)
+class RunFacts:
+    """What status, remedies and warnings are made of."""
+
+    scene: EccentricScene
+    cause: Cause
+    stage: Stage
+    """At the end of the run."""
+    findings: Findings
+    time: float
+    """End of the run, s."""
+    diverged: bool
+    """Whether it ended early, at the last sample that means anything."""
+    speed: FloatArray
+    """rad/s, shape (n,)."""
+    amplitude: FloatArray
+    """m, shape (n,)."""
+    left: int | None
+    """Sample of the largest vibration after the rotor was balanced, if that is above the limit."""
+    innovation: float | None
+    """Mean square of the normalised innovations."""
+    settling_time: float | None
+    """From when on the amplitude is within the limit, s; None when it is not at the end."""
+    deviation: float
+    """Standard deviation of the imbalance, kg m."""
+    imbalance: float
+    """Its estimated magnitude, kg m."""
+    saturation: float
+    """Seconds for which a voltage was at its limit."""
+    hold: int
+    """Of the drives at the end."""
+    least_gap: float
+    """Smallest angle between the masses on the way, rad."""
+    euler_limit: float
+    """Longest step of the paper's transition at the highest speed of the estimation, s."""
+    predicted: float
+    """Standard deviation of the imbalance to be expected after the longest estimation, kg m."""
+
+    @cached_property
+    def outcome(self) -> EccentricOutcome:
+        """SETTLED only when the strategy was content and the true amplitude stays within the limit after."""
+        if self.diverged:
+            return EccentricOutcome.DIVERGED
+        kept = self.settling_time is not None and self.left is None
+        if self.cause is Cause.BALANCED:
+            return EccentricOutcome.SETTLED if kept else EccentricOutcome.RISES_AGAIN
+        if self.cause is Cause.SPEED_CHANGED and kept:
+            return EccentricOutcome.SETTLED
+        cause = _cause(self)
+        return EccentricOutcome.TIME_LIMIT if cause is Cause.NONE else EccentricOutcome(cause.name.lower())
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know although the run continued."""
+        return tuple(text for is_due, text in _warnings(self) if is_due)
+
+    def status(self, remedies: Sequence[Remedy]) -> str:
+        """One or two sentences: how the run ended, with its numbers, and what to do next."""
+        advice = f": {', or '.join(remedy.text for remedy in remedies)}" if remedies else ""
+        if self.outcome in _WHOLE_TEXTS:
+            return _WHOLE_TEXTS[self.outcome](self) + advice
+        return f"{_not_settled(self)}; {_REASONS[self.outcome](self)}{advice}"
 
 
 def _cause(facts: RunFacts) -> Cause:
@@ -44,19 +98,6 @@ def _cause(facts: RunFacts) -> Cause:
     if facts.stage is Stage.FRICTION and findings.stalled > STALLED_SHARE * findings.driven:
         return Cause.STALLED
     return facts.cause
-
-
-def status_text(facts: RunFacts, outcome: EccentricOutcome, remedies: Sequence[Remedy]) -> str:
-    """One or two sentences: how the run ended, with its numbers, and what to do next."""
-    advice = f": {', or '.join(remedy.text for remedy in remedies)}" if remedies else ""
-    if outcome in _WHOLE_TEXTS:
-        return _WHOLE_TEXTS[outcome](facts) + advice
-    return f"{_not_settled(facts)}; {_REASONS[outcome](facts)}{advice}"
-
-
-def warnings_of(facts: RunFacts) -> tuple[str, ...]:
-    """What the user should know although the run continued."""
-    return (*found_beforehand(facts.scene), *(text for is_due, text in _warnings(facts) if is_due))
 
 
 def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain, track_model
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -82,17 +82,17 @@ class RecommendedGains:
         """Regulator, speed and pair."""
         return self.regulator, self.speed, self.pair
 
-
-def recommended_gains(scene: EccentricScene) -> RecommendedGains:
-    """Judge the loops of a scene before it is run."""
-    regulator, speed, pair = _regulator(scene), _speed(scene), _pair(scene)
-    return RecommendedGains(
-        regulator=regulator,
-        speed=speed,
-        pair=pair,
-        step=min(loop.recommended_step for loop in (regulator, speed, pair)),
-        drive_speed=_drive_speed(scene, min(speed.value, speed.recommended)),
-    )
+    @classmethod
+    def of(cls, scene: EccentricScene) -> RecommendedGains:
+        """Judge the loops of a scene before it is run."""
+        regulator, speed, pair = _regulator(scene), _speed(scene), _pair(scene)
+        return cls(
+            regulator=regulator,
+            speed=speed,
+            pair=pair,
+            step=min(loop.recommended_step for loop in (regulator, speed, pair)),
+            drive_speed=_drive_speed(scene, min(speed.value, speed.recommended)),
+        )
 
 
 def advised(
@@ -102,7 +102,7 @@ def advised(
 
     Returns: The scene, and the values that changed by key, SI.
     """
-    advice = recommended_gains(scene) if gains is None else gains
+    advice = RecommendedGains.of(scene) if gains is None else gains
     changes = {loop.key: loop.recommended for loop in advice.loops if loop.value > loop.recommended}
     if advice.drive_speed > scene.friction_filter.drive_speed:
         changes["friction_filter.drive_speed"] = advice.drive_speed
@@ -134,7 +134,7 @@ def _regulator(scene: EccentricScene) -> SampledLoop:
 
 def _speed(scene: EccentricScene) -> SampledLoop:
     """One pole, that of the rate."""
-    gain, per_volt = scene.friction_filter.speed_gain, plant_parameters(scene).drive_gain
+    gain, per_volt = scene.friction_filter.speed_gain, PlantParameters.of(scene).drive_gain
 
     def poles(value: float, step: float) -> ComplexArray:
         return _poles(scene, step, 0.0, per_volt * value, eased=True)
@@ -153,7 +153,7 @@ def _speed(scene: EccentricScene) -> SampledLoop:
 
 def _pair(scene: EccentricScene) -> SampledLoop:
     """The angle between the masses gets each drive's error; recommended beside the lower speed gain."""
-    told, per_volt = scene.friction_filter, plant_parameters(scene).drive_gain
+    told, per_volt = scene.friction_filter, PlantParameters.of(scene).drive_gain
 
     def poles(pair: float, speed: float, step: float) -> ComplexArray:
         return _poles(scene, step, 2 * per_volt * pair, per_volt * speed, eased=True)
@@ -178,7 +178,7 @@ def _pair(scene: EccentricScene) -> SampledLoop:
 
 def _drive_speed(scene: EccentricScene, gain: float) -> float:
     """Where B_add gamma w is the friction's torque, with a margin."""
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     speed = scene.rotor.speed_profile[0].speed
     friction = max(plant.friction_arm_1, plant.friction_arm_2) * plant.moment * speed**2
     return max(scene.friction_filter.drive_speed, _TORQUE_MARGIN * friction / (plant.drive_gain * gain))
@@ -191,7 +191,7 @@ def _poles(
 
     `eased`: whether the drive law makes up for the rotor, which it does not while the imbalance is unknown.
     """
-    track, mass = track_model(scene), plant_parameters(scene).mass
+    track, mass = track_model(scene), PlantParameters.of(scene).mass
     given_way = 2 * track.moment**2 / (mass * track.inertia)
     if eased:
         position, rate = (1 - given_way) * position, (1 - given_way) * rate - given_way * track.damping

@@ -1,9 +1,13 @@
-"""One scene with eccentric masses as a report needs it: balanced and locked run, loops, requirements."""
+"""One scene with eccentric masses as a report needs it: balanced and locked run, loops, requirements.
+
+Intervals follow from the scene's stated uncertainties and its sensors' noise: the plant is moved, not what
+the controller is configured with, which does not know what is unknown.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Final
 
@@ -11,27 +15,17 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.speed import steady_until
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
-from ringbalance.controller.eccentric_mass.uncertainty import (
-    Judged,
-    drawn_runs,
-    effects,
-    interval,
-    lost,
-    moved_runs,
-)
-from ringbalance.controller.tuning.eccentric import (
-    EccentricTuning,
-    eccentric_tuning_document,
-    tune_eccentric,
-)
+from ringbalance.controller.tuning.eccentric import EccentricTuning, eccentric_tuning_document, tune_eccentric
 from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.models import InputUncertainty
+from ringbalance.scene.uncertain import eccentric_drawn, eccentric_moved
 
 _AT_LEAST: Final = "at least"
 _AT_MOST: Final = "at most"
@@ -41,6 +35,12 @@ _FEWEST: Final = 3
 
 
 Interval = tuple[float, float]
+Judged = Mapping[str, float | None]
+"""Numbers that a run comes to, by name; None: it does not come to it."""
+NOISE: Final = "sensor.noise"
+_SEEDS: Final = 2
+DRAWS: Final = 39
+"""Of so many: 95 % of further ones lie between least and greatest, or between an end and the second."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,14 +129,14 @@ def eccentric_study(
     run = simulate_eccentric(scene, seed=seed, progress=progress)
     locked = locked_run(scene, progress=progress)
     number = scene.run.seed if seed is None else seed
-    moved, drawn = moved_runs(scene, _judged, seed=number), drawn_runs(scene, _judged, seed=number)
+    moved, drawn = _moved_runs(scene, _judged, seed=number), _drawn_runs(scene, _judged, seed=number)
     rows = (_with_intervals(row, moved, drawn) for row in _of_run(scene, run))
     requirements = (*rows, *_of_loops(tuning.gains))
     return EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
 
 
 def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     gap = scene.masses.arc_length / scene.masses.guide_radius
     # Of an imbalance beyond all reach, what the masses side by side leave is what they lack.
     beyond = 4 * plant.moment
@@ -163,7 +163,7 @@ def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
 
 def _deadline(scene: EccentricScene) -> tuple[float, str]:
     """Time by which the rotor must be balanced, s, and what sets it."""
-    change = steady_until(scene)
+    change = scene.steady_until
     if change is not None:
         return change, "the speed begins to change"
     return scene.run.time_limit, "run.time_limit, the end of the run"
@@ -208,8 +208,8 @@ def _with_intervals(
         required_interval=_interval(row.required, drawn, f"{row.quantity}.required"),
         achieved_interval=_interval(row.achieved, drawn, f"{row.quantity}.achieved"),
         excess_interval=_interval(row.excess, drawn, f"{row.quantity}.excess"),
-        effects=effects(row.excess, moved, f"{row.quantity}.excess"),
-        lost=lost(moved, f"{row.quantity}.achieved"),
+        effects=_effects(row.excess, moved, f"{row.quantity}.excess"),
+        lost=_lost(moved, f"{row.quantity}.achieved"),
         reached=sum(run[f"{row.quantity}.achieved"] is not None for run in drawn) / len(drawn),
     )
 
@@ -229,3 +229,77 @@ def _largest_balanced(run: EccentricRun) -> float | None:
     if last.name != STAGE_NAMES[Stage.REST]:
         return None
     return float(np.max(run.amplitude[run.time >= last.start]))
+
+
+def _moved_runs(
+    scene: EccentricScene, judge: Callable[[EccentricScene, EccentricRun], Judged], *, seed: int
+) -> dict[str, list[Judged]]:
+    """What a run comes to with one input at either end of its stated interval, by the input's path.
+
+    With any uncertainty stated, `NOISE` has the runs with further seeds. Empty: none is stated.
+    """
+    if not scene.uncertainty:
+        return {}
+    settings = StrategySettings.of(scene)
+
+    def came_to(plant: EccentricScene, number: int) -> Judged:
+        return judge(plant, simulate_eccentric(plant, seed=number, settings=settings))
+
+    moved = {
+        each.quantity: [came_to(plant, seed) for plant in _both_ends(scene, each)]
+        for each in scene.uncertainty
+    }
+    return moved | {NOISE: [came_to(scene, seed + more) for more in range(1, _SEEDS + 1)]}
+
+
+def _drawn_runs(
+    scene: EccentricScene, judge: Callable[[EccentricScene, EccentricRun], Judged], *, seed: int
+) -> list[Judged]:
+    """What runs come to with all stated inputs, and the noise, drawn at once; empty: none is stated."""
+    if not scene.uncertainty:
+        return []
+    settings = StrategySettings.of(scene)
+    plants = (
+        (
+            eccentric_drawn(scene, np.random.default_rng(np.random.SeedSequence(number, spawn_key=(1,)))),
+            number,
+        )
+        for number in range(seed + 1, seed + 1 + DRAWS)
+    )
+    return [judge(plant, simulate_eccentric(plant, seed=n, settings=settings)) for plant, n in plants]
+
+
+def interval(value: float, drawn: Sequence[float]) -> tuple[float, float]:
+    """Both ends between which 95 % of what is drawn lies; the value as the scene says is among them.
+
+    An amplitude is least where nothing is wrong: such a value lies at the end of what is drawn, not in its
+    middle, and a sum of squares of the effects of single inputs would count an end that nothing reaches.
+    Source: order statistics; of n draws, a further one falls between two with i others between them with
+        probability (i + 1)/(n + 1), whatever the distribution.
+    """
+    low, *_, high = ordered = sorted(drawn)
+    if value < low:
+        return value, ordered[-2]
+    return (ordered[1], value) if value > high else (low, high)
+
+
+def _both_ends(scene: EccentricScene, uncertain: InputUncertainty) -> Iterator[EccentricScene]:
+    def at(sign: int) -> Callable[[float], float]:
+        return lambda value: value + sign * uncertain.absolute(value)
+
+    for sign in (-1, 1):
+        yield eccentric_moved(scene, uncertain.quantity, at(sign))
+
+
+def _effects(value: float, moved: Mapping[str, list[Judged]], name: str) -> dict[str, tuple[float, float]]:
+    """By how much each cause alone lowers and raises a number, both at least zero."""
+    found = {}
+    for path, runs in moved.items():
+        if changes := [number - value for run in runs if (number := run[name]) is not None]:
+            found[path] = (max(0.0, -min(changes)), max(0.0, *changes))
+    return found
+
+
+def _lost(moved: Mapping[str, list[Judged]], name: str) -> tuple[str, ...]:
+    """Causes with which at least one run does not come to a number at all."""
+    return tuple(path for path, runs in moved.items() if any(run[name] is None for run in runs))

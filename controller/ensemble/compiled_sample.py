@@ -304,7 +304,7 @@ def _permitted(shared: Record, run: Record, pair: int, first: bool, duration: fl
 
 @in_place
 def _judge(shared: Record, run: Record) -> None:
-    """As `outcome_of` does."""
+    """As `Facts.outcome` does."""
     settled = run.cause == HELD or (run.cause == AT_REST and run.since < math.inf)
     run.settled = 1 if settled else 0
     run.settling_time = run.since if settled else math.inf

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.formulas.path_piece import piece_rise
+from ringbalance.controller.formulas.paths import piece_rise
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 
@@ -34,18 +34,18 @@ class MomentTable(NamedTuple):
         rise, d1 = self.value[cell + 1] - y0, self.slope[cell + 1]
         return np.asarray(y0 + piece_rise(t, rise, d0, d1))
 
+    @classmethod
+    def of(cls, *, model: BalancerModel, total: float) -> MomentTable:
+        """Tabulate a balancer's moment of a pair whose two fill ratios sum to `total`."""
+        largest = model.flow.max_fill_ratio
+        lowest, highest = max(0.0, total - largest), min(total, largest)
+        step = (highest - lowest) / (MOMENT_NODES - 1)
 
-def moment_table(*, model: BalancerModel, total: float) -> MomentTable:
-    """Tabulate a balancer's moment of a pair whose two fill ratios sum to `total`."""
-    largest = model.flow.max_fill_ratio
-    lowest, highest = max(0.0, total - largest), min(total, largest)
-    step = (highest - lowest) / (MOMENT_NODES - 1)
+        def of(x: FloatArray) -> ComplexArray:
+            held = np.clip(x, lowest, highest)
+            return model.moment.pair_vector(fill_ratio=held, opposite_fill_ratio=total - held)
 
-    def of(x: FloatArray) -> ComplexArray:
-        held = np.clip(x, lowest, highest)
-        return model.moment.pair_vector(fill_ratio=held, opposite_fill_ratio=total - held)
-
-    x = np.linspace(lowest, highest, MOMENT_NODES)
-    before, after = np.maximum(x - step / 2, lowest), np.minimum(x + step / 2, highest)
-    slope = (of(after) - of(before)) / (after - before) * step
-    return MomentTable(lowest=float(lowest), step=float(step), value=of(x), slope=slope)
+        x = np.linspace(lowest, highest, MOMENT_NODES)
+        before, after = np.maximum(x - step / 2, lowest), np.minimum(x + step / 2, highest)
+        slope = (of(after) - of(before)) / (after - before) * step
+        return cls(lowest=float(lowest), step=float(step), value=of(x), slope=slope)

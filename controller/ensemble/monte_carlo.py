@@ -11,16 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.checks import check_fit
-from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns, ensemble_plan
-from ringbalance.controller.ensemble.samples import (
-    BLOCK,
-    Members,
-    MemberUncertainty,
-    drawn_members,
-    member_uncertainty,
-    members_alike,
-)
-from ringbalance.controller.ensemble.transfer import PairTransfer, pair_transfer
+from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns
+from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
+from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
@@ -49,6 +42,18 @@ class Probability:
     low: float
     """95 % interval of a binomial share."""
     high: float
+
+    @classmethod
+    def counted(cls, *, count: int, of: int) -> Probability:
+        """A fraction with its 95 % interval.
+
+        Source: Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", JASA 22
+            (1927).
+        """
+        p, z2 = count / of, NORMAL_95**2 / of
+        centre = (p + z2 / 2) / (1 + z2)
+        half = math.sqrt(p * (1 - p) * z2 + z2**2 / 4) / (1 + z2)
+        return cls(value=p, low=max(centre - half, 0.0), high=min(centre + half, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,8 +139,8 @@ def simulate_ensemble(
         raise ValueError(f"an ensemble needs members and workers, not n={n} and workers={workers}")
     model = flow_law if isinstance(flow_law, BalancerModel) else balancer_model(flow_law)
     followed = ensemble_transfer(scene, model) if transfer is None else transfer
-    widths = member_uncertainty(scene, model) if uncertainty_95 is None else uncertainty_95
-    plan = ensemble_plan(scene=scene, model=model, transfer=followed)
+    widths = MemberUncertainty.of(scene, model) if uncertainty_95 is None else uncertainty_95
+    plan = EnsemblePlan.of(scene=scene, model=model, transfer=followed)
     tally = _Tally(time_limit=scene.run.time_limit, quantiles=quantiles)
 
     def run(block: int) -> MemberRuns:
@@ -161,11 +166,11 @@ def simulate_members(
 
     Raises: SceneError, ValueError: as `simulate_ensemble`, and for more members than a block holds.
     """
-    given = members_alike(scene, size=size) if members is None else members
+    given = Members.alike(scene, size=size) if members is None else members
     if given.proportional.size > BLOCK:
         raise ValueError(f"at most {BLOCK} members at once")
     followed = ensemble_transfer(scene, model) if transfer is None else transfer
-    return ensemble_plan(scene=scene, model=model, transfer=followed).run(given, seed=seed)
+    return EnsemblePlan.of(scene=scene, model=model, transfer=followed).run(given, seed=seed)
 
 
 def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
@@ -183,7 +188,7 @@ def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
         )
         raise SceneError([fault])
     modelled = terms_modelled(run_models(scene=scene, model=model))
-    return pair_transfer(
+    return PairTransfer.of(
         model=model,
         total=2 * scene.disc.initial_fill,
         gas_pressure=scene.gas.pressure,
@@ -195,7 +200,7 @@ def _block(
     scene: Scene, plan: EnsemblePlan, widths: MemberUncertainty, *, seed: int, block: int, size: int
 ) -> MemberRuns:
     """The first `size` members of one block."""
-    drawn = drawn_members(scene, uncertainty_95=widths, seed=seed, block=block)
+    drawn = Members.drawn(scene, uncertainty_95=widths, seed=seed, block=block)
     return plan.run(drawn.first(size), seed=seed, number=block * BLOCK)
 
 
@@ -239,7 +244,7 @@ class _Tally:
         """Freeze the counts."""
 
         def share(count: int) -> Probability:
-            return binomial_share(count=count, of=self.members)
+            return Probability.counted(count=count, of=self.members)
 
         return Ensemble(
             law=law,
@@ -265,14 +270,3 @@ class _Tally:
         return tuple(
             float(np.interp(q, reached, edges)) if q <= reached[-1] else None for q in self.quantiles
         )
-
-
-def binomial_share(*, count: int, of: int) -> Probability:
-    """A fraction with its 95 % interval.
-
-    Source: Wilson, "Probable Inference, the Law of Succession, and Statistical Inference", JASA 22 (1927).
-    """
-    p, z2 = count / of, NORMAL_95**2 / of
-    centre = (p + z2 / 2) / (1 + z2)
-    half = math.sqrt(p * (1 - p) * z2 + z2**2 / 4) / (1 + z2)
-    return Probability(value=p, low=max(centre - half, 0.0), high=min(centre + half, 1.0))

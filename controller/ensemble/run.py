@@ -13,13 +13,13 @@ from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.ensemble.compiled_noise import noise_key
 from ringbalance.controller.ensemble.compiled_records import GAS_LINE, RUN
 from ringbalance.controller.ensemble.compiled_sample import run_members
-from ringbalance.controller.ensemble.moment import moment_table
+from ringbalance.controller.ensemble.moment import MomentTable
 from ringbalance.controller.ensemble.samples import LARGEST_RATIO, Members
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.judgement import noise_floor
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
 from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATIONS, TAIL_POINTS
-from ringbalance.controller.rotor import chamber_directions, initial_vibration
+from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_by_velocity
@@ -110,32 +110,32 @@ class EnsemblePlan:
         largest = self.loop.largest_staying / max(self.loop.limit / 2.0, 1e-300)
         return np.asarray(members.proportional * self.loop.rate * faster <= largest * np.maximum(error, 0.0))
 
-
-def ensemble_plan(*, scene: Scene, model: BalancerModel, transfer: PairTransfer) -> EnsemblePlan:
-    """Prepare the runs of an ensemble."""
-    shared, chambers = transfer.shared.copy(), scene.disc.chambers
-    axes = chamber_directions(chambers)[: chambers // 2]
-    moment = moment_table(model=model, total=2 * scene.disc.initial_fill)
-    parts = [part for z in (np.real, np.imag) for part in (z(moment.value), z(moment.slope))]
-    shared["moment"], shared["moment_step"] = np.stack(parts, axis=1), moment.step
-    shared["asymmetric"] = bool(np.any(moment.value.imag))
-    shared["axis"][0, : axes.size] = np.stack([axes.real, axes.imag], axis=1)
-    for name, value in (_loop(scene) | _controller(scene)).items():
-        shared[name] = value
-    loop = loop_factor(scene, model, target_vector_of(scene))
-    shared["offset"][0, :chambers] = scene.controller.offsets(chambers)
-    return EnsemblePlan(
-        shared=shared,
-        plant=transfer.plant,
-        loop=loop,
-        rotor=scene.rotor,
-        residual=residual_by_velocity(scene, law=model.flow),
-    )
+    @classmethod
+    def of(cls, *, scene: Scene, model: BalancerModel, transfer: PairTransfer) -> EnsemblePlan:
+        """Prepare the runs of an ensemble."""
+        shared, chambers = transfer.shared.copy(), scene.disc.chambers
+        axes = chamber_directions(chambers)[: chambers // 2]
+        moment = MomentTable.of(model=model, total=2 * scene.disc.initial_fill)
+        parts = [part for z in (np.real, np.imag) for part in (z(moment.value), z(moment.slope))]
+        shared["moment"], shared["moment_step"] = np.stack(parts, axis=1), moment.step
+        shared["asymmetric"] = bool(np.any(moment.value.imag))
+        shared["axis"][0, : axes.size] = np.stack([axes.real, axes.imag], axis=1)
+        for name, value in (_loop(scene) | _controller(scene)).items():
+            shared[name] = value
+        loop = loop_factor(scene, model, target_vector_of(scene))
+        shared["offset"][0, :chambers] = scene.controller.offsets(chambers)
+        return cls(
+            shared=shared,
+            plant=transfer.plant,
+            loop=loop,
+            rotor=scene.rotor,
+            residual=residual_by_velocity(scene, law=model.flow),
+        )
 
 
 def _loop(scene: Scene) -> dict[str, float]:
     """Rotor, sensor, clock and bounds."""
-    start, sensor = initial_vibration(rotor=scene.rotor), scene.sensor
+    start, sensor = scene.rotor.initial_vibration, scene.sensor
     return {
         "initial_fill": scene.disc.initial_fill,
         "start_real": start.real,

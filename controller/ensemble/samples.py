@@ -47,6 +47,28 @@ class MemberUncertainty:
     gas_line: Mapping[str, float] = field(default_factory=dict)
     """Relative, of those of `LINE_KEYS` whose uncertainty the scene states."""
 
+    @classmethod
+    def of(cls, scene: Scene, model: BalancerModel) -> MemberUncertainty:
+        """Half-widths for a scene under a law: the law's, the scene's, else assumed ones."""
+        velocity, moment = _velocity(scene, model), _moment(scene, model)
+        influence = _stated(scene, "influence_coefficient")
+        lag = _stated(scene, "lag_angle")
+        own, assumed = "the scene's uncertainty", "assumed: the scene states none"
+        coefficient = scene.rotor.influence_coefficient
+        return cls(
+            velocity=velocity[0],
+            moment=moment[0],
+            influence_coefficient=ASSUMED_INFLUENCE if influence is None else influence / coefficient,
+            lag_angle=ASSUMED_LAG if lag is None else lag,
+            sources=(
+                velocity[1],
+                moment[1],
+                assumed if influence is None else own,
+                assumed if lag is None else own,
+            ),
+            gas_line=_line(scene),
+        )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Members:
@@ -86,60 +108,38 @@ class Members:
             own["critical_ratio"] = min(own["critical_ratio"], LARGEST_RATIO)
         return replace(gas, **own)
 
+    @classmethod
+    def alike(cls, scene: Scene, *, size: int) -> Members:
+        """Members that all have the scene's own values."""
+        one = np.ones(size)
+        return cls(
+            velocity_factor=one,
+            moment_factor=one,
+            influence_coefficient=scene.rotor.influence_coefficient * one,
+            lag_angle=scene.rotor.lag_angle * one,
+            proportional=scene.controller.proportional * one,
+        )
 
-def members_alike(scene: Scene, *, size: int) -> Members:
-    """Members that all have the scene's own values."""
-    one = np.ones(size)
-    return Members(
-        velocity_factor=one,
-        moment_factor=one,
-        influence_coefficient=scene.rotor.influence_coefficient * one,
-        lag_angle=scene.rotor.lag_angle * one,
-        proportional=scene.controller.proportional * one,
-    )
+    @classmethod
+    def drawn(cls, scene: Scene, *, uncertainty_95: MemberUncertainty, seed: int, block: int) -> Members:
+        """Draw one block of members; relative quantities log-normal, the lag angle normal.
 
-
-def drawn_members(scene: Scene, *, uncertainty_95: MemberUncertainty, seed: int, block: int) -> Members:
-    """Draw one block of members; relative quantities log-normal, the lag angle normal.
-
-    A block has the same members in an ensemble of any size.
-    """
-    random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 0)))
-    z = random.standard_normal((4, BLOCK)) / NORMAL_95
-    line = uncertainty_95.gas_line
-    wide = np.array([[math.log1p(line.get(name, 0.0))] for name in LINE_KEYS])
-    alike = members_alike(scene, size=BLOCK)
-    return Members(
-        velocity_factor=np.exp(math.log1p(uncertainty_95.velocity) * z[0]),
-        moment_factor=np.exp(math.log1p(uncertainty_95.moment) * z[1]),
-        influence_coefficient=alike.influence_coefficient
-        * np.exp(math.log1p(uncertainty_95.influence_coefficient) * z[2]),
-        lag_angle=alike.lag_angle + uncertainty_95.lag_angle * z[3],
-        proportional=alike.proportional,
-        gas_line=np.exp(wide * random.standard_normal((4, BLOCK)) / NORMAL_95) if line else None,
-    )
-
-
-def member_uncertainty(scene: Scene, model: BalancerModel) -> MemberUncertainty:
-    """Half-widths for a scene under a law: the law's, the scene's, else assumed ones."""
-    velocity, moment = _velocity(scene, model), _moment(scene, model)
-    influence = _stated(scene, "influence_coefficient")
-    lag = _stated(scene, "lag_angle")
-    own, assumed = "the scene's uncertainty", "assumed: the scene states none"
-    coefficient = scene.rotor.influence_coefficient
-    return MemberUncertainty(
-        velocity=velocity[0],
-        moment=moment[0],
-        influence_coefficient=ASSUMED_INFLUENCE if influence is None else influence / coefficient,
-        lag_angle=ASSUMED_LAG if lag is None else lag,
-        sources=(
-            velocity[1],
-            moment[1],
-            assumed if influence is None else own,
-            assumed if lag is None else own,
-        ),
-        gas_line=_line(scene),
-    )
+        A block has the same members in an ensemble of any size.
+        """
+        random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 0)))
+        z = random.standard_normal((4, BLOCK)) / NORMAL_95
+        line = uncertainty_95.gas_line
+        wide = np.array([[math.log1p(line.get(name, 0.0))] for name in LINE_KEYS])
+        alike = Members.alike(scene, size=BLOCK)
+        return cls(
+            velocity_factor=np.exp(math.log1p(uncertainty_95.velocity) * z[0]),
+            moment_factor=np.exp(math.log1p(uncertainty_95.moment) * z[1]),
+            influence_coefficient=alike.influence_coefficient
+            * np.exp(math.log1p(uncertainty_95.influence_coefficient) * z[2]),
+            lag_angle=alike.lag_angle + uncertainty_95.lag_angle * z[3],
+            proportional=alike.proportional,
+            gas_line=np.exp(wide * random.standard_normal((4, BLOCK)) / NORMAL_95) if line else None,
+        )
 
 
 def _line(scene: Scene) -> dict[str, float]:

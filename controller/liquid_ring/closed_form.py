@@ -6,8 +6,8 @@ from typing import Protocol, cast, runtime_checkable
 
 import numpy as np
 
-from ringbalance.controller.formulas.linear_path import linear_course
-from ringbalance.controller.liquid_ring.transfer import Drive, Event, Transfer, checked_instants, still
+from ringbalance.controller.formulas.paths import linear_course
+from ringbalance.controller.liquid_ring.transfer import Drive, Event, Transfer, checked_instants
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.scene.arrays import FloatArray
 
@@ -49,11 +49,11 @@ def closed_form(drive: Drive, instants: FloatArray) -> Transfer:
     t = checked_instants(instants)
     u0, deceleration, end, stalls = _course(drive, drive.fill)
     if u0 == 0:
-        return still(drive, t, flow=drive.flow(drive.fill))
+        return drive.still(t, flow=drive.flow(drive.fill))
     flowing = np.minimum(t, end)
     fill = drive.fill - drive.exchange_rate * flowing * (u0 - deceleration * flowing / 2)
     ended = bool(t[-1] >= end)
-    event = Event.STALLED if stalls else boundary_event(drive, drive.lowest)
+    event = Event.STALLED if stalls else drive.boundary_event(drive.lowest)
     if ended and not stalls:
         fill[t >= end] = drive.lowest
     held = np.minimum(np.maximum(fill, drive.lowest), drive.highest)
@@ -80,10 +80,3 @@ def _course(drive: Drive, fill: float) -> tuple[float, float, float, bool]:
         drive.total,
         drive.lowest,
     )
-
-
-def boundary_event(drive: Drive, fill: float) -> Event:
-    """EMPTY or FULL: which event it is to reach `drive.lowest` or `drive.highest`."""
-    if fill == drive.lowest:
-        return Event.EMPTY if drive.lowest == 0 else Event.FULL
-    return Event.EMPTY if drive.highest == drive.total else Event.FULL

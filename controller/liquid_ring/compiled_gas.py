@@ -40,7 +40,7 @@ def line_rates(
 
     `content` is m R = p V/T, J/K; `growth` is dV/dt.
     Returns: the two, then the derivatives of each by pressure, volume and content.
-    Source: ISO 6358-1 for the mass flow, as in `physics.gas.supply`; first law for the chamber's gas.
+    Source: ISO 6358-1 for the mass flow, as in `physics.gas`; first law for the chamber's gas.
     """
     outside, temperature, varies = end_pressure(plant, is_open), plant.temperature, 0.0
     if pressure <= outside:
@@ -102,7 +102,7 @@ def _ratio_after(ratio: float, time: float, critical_ratio: float, vents: bool) 
     """Pressure ratio r, downstream over upstream, of a constant volume after a time in units of its tau.
 
     The gas keeps its temperature.  Filling, dr/dt = phi(r); venting, dr/dt = r phi(r); tau = V/(C p_0)
-    sqrt(T_0/T), as in `physics.gas.supply`, which has the times between two pressures.  Along the ellipse
+    sqrt(T_0/T), as in `physics.gas`, which has the times between two pressures.  Along the ellipse
     r = b + (1 - b) sin q with dq/dt = 1/(1 - b), or with y = tan(q/2) and c = 1 - b while venting
         dy/ds = (b y^2 + 2 c y + b)/2,  s = t/c,
     whose solution is a ratio of two linear functions of y(0).

@@ -34,12 +34,7 @@ from ringbalance.controller.liquid_ring.compiled_events import (
     would_start,
 )
 from ringbalance.controller.liquid_ring.compiled_gas import end_pressure, near_end
-from ringbalance.controller.liquid_ring.compiled_lift import (
-    arrived,
-    front,
-    set_out,
-    shown,
-)
+from ringbalance.controller.liquid_ring.compiled_lift import arrived, front, set_out, shown
 from ringbalance.controller.liquid_ring.compiled_step import (
     BETWEEN,
     END,

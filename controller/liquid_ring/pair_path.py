@@ -66,6 +66,29 @@ class FlowPaths:
         interval = int(np.searchsorted(self.edges, fill, side="right"))
         return bool(self.sense[interval] != 0 and self.holds[interval])
 
+    @classmethod
+    def of(cls, drive: Drive, *, primed: bool, most_changes: int = MOST_CHANGES) -> FlowPaths:
+        """All flows of a pair under the gas pressure of a drive, whose fill and priming do not matter.
+
+        With `primed` False those of an unprimed tube, whose paths end where it is primed.
+        Raises: UntabulatedError: a law that changes sense, regime or priming more than `most_changes` times.
+        """
+        flowing = replace(drive, primed=primed)
+        found = _mapped(flowing, most_changes=most_changes)
+        intervals = _intervals(drive, found)
+        own = found.sense if primed else np.where(found.holds, 0, found.sense)
+        paths = _path_of_each(own)
+        nodes = [_path(flowing, intervals, own, paths == p) for p in range(int(paths.max()) + 1)]
+        begin = np.cumsum([0] + [rows.shape[1] for rows in nodes])
+        return cls(
+            edges=found.after,
+            sense=found.sense,
+            holds=found.holds,
+            path=paths.astype(np.int64),
+            begin=begin.astype(np.int64),
+            nodes=np.concatenate([np.zeros((4, 0)), *nodes], axis=1),
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Map:
@@ -77,29 +100,6 @@ class _Map:
     """First fill after it, the next number."""
     sense: IntArray
     holds: BoolArray
-
-
-def flow_paths(drive: Drive, *, primed: bool, most_changes: int = MOST_CHANGES) -> FlowPaths:
-    """All flows of a pair under the gas pressure of a drive, whose fill and priming do not matter.
-
-    With `primed` False those of an unprimed tube, whose paths end where it is primed.
-    Raises: UntabulatedError: a law that changes sense, regime or priming more than `most_changes` times.
-    """
-    flowing = replace(drive, primed=primed)
-    found = _mapped(flowing, most_changes=most_changes)
-    intervals = _intervals(drive, found)
-    own = found.sense if primed else np.where(found.holds, 0, found.sense)
-    paths = _path_of_each(own)
-    nodes = [_path(flowing, intervals, own, paths == p) for p in range(int(paths.max()) + 1)]
-    begin = np.cumsum([0] + [rows.shape[1] for rows in nodes])
-    return FlowPaths(
-        edges=found.after,
-        sense=found.sense,
-        holds=found.holds,
-        path=paths.astype(np.int64),
-        begin=begin.astype(np.int64),
-        nodes=np.concatenate([np.zeros((4, 0)), *nodes], axis=1),
-    )
 
 
 def _state(drive: Drive, fill: FloatArray) -> IntArray:

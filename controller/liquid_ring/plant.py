@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,9 +12,11 @@ from ringbalance.controller.liquid_ring.interval import longest_opening, pass_ti
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
 from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL, opening_within
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer
+from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Disc
 
 
@@ -54,6 +56,12 @@ class DiscState:
     def rests(self) -> bool:
         """Whether no liquid can move until a valve is commanded to open."""
         return not any(pair.primed for pair in self.pairs) and all(p.motion.rests for p in self.pairs)
+
+    @classmethod
+    def initial(cls, *, disc: Disc) -> DiscState:
+        """All chambers at the scene's initial fill, no tube primed."""
+        pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
+        return cls(pairs=(pair,) * (disc.chambers // 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -271,6 +279,35 @@ class LiquidRing:
             primed=pair.primed,
         )
 
+    def largest_pair_moment(self, *, state: DiscState) -> complex:
+        """Moment of a pair with its usable liquid moved to one side, along and across, kg m.
+
+        Source: Eq. 7 of the liquid-ring paper for a pair, by the model's own moment curve.
+        """
+        total = state.pairs[0].total
+        highest = min(total - min(self.residual_fill, total / 2), self.model.flow.max_fill_ratio)
+        moment = self.model.moment.pair_vector(fill_ratio=highest, opposite_fill_ratio=total - highest)
+        return complex(moment)
+
+    def unreachable_vibration(self, *, state: DiscState, rotor: Rotor) -> float:
+        """Vibration that remains with the liquid at its best, m; zero within capacity.
+
+        It follows from the distance between the moment that is wanted and the nearest that the disc can form.
+        Those fill a polygon whose corners have every pair fully to one side or the other.
+        Source: Eq. 8 of the liquid-ring paper, in every direction and for any number of chambers.
+        """
+        n = self.chambers
+        axes = chamber_directions(n)[: n // 2]
+        seen_from = np.exp(1j * np.pi * (2 * np.arange(n) + 1) / n + 0.5j * np.pi)
+        signs = np.sign((axes[None, :] * seen_from[:, None].conj()).real)
+        corners = self.largest_pair_moment(state=state) * (signs @ axes)
+        edges = np.roll(corners, -1) - corners
+        offset = -rotor.initial_unbalance - corners
+        if n > 2 and np.all((edges.conj() * offset).imag >= 0):
+            return 0.0
+        along = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
+        return float(np.min(np.abs(offset - along * edges))) * rotor.influence_coefficient
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Valve:
@@ -286,17 +323,6 @@ class _Path:
     fill: FloatArray
     operation: Operation | None
     drift: float
-
-
-def initial_state(*, disc: Disc) -> DiscState:
-    """All chambers at the scene's initial fill, no tube primed."""
-    pair = PairState(fill=disc.initial_fill, total=2 * disc.initial_fill)
-    return DiscState(pairs=(pair,) * (disc.chambers // 2))
-
-
-def longest(operations: Sequence[Operation]) -> Operation:
-    """The operation of a command that was given the most gas."""
-    return max(operations, key=lambda operation: operation.duration)
 
 
 def _run_dry(transfer: Transfer, before: float, duration: float) -> float:

@@ -8,17 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.formulas.path_piece import piece_part, piece_rise
-from ringbalance.controller.liquid_ring.closed_form import boundary_event
-from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError, flow_paths
-from ringbalance.controller.liquid_ring.transfer import (
-    Drive,
-    Event,
-    Transfer,
-    checked_instants,
-    finished,
-    still,
-)
+from ringbalance.controller.formulas.paths import piece_part, piece_rise
+from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError
+from ringbalance.controller.liquid_ring.transfer import Drive, Event, Transfer, checked_instants
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.scene.arrays import FloatArray
 
@@ -66,15 +58,14 @@ def quadrature(drive: Drive, instants: FloatArray) -> Transfer:
     t = checked_instants(instants)
     before = drive.flow(drive.fill, primed=drive.primed)
     if float(before.velocity) == 0:
-        return still(drive, t, flow=before)
+        return drive.still(t, flow=before)
     try:
         way = _course(drive, t)
         event = _event(drive, way, float(t[-1]))
     except UntabulatedError:
         way = _Way(fill=np.full(t.shape, drive.fill), end=drive.fill, duration=0.0, primed=drive.primed)
         event = Event.UNFINISHED
-    return finished(
-        drive,
+    return drive.finished(
         t,
         way.fill,
         regime_start=Regime(int(before.regime)),
@@ -114,7 +105,7 @@ def _paths(
         gas_pressure=gas_pressure,
         primed=primed,
     )
-    return flow_paths(drive, primed=primed)
+    return FlowPaths.of(drive, primed=primed)
 
 
 def _way(paths: FlowPaths, fill: float, instants: FloatArray, *, primed: bool) -> _Way:
@@ -147,4 +138,4 @@ def _event(drive: Drive, way: _Way, duration: float) -> Event:
     if duration < way.duration:
         return Event.NONE
     ended = way.end in {drive.lowest, drive.highest}
-    return boundary_event(drive, way.end) if ended else Event.STALLED
+    return drive.boundary_event(way.end) if ended else Event.STALLED

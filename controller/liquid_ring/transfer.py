@@ -73,6 +73,51 @@ class Drive:
             primed=primed,
         )
 
+    def still(self, instants: FloatArray, *, flow: Flow) -> Transfer:
+        """An interval in which nothing flows."""
+        regime = Regime(int(flow.regime))
+        return Transfer(
+            instants=instants,
+            fill=np.full(instants.shape, self.fill),
+            regime_start=regime,
+            regime_end=regime,
+            event=Event.BLOCKED,
+            event_time=0.0,
+            primed=bool(flow.primed),
+        )
+
+    def finished(
+        self,
+        instants: FloatArray,
+        fill: FloatArray,
+        *,
+        regime_start: Regime,
+        event: Event,
+        event_time: float | None,
+        primed: bool = True,
+    ) -> Transfer:
+        """An interval that flowed, at its end in a primed tube or not.
+
+        Gas that has blown through an emptied chamber leaves no column.
+        """
+        held = np.clip(fill, self.lowest, self.highest)
+        after = self.flow(held[-1], primed=primed)
+        return Transfer(
+            instants=instants,
+            fill=held,
+            regime_start=regime_start,
+            regime_end=Regime(int(after.regime)),
+            event=event,
+            event_time=event_time,
+            primed=bool(after.primed) and event is not Event.EMPTY,
+        )
+
+    def boundary_event(self, fill: float) -> Event:
+        """EMPTY or FULL: which event it is to reach `drive.lowest` or `drive.highest`."""
+        if fill == self.lowest:
+            return Event.EMPTY if self.lowest == 0 else Event.FULL
+        return Event.EMPTY if self.highest == self.total else Event.FULL
+
 
 @dataclass(frozen=True, kw_only=True)
 class Transfer:
@@ -102,44 +147,3 @@ def checked_instants(instants: npt.ArrayLike) -> FloatArray:
     if t.ndim != 1 or t.size == 0 or not (t[0] >= 0 and t[-1] < np.inf and bool(np.all(t[1:] >= t[:-1]))):
         raise ValueError("instants must be at least one finite time >= 0, in ascending order")
     return t
-
-
-def still(drive: Drive, instants: FloatArray, *, flow: Flow) -> Transfer:
-    """An interval in which nothing flows."""
-    regime = Regime(int(flow.regime))
-    return Transfer(
-        instants=instants,
-        fill=np.full(instants.shape, drive.fill),
-        regime_start=regime,
-        regime_end=regime,
-        event=Event.BLOCKED,
-        event_time=0.0,
-        primed=bool(flow.primed),
-    )
-
-
-def finished(
-    drive: Drive,
-    instants: FloatArray,
-    fill: FloatArray,
-    *,
-    regime_start: Regime,
-    event: Event,
-    event_time: float | None,
-    primed: bool = True,
-) -> Transfer:
-    """An interval that flowed, at its end in a primed tube or not.
-
-    Gas that has blown through an emptied chamber leaves no column.
-    """
-    held = np.clip(fill, drive.lowest, drive.highest)
-    after = drive.flow(held[-1], primed=primed)
-    return Transfer(
-        instants=instants,
-        fill=held,
-        regime_start=regime_start,
-        regime_end=Regime(int(after.regime)),
-        event=event,
-        event_time=event_time,
-        primed=bool(after.primed) and event is not Event.EMPTY,
-    )

@@ -24,8 +24,7 @@ from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import checked_law
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import results_console
+from ringbalance.scene.platform.terminal import activity, results_console
 
 TUNED = 0
 NOT_TUNED = 1
@@ -83,7 +82,8 @@ def _eccentric_masses(scene: EccentricScene, *, json: bool) -> int:
 def _show(tuning: Tuning, console: Console) -> None:
     console.print(Text(tuning.status, style=f"bold {'green' if tuning.succeeded else 'yellow'}"))
     warning = line_warning(tuning.gas_line)
-    if warning:
+    # Runs that settle with the scene's own line have shown what its smallest correction left open.
+    if warning and not tuning.reachable:
         console.print(Text(warning, style="yellow"))
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_column(style="dim")
@@ -95,7 +95,7 @@ def _show(tuning: Tuning, console: Console) -> None:
     for name in ("part", "relative", "from"):
         parts.add_column(name)
     for part in tuning.contributions:
-        parts.add_row(part.name, f"{part.uncertainty:.2%}", part.source)
+        parts.add_row(part.name, f"{100 * part.uncertainty:.2g} %", part.source)
     console.print(parts)
 
 
@@ -131,7 +131,7 @@ def _rows(tuning: Tuning) -> dict[str, str]:
             f"{low * 1e3:.3g} to {high * 1e3:.3g} ms; no injection moves liquid up to "
             f"{tuning.dead_zone * _UM:.3g} um"
         )
-    rows["smallest correction of the valve"] = f"{tuning.smallest_correction * _UM:.4g} um"
+    rows["smallest correction, ideal valve"] = f"{tuning.smallest_correction * _UM:.4g} um"
     rows["gas line"] = line_text(tuning.gas_line)
     rows["neglected"] = neglected_in_injections(tuning.models_used).text
     return rows | _settling(tuning) | _tried(tuning)
@@ -140,7 +140,7 @@ def _rows(tuning: Tuning) -> dict[str, str]:
 def _tried(tuning: Tuning) -> dict[str, str]:
     rows = tuning.search.tried if tuning.search else ()
     return {
-        f"tried {place}": f"{row.change}: {row.settled:.0%} of {row.runs} short runs"
+        f"tried {place}": f"{row.change}: {round(row.settled * row.runs)} of {row.runs} runs"
         for place, row in enumerate(rows, start=1)
     }
 

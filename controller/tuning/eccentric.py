@@ -14,15 +14,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.controller.eccentric_mass.plant.speed import steady_until
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised, recommended_gains
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
-from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
-from ringbalance.controller.eccentric_mass.uncertainty import drawn_plant
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
 from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.uncertain import eccentric_drawn
 
 RUNS: Final = 40
 FIRST_RUNS: Final = 16
@@ -76,7 +75,7 @@ def tune_eccentric(
 
     Args: `runs`: at the most; 0 judges the loops alone.
     """
-    gains = recommended_gains(scene)
+    gains = RecommendedGains.of(scene)
     ready, changes = advised(scene, gains)
     settling = None
     if runs and scene.supervisor.strategy != "locked":
@@ -89,7 +88,7 @@ def eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> E
 
     Few runs first, and more where these leave it open that 95 % settle.
     """
-    span = steady_until(scene) or scene.run.time_limit
+    span = scene.steady_until or scene.run.time_limit
     done: list[EccentricRun] = []
     # A mass that is balanced rests: what has settled by an early end is still so later.
     short = span
@@ -110,7 +109,7 @@ def eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> E
 def _one_run(scene: EccentricScene, number: int, *, spans: tuple[float, float]) -> EccentricRun:
     seed = scene.run.seed + number
     random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(0,)))
-    settings, plant = strategy_settings(scene), drawn_plant(scene, random)
+    settings, plant = StrategySettings.of(scene), eccentric_drawn(scene, random)
     for span in dict.fromkeys(spans):
         limited = replace(plant, run=replace(plant.run, time_limit=span))
         run = simulate_eccentric(limited, seed=seed, settings=settings)
@@ -161,7 +160,7 @@ def _of_runs(settling: EccentricSettling | None) -> str:
     if slow is not None:
         return f"95 % of {times.runs} runs settle within {slow:.3g} s"
     return (
-        f"{times.settled.value:.1%} of {times.runs} runs settle within {settling.span:.4g} s: 95 % is not "
+        f"{times.told(times.settled.value)} settle within {settling.span:.4g} s: 95 % is not "
         f"reached; most of the others: {settling.advice}"
     )
 

@@ -28,7 +28,6 @@ from ringbalance.controller.liquid_ring.reach import (
     least_driven_fill,
     starting_pressure,
 )
-from ringbalance.controller.rotor import initial_unbalance
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.arrays import FloatArray
@@ -148,7 +147,7 @@ def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)
     pairs = scene.disc.chambers // 2
     changes = pair_changes(
-        wanted=-initial_unbalance(rotor=scene.rotor),
+        wanted=-scene.rotor.initial_unbalance,
         bounds=[(float(low - now), float(high - now))] * pairs,
     )
     fills = [

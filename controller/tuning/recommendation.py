@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.ensemble.samples import MemberUncertainty, member_uncertainty
+from ringbalance.controller.ensemble.samples import MemberUncertainty
 from ringbalance.controller.tuning.loop_factor import LoopFactor, vibration_rates
 from ringbalance.reduced_model.device import HEAD_INPUTS, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -75,7 +75,7 @@ def recommended_gain(
 def factor_uncertainty(scene: Scene, model: BalancerModel) -> FactorUncertainty:
     """All that makes the loop factor uncertain, under a law; inputs move a law that the program can make."""
     scene = with_tube_models(scene)
-    own = member_uncertainty(scene, _without_inputs(scene, model))
+    own = MemberUncertainty.of(scene, _without_inputs(scene, model))
     effects = _input_effects(scene, model)
     parts = [
         Contribution(name="velocity", uncertainty=own.velocity, source=own.sources[0]),

@@ -10,10 +10,9 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.algorithms.by_name import law_based_of
-from ringbalance.controller.ensemble.monte_carlo import Probability, binomial_share, simulate_ensemble
-from ringbalance.controller.ensemble.samples import Members, MemberUncertainty, drawn_members
-from ringbalance.controller.liquid_ring.plant import initial_state
-from ringbalance.controller.liquid_ring.reach import unreachable_vibration
+from ringbalance.controller.ensemble.monte_carlo import Probability, simulate_ensemble
+from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
+from ringbalance.controller.liquid_ring.plant import DiscState
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
@@ -67,14 +66,18 @@ class SettlingTimes:
         """Whether the disc's capacity alone keeps 95 % from settling, and little else does."""
         return self.beyond_capacity > TOO_MANY and self.explained_by(self.beyond_capacity)
 
+    def told(self, fraction: float) -> str:
+        """A fraction of the runs as their number, which claims nothing finer."""
+        return f"{round(fraction * self.runs)} of {self.runs} runs"
+
     def rows(self, limit: float) -> dict[str, str]:
         """As a person reads them; `limit` is the time that each run had, s."""
-        times = ", ".join(
-            f"{name[1:]} % within {f'{time:.3g} s' if time is not None else 'not reached'}"
+        times = (
+            f"{name[1:]} % of runs {f'within {time:.3g} s' if time is not None else 'not reached'}"
             for name, time in self.quantiles.items()
         )
-        fraction = f"{self.settled.value:.2%} of {self.runs} runs within {limit:.4g} s"
-        return {"settling time": times, "settled": fraction}
+        settled = f"{self.told(self.settled.value)} within {limit:.4g} s"
+        return {"settling time": ", ".join(times), "settled": settled}
 
 
 def settling_times(
@@ -129,7 +132,7 @@ def _runs(
 
 def summary(times: Sequence[float]) -> SettlingTimes:
     """Of runs one by one, each with its settling time, s, or infinity; quantiles are of all of them."""
-    settled = binomial_share(count=sum(map(math.isfinite, times)), of=len(times))
+    settled = Probability.counted(count=sum(map(math.isfinite, times)), of=len(times))
     quantiles = {name: _quantile(np.array(times), q) for name, q in QUANTILES.items()}
     return SettlingTimes(runs=len(times), settled=settled, quantiles=quantiles)
 
@@ -158,17 +161,15 @@ def _beyond_capacity(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, runs: int
 ) -> tuple[float, float]:
     """Of the drawn runs, the fraction whose unbalance is beyond the liquid, and beyond it under this gas."""
-    ring, state = law_based_of(scene, model).ring, initial_state(disc=scene.disc)
-    drawn = drawn_members(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
+    ring, state = law_based_of(scene, model).ring, DiscState.initial(disc=scene.disc)
+    drawn = Members.drawn(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
     driven = with_driving_gas(scene, model)
     residual = np.interp(drawn.velocity_factor[:runs], *residual_by_velocity(driven, law=model.flow))
 
     def fraction(least: FloatArray) -> float:
         left = (
-            unreachable_vibration(
-                plant=replace(ring, residual_fill=float(fill)),
-                state=state,
-                rotor=_rotor(scene, drawn, number),
+            replace(ring, residual_fill=float(fill)).unreachable_vibration(
+                state=state, rotor=_rotor(scene, drawn, number)
             )
             for number, fill in enumerate(least)
         )
@@ -192,7 +193,7 @@ def _one_run(
 ) -> Simulation:
     """One drawn run; velocity, moment and influence coefficient act through their product."""
     told(f"run {number + 1}")
-    drawn = drawn_members(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
+    drawn = Members.drawn(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
     rotor = _rotor(scene, drawn, number)
     faster = rotor.influence_coefficient * float(drawn.velocity_factor[number])
     run = replace(scene.run, seed=scene.run.seed + number)

@@ -62,24 +62,24 @@ def status_of(
 def _unsettled(scene: Scene, settling: SettlingTimes, *, also: str, found: Search | None) -> str:
     """Of runs that settle too seldom, by what explains them. Args: `also`: a change that is recommended."""
     share = (
-        f"{settling.settled.value:.1%} of the runs settle within the time limit of "
+        f"{settling.told(settling.settled.value)} settle within the time limit of "
         f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
     )
     if settling.explained_by(settling.beyond_capacity):
         return (
-            f"{share}; {settling.beyond_capacity:.1%} of the runs would need more moment than the disc "
+            f"{share}; {settling.told(settling.beyond_capacity)} would need more moment than the disc "
             f"can form above its residual fill: {BEYOND_CAPACITY}"
         )
     if found is not None and found.needs is not None and found.needs_more_than(scene.run.time_limit):
         return f"{share}; they need some {found.needs:.2g} s: raise run.time_limit"
     if settling.explained_by(settling.beyond_pressure):
         return (
-            f"{share}, nor by other gains; in {settling.beyond_pressure:.1%} of the runs the gas does not "
+            f"{share}, nor by other gains; in {settling.told(settling.beyond_pressure)} the gas does not "
             f"drive the liquid far enough at {scene.gas.pressure / 1e6:.3g} MPa: raise gas.pressure"
         )
     if settling.explained_by(settling.drifted):
         return (
-            f"{share}, nor by other gains and pressures; in {settling.drifted:.1%} of the runs the full tube "
+            f"{share}, nor by other gains and pressures; in {settling.told(settling.drifted)} the full tube "
             f"lets liquid run back while the gas is off: {RUNS_BACK}"
         )
     others = "" if found is None or found.settles else ", nor by other gains and pressures"

@@ -10,8 +10,7 @@ import numpy as np
 
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.checks import check_settings
-from ringbalance.controller.liquid_ring.plant import initial_state
-from ringbalance.controller.liquid_ring.reach import unreachable_vibration
+from ringbalance.controller.liquid_ring.plant import DiscState
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
 from ringbalance.controller.tuning.loop_factor import (
@@ -21,19 +20,9 @@ from ringbalance.controller.tuning.loop_factor import (
     with_driving_gas,
 )
 from ringbalance.controller.tuning.margins import Margins, loop_margins
-from ringbalance.controller.tuning.recommendation import (
-    Contribution,
-    FactorUncertainty,
-    factor_uncertainty,
-)
+from ringbalance.controller.tuning.recommendation import Contribution, FactorUncertainty, factor_uncertainty
 from ringbalance.controller.tuning.search import Candidate, Search, recommended, search, with_ways_out
-from ringbalance.controller.tuning.settling import (
-    MEMBERS,
-    RUNS,
-    Progress,
-    SettlingTimes,
-    settling_times,
-)
+from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
 from ringbalance.controller.tuning.status import over_capacity, status_of, valves_reach
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document
@@ -177,8 +166,11 @@ def _judged(
 
 def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
     """With gas that drives the liquid: what only a higher pressure can do is not beyond the disc."""
-    plant, state = law_based_of(with_driving_gas(scene, model), model).ring, initial_state(disc=scene.disc)
-    return unreachable_vibration(plant=plant, state=state, rotor=scene.rotor)
+    plant, state = (
+        law_based_of(with_driving_gas(scene, model), model).ring,
+        DiscState.initial(disc=scene.disc),
+    )
+    return plant.unreachable_vibration(state=state, rotor=scene.rotor)
 
 
 def _line_reaches(lines: tuple[LineAnswer, ...], *, settles: bool) -> bool | None:

@@ -50,6 +50,20 @@ class LawComparison:
         """What the data say."""
         return _SAID[self.outcome].format(self.other)
 
+    @classmethod
+    def of(cls, fit: LinearFit, *, other: str, residuals: FloatArray) -> LawComparison:
+        """Compare by linear re-fits from the solution.
+
+        Args: `other`: the other law in words. `residuals`: with its predictions at the fitted parameters,
+            over sigma, shape (n,).
+        """
+        own, others = fit.beyond_parameters(fit.residuals), fit.beyond_parameters(residuals)
+        return cls(
+            other=other,
+            separation=float(np.sum((others - own) ** 2)),
+            preference=float(others @ others - own @ own),
+        )
+
 
 def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, str]]:
     """What the data say of all of them, one sentence for each outcome, the gravest first."""
@@ -57,17 +71,3 @@ def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, s
         others = [each.other for each in comparisons if each.outcome == outcome]
         if others:
             yield outcome, sentence.format(" or ".join(filter(None, (", ".join(others[:-1]), others[-1]))))
-
-
-def compare_laws(fit: LinearFit, *, other: str, residuals: FloatArray) -> LawComparison:
-    """Compare by linear re-fits from the solution.
-
-    Args: `other`: the other law in words. `residuals`: with its predictions at the fitted parameters, over
-        sigma, shape (n,).
-    """
-    own, others = fit.beyond_parameters(fit.residuals), fit.beyond_parameters(residuals)
-    return LawComparison(
-        other=other,
-        separation=float(np.sum((others - own) ** 2)),
-        preference=float(others @ others - own @ own),
-    )

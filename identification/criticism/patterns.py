@@ -77,29 +77,31 @@ class Criticism:
             return "too few measurements to tell whether the fit describes them"
         return f"no pattern in the residuals ({len(self.findings)} tests, {100 * LEVEL:g} % level)"
 
+    @classmethod
+    def of(cls, fit: LinearFit, covariates: Mapping[str, FloatArray]) -> Criticism:
+        """Test the residuals of a fit.
 
-def criticise(fit: LinearFit, covariates: Mapping[str, FloatArray]) -> Criticism:
-    """Test the residuals of a fit.
-
-    Args: `covariates`: by name, shape (n,); NaN where a row has none, as priors have. "order" is the order in
-        which the rows of a file were measured.
-    """
-    tests = [*_patterns(fit, covariates), *_sizes(fit), *_runs(fit, covariates.get("order"))]
-    patterns = [t for t in tests if t.contrast is not None]
-    families = len(tests) - len(patterns) + bool(patterns)
-    worst = _max_correction(patterns)
-    found = [
-        Finding(
-            test=each.test,
-            block=each.block,
-            against=each.against,
-            p_value=each.p_value,
-            corrected=-math.expm1(families * math.log1p(-min(worst.get(id(each), each.p_value), 1 - 1e-12))),
-            text=each.text,
-        )
-        for each in tests
-    ]
-    return Criticism(findings=tuple(sorted(found, key=lambda f: (f.corrected, f.p_value))))
+        Args: `covariates`: by name, shape (n,); NaN where a row has none, as priors have. "order" is that in
+            which the rows of a file were measured.
+        """
+        tests = [*_patterns(fit, covariates), *_sizes(fit), *_runs(fit, covariates.get("order"))]
+        patterns = [t for t in tests if t.contrast is not None]
+        families = len(tests) - len(patterns) + bool(patterns)
+        worst = _max_correction(patterns)
+        found = [
+            Finding(
+                test=each.test,
+                block=each.block,
+                against=each.against,
+                p_value=each.p_value,
+                corrected=-math.expm1(
+                    families * math.log1p(-min(worst.get(id(each), each.p_value), 1 - 1e-12))
+                ),
+                text=each.text,
+            )
+            for each in tests
+        ]
+        return cls(findings=tuple(sorted(found, key=lambda f: (f.corrected, f.p_value))))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

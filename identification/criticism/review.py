@@ -2,27 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.criticism.at_solution import AtSolution, at_solution
-from ringbalance.identification.criticism.law_comparison import LawComparison, compare_laws
-from ringbalance.identification.criticism.other_laws import EXPONENTS, WITHOUT, laws_to_compare, other_law
-from ringbalance.identification.criticism.patterns import Criticism, criticise
+from ringbalance.identification.criticism.law_comparison import LawComparison
+from ringbalance.identification.criticism.linear_fit import LinearFit
+from ringbalance.identification.criticism.patterns import Criticism
+from ringbalance.identification.data.kinds import KINDS
+from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.predict.device import device_of
+from ringbalance.identification.predict.device import Device
 from ringbalance.identification.result import FitResult
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.tables.fit import table_from_samples
+from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.scene.arrays import FloatArray, StringArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import eccentric_with
 
 _BY_LAW: Final = ("injection", "transfer", "flow")
 """Kinds that the law of the tube's flow decides on."""
+LAMINAR: Final = "laminar flow (a loss in proportion to the velocity)"
+TURBULENT: Final = "turbulent flow (a loss in proportion to its square)"
+UNBROKEN: Final = "a column that never separates over the crest"
+BROKEN: Final = "a column that separates at ambient pressure"
+UNSPILT: Final = "a column that runs full without spilling first"
+EXPONENTS: Final[Mapping[str, float]] = MappingProxyType({LAMINAR: 1.0, TURBULENT: 2.0})
+"""Of the loss over the velocity, of those of these laws that are powers."""
+_OF_THE_CREST: Final = (UNBROKEN, BROKEN, UNSPILT)
+
+WITHOUT: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
+    {
+        "a rotor without damping": ("run_up", ("rotor.damping",)),
+        "masses without friction": ("positioning", ("masses.friction_arm[0]", "masses.friction_arm[1]")),
+        "a motor without back EMF": ("positioning", ("motor.back_emf_constant",)),
+    }
+)
+"""Of eccentric masses: the kind of data that an effect moves, and the values that are zero without it."""
+ORDER = "the order of measurement"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,23 +67,23 @@ class Review:
         """All that is to be said, the verdict on the fit first."""
         return (self.criticism.text, *(each.text for each in self.laws))
 
+    @classmethod
+    def of(cls, result: FitResult) -> Review:
+        """Test the residuals of a fit and compare its law with others."""
+        found = _at_solution(result)
+        return cls(
+            criticism=Criticism.of(found.fit, found.covariates),
+            laws=tuple(_comparisons(result, found)),
+        )
 
-def review(result: FitResult) -> Review:
-    """Test the residuals of a fit and compare its law with others."""
-    found = at_solution(result)
-    return Review(
-        criticism=criticise(found.fit, found.covariates),
-        laws=tuple(_comparisons(result, found)),
-    )
 
-
-def _comparisons(result: FitResult, found: AtSolution) -> Iterator[LawComparison]:
+def _comparisons(result: FitResult, found: _AtSolution) -> Iterator[LawComparison]:
     best = result.optimum
     problem, scene = best.residuals.problem, best.residuals.problem.scene_at(best.t)
     predictions = _by_other_tubes if isinstance(scene, Scene) else _by_other_machines
     for name, predicted in predictions(problem, scene):
         residuals = found.turned(best.residuals.at(best.t, predicted=predicted))
-        yield compare_laws(found.fit, other=name, residuals=residuals)
+        yield LawComparison.of(found.fit, other=name, residuals=residuals)
 
 
 def _by_other_machines(problem: Problem, scene: EccentricScene) -> Iterator[tuple[str, FloatArray]]:
@@ -79,9 +103,9 @@ def _by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, Float
     blocks = [b for b in problem.blocks if b.observations.kind in _BY_LAW]
     if not blocks:
         return
-    law, velocity = device_of(scene, problem.models).law, _typical_velocity(scene, problem, blocks)
-    for name in laws_to_compare(law):
-        models = replace(problem.models, other=partial(other_law, name=name, velocity=velocity))
+    law, velocity = Device.of(scene, problem.models).law, _typical_velocity(scene, problem, blocks)
+    for name in _laws_to_compare(law):
+        models = replace(problem.models, other=partial(_other_law, name=name, velocity=velocity))
         other = replace(problem, models=models)
         yield (
             name,
@@ -105,6 +129,131 @@ def _typical_velocity(scene: Scene, problem: Problem, blocks: list[Block]) -> fl
     """At equal fills under the middle of the data's gas pressures, m/s; 1 where nothing flows there."""
     pressures = [b.observations.columns["pressure"] for b in blocks if "pressure" in b.observations.columns]
     pressure = float(np.median(np.concatenate(pressures))) if pressures else scene.gas.pressure
-    law, x = device_of(scene, problem.models).law, scene.disc.initial_fill
+    law, x = Device.of(scene, problem.models).law, scene.disc.initial_fill
     flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
     return abs(float(flow.velocity)) or 1.0
+
+
+def power_of(law: CalibratedLaw, velocity: float, exponent: float) -> CalibratedLaw:
+    """Heads in proportion to a power of the velocity, those of the law at one velocity, m/s."""
+    heads = law.heads
+    near, far = heads.hump_head, heads.return_hump_head
+    return replace(
+        law,
+        heads=replace(
+            heads,
+            head=_straight(heads.head, velocity, exponent),
+            hump_head=None if near is None else _straight(near, velocity, exponent),
+            return_hump_head=None if far is None else _straight(far, velocity, exponent),
+        ),
+    )
+
+
+def _straight(table: HermiteTable, velocity: float, exponent: float) -> HermiteTable:
+    nodes: FloatArray = table.nodes
+    at = float(np.clip(np.log(velocity), nodes[0], nodes[-1]))
+    value = table(at) + exponent * (nodes - at)
+    return table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value)
+
+
+def _other_law(law: CalibratedLaw, *, name: str, velocity: float) -> CalibratedLaw:
+    """The other law of a name, from the fitted one; a power has the same loss at a velocity, m/s."""
+    if name in EXPONENTS:
+        return power_of(law, velocity, EXPONENTS[name])
+    if name == UNBROKEN:
+        heads = replace(law.heads, hump_head=None, return_hump_head=None)
+        return replace(law, path=replace(law.path, hump_pressure=None), heads=heads)
+    if name == BROKEN:
+        return replace(law, path=replace(law.path, vapour_pressure=0.0, released=0.0))
+    if name == UNSPILT:
+        return replace(law, path=replace(law.path, froude_velocity=0.0))
+    raise ValueError(f"{name!r} is no other law")
+
+
+def _laws_to_compare(law: CalibratedLaw) -> tuple[str, ...]:
+    """Names of those that mean something for a law: a tube without crest has no column to break."""
+    return (*EXPONENTS, *(() if law.path.hump_pressure is None else _OF_THE_CREST))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _AtSolution:
+    """Rows are those of all files, then held inputs, then priors."""
+
+    fit: LinearFit
+    """Of a vibration the part along its predicted change, and the part across."""
+    covariates: Mapping[str, FloatArray]
+    """By name, shape (n,); NaN where a row has none."""
+    turn: FloatArray
+    """Rotation of the rows of vibrations into these parts, shape (measured, measured)."""
+
+    def turned(self, rows: FloatArray) -> FloatArray:
+        """Rows of the fit's own order, with those of vibrations along and across."""
+        count = self.turn.shape[0]
+        return np.concatenate([self.turn @ rows[:count], rows[count:]])
+
+
+def _at_solution(result: FitResult) -> _AtSolution:
+    """The fit linearised at its optimum; what is no parameter but was fitted too counts as one."""
+    best = result.optimum
+    problem, residuals = best.residuals.problem, best.residuals
+    count, parts = problem.measured.size, best.at
+    turn = _rotation(result)
+    more = np.zeros((parts.size - residuals.base.shape[0], residuals.base.shape[1]))
+    whole = np.hstack([-best.slopes, np.concatenate([residuals.base, more])])
+    data = np.arange(parts.size) < count
+    known = np.zeros(parts.size, dtype=np.bool_)
+    known[:count] = problem.group < 0
+    blocks = np.concatenate([_titles(b.observations, b.measured.size) for b in problem.blocks])
+    rest = np.full(parts.size - count, "beforehand")
+    return _AtSolution(
+        fit=LinearFit(
+            residuals=np.concatenate([turn @ parts[:count], parts[count:]]),
+            derivatives=np.concatenate([turn @ whole[:count], whole[count:]]),
+            block=np.concatenate([blocks, rest]),
+            data=data,
+            known_noise=known,
+        ),
+        covariates=_covariates(result, parts.size),
+        turn=turn,
+    )
+
+
+def _titles(observations: Observations, size: int) -> StringArray:
+    title = Path(observations.file).name
+    if size == len(observations):
+        return np.full(size, title)
+    parts = ("along the predicted change", "across the predicted change")
+    return np.repeat([f"{title} {part}" for part in parts], len(observations))
+
+
+def _rotation(result: FitResult) -> FloatArray:
+    """Rotates a vibration's real and imaginary part into those along its predicted change and across."""
+    problem, t = result.optimum.residuals.problem, result.optimum.t
+    predicted, turn, at = problem.at(t), np.eye(problem.measured.size), 0
+    for block in problem.blocks:
+        size, rows = block.measured.size, len(block.observations)
+        if size == 2 * rows:
+            along = block.observations.rows_of(predicted[at : at + size])
+            angle = np.arctan2(along[:, 1], along[:, 0])
+            i = at + np.arange(rows)
+            turn[i, i] = turn[i + rows, i + rows] = np.cos(angle)
+            turn[i, i + rows], turn[i + rows, i] = np.sin(angle), -np.sin(angle)
+        at += size
+    return turn
+
+
+def _covariates(result: FitResult, size: int) -> Mapping[str, FloatArray]:
+    """What was set, and the order; angles apart, which have no least and no largest."""
+    problem, found, at = result.optimum.residuals.problem, {ORDER: np.full(size, np.nan)}, 0
+    for block in problem.blocks:
+        observations = block.observations
+        width = block.measured.size // len(observations)
+        mine = slice(at, at + block.measured.size)
+        found[ORDER][mine] = np.tile(np.arange(float(len(observations))), width)
+        for column in KINDS[observations.kind].columns:
+            values = observations.columns.get(column.name)
+            if values is None or column.measured or column.amplitude or column.dimension == "angle":
+                continue
+            found.setdefault(column.words, np.full(size, np.nan))[mine] = np.tile(values, width)
+        at += block.measured.size
+    return found

@@ -9,10 +9,9 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-from ringbalance.identification.data.columns import dimension_of, split_head
-from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.identification.data.tables import dimension_of, split_head
 from ringbalance.scene.faults import did_you_mean
-from ringbalance.scene.units import FieldError
+from ringbalance.scene.units import DIMENSIONS, FieldError
 
 AMPLITUDES: Final[Mapping[str, float]] = MappingProxyType(
     {"zero_to_peak": 1.0, "peak_to_peak": 0.5, "rms": math.sqrt(2)}

@@ -14,28 +14,21 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.columns import (
-    column_values,
-    dimension_of,
-    head_fault,
-    name_faults,
-    split_head,
-    texts,
-)
 from ringbalance.identification.data.tables import (
+    SERIES,
     Table,
     data_fault,
     decoded,
+    dimension_of,
     file_name,
-    header_faults,
     in_order,
     parse_table,
     read_content,
+    split_head,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 from ringbalance.scene.faults import Fault, toml_text
 
-SERIES: Final = "series"
 _MOST_SHOWN: Final = 20
 _ENOUGH: Final = ("kind", "source", "uncertainty")
 
@@ -96,68 +89,55 @@ class Measurements:
             columns={name: column[chosen] for name, column in self.columns.items()},
         )
 
+    @classmethod
+    def parsed(cls, text: str, *, file: str) -> Measurements:
+        """The data set of a text. Args: `file`: for messages. Raises: MeasurementsError: all errors."""
+        table, faults = parse_table(text, file=file)
+        if table is None:
+            raise _error(faults)
+        wrong = [*faults, *_source_faults(table), *table.name_faults(), *_unit_faults(table)]
+        heads_are_right = len(wrong) == len(faults)
+        columns = dict(_columns(table, wrong)) if heads_are_right else {}
+        if wrong:
+            raise _error(wrong)
+        return cls(
+            source=Source(**table.header),  # type: ignore[arg-type]
+            series=table.series,
+            columns=columns,
+        )
 
-def read_measurements(path: Path) -> Measurements:
-    """The data set of a file. Raises: MeasurementsError: no such file, or not a data set."""
-    content, unreadable = read_content(path)
-    text, faults = decoded(content, file=file_name(path))
-    if unreadable or faults:
-        raise _error(unreadable or faults)
-    return parse_measurements(text, file=file_name(path))
-
-
-def parse_measurements(text: str, *, file: str) -> Measurements:
-    """The data set of a text. Args: `file`: its name in messages. Raises: MeasurementsError: all errors."""
-    table, faults = parse_table(text, file=file)
-    if table is None:
-        raise _error(faults)
-    wrong = [*faults, *_source_faults(table.header, file=file), *name_faults(table), *_unit_faults(table)]
-    heads_are_right = len(wrong) == len(faults)
-    columns = dict(_columns(table, wrong)) if heads_are_right else {}
-    if wrong:
-        raise _error(wrong)
-    return Measurements(
-        source=Source(**table.header),  # type: ignore[arg-type]
-        series=series_of(table),
-        columns=columns,
-    )
-
-
-def series_of(table: Table) -> StringArray:
-    """The column of series, or one series for all rows."""
-    return np.array(texts(table, SERIES) if SERIES in table.heads else ("one",) * len(table.rows))
+    @classmethod
+    def read(cls, path: Path) -> Measurements:
+        """The data set of a file. Raises: MeasurementsError: no such file, or not a data set."""
+        content, unreadable = read_content(path)
+        text, faults = decoded(content, file=file_name(path))
+        if unreadable or faults:
+            raise _error(unreadable or faults)
+        return Measurements.parsed(text, file=file_name(path))
 
 
-def _source_faults(header: Mapping[str, object], *, file: str) -> Iterator[Fault]:
+def _source_faults(table: Table) -> Iterator[Fault]:
     """What is wrong with the first lines of a data set."""
-    yield from header_faults(header, known=SOURCE_KEYS, needed=_ENOUGH, file=file)
-    yield from text_faults(header, [key for key in SOURCE_KEYS if key != "uncertainty"], file=file)
-    width = header.get("uncertainty", 0.0)
+    yield from table.header_faults(known=SOURCE_KEYS, needed=_ENOUGH)
+    yield from table.text_faults(key for key in SOURCE_KEYS if key != "uncertainty")
+    width = table.header.get("uncertainty", 0.0)
     if isinstance(width, bool) or not isinstance(width, int | float) or not 0 <= width < 1:
         problem = "it is not a number from 0 to below 1: 95 %, relative to the measured value"
-        yield data_fault(file, "uncertainty", problem, value=toml_text(width))
-
-
-def text_faults(header: Mapping[str, object], keys: Iterable[str], *, file: str) -> Iterator[Fault]:
-    """Values of keys that must be text, and are not."""
-    for key in keys:
-        value = header.get(key, "")
-        if not isinstance(value, str):
-            yield data_fault(file, key, "it is not text", value=toml_text(value), allowed='"..."')
+        yield data_fault(table.file, "uncertainty", problem, value=toml_text(width))
 
 
 def _unit_faults(table: Table) -> Iterator[Fault]:
     for head in table.heads:
         _, unit = split_head(head) or ("", "")
         if unit and dimension_of(unit) is None:
-            yield head_fault(table, head, "the unit is not known; docs/scene-file.md has them")
+            yield table.head_fault(head, "the unit is not known; docs/scene-file.md has them")
 
 
 def _columns(table: Table, wrong: list[Fault]) -> Iterator[tuple[str, FloatArray]]:
     for head in table.heads:
         name, unit = split_head(head) or ("", "")
         if name != SERIES:
-            values, faults = column_values(table, head, unit, dimension_of(unit) if unit else None)
+            values, faults = table.values(head, unit, dimension_of(unit) if unit else None)
             wrong += faults
             yield name, values
 

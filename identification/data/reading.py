@@ -11,16 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.columns import (
-    check_unit,
-    column_values,
-    head_fault,
-    name_faults,
-    split_head,
-    texts,
-)
 from ringbalance.identification.data.kinds import AMPLITUDES, KINDS, Column, DataKind, unknown_kind
-from ringbalance.identification.data.measurements import SOURCE_KEYS, series_of, text_faults
+from ringbalance.identification.data.measurements import SOURCE_KEYS
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.data.stated import stated_uncertainty
 from ringbalance.identification.data.tables import (
@@ -28,17 +20,17 @@ from ringbalance.identification.data.tables import (
     data_fault,
     decoded,
     file_name,
-    header_faults,
     in_order,
     parse_table,
     read_content,
+    split_head,
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, toml_text
 from ringbalance.scene.keys.fields import LETTERS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.units import FieldError
+from ringbalance.scene.units import FieldError, parse_quantity
 
 AMPLITUDE: Final = "amplitude"
 _NEEDED: Final = ("kind", "source")
@@ -117,14 +109,14 @@ def _observations(
 ) -> Observations:
     """Amplitudes as the file's convention has them become zero to peak."""
     factor = AMPLITUDES[str(table.header.get(AMPLITUDE, "zero_to_peak"))]
-    letters = texts(table, "chamber") if kind.has_chamber else ("",) * len(table.rows)
+    letters = table.texts("chamber") if kind.has_chamber else ("",) * len(table.rows)
     used = {column.name: columns[column.name] for column in kind.columns if column.name in columns}
     return Observations(
         kind=str(table.header["kind"]),
         file=table.file,
         source=str(table.header["source"]),
         lines=np.array(table.lines, dtype=np.int64),
-        series=series_of(table),
+        series=table.series,
         chamber=np.array(letters, dtype=np.str_),
         columns=_zero_to_peak(used, kind, factor),
         uncertainty=_zero_to_peak(uncertainty, kind, factor),
@@ -151,8 +143,8 @@ def _header_faults(table: Table, kind: DataKind) -> list[Fault]:
     convention = (AMPLITUDE,) if kind.has_amplitudes else ()
     texts_only = [key for key in SOURCE_KEYS if key != "uncertainty"]
     faults = [
-        *header_faults(table.header, known=(*SOURCE_KEYS, *convention), needed=_NEEDED, file=table.file),
-        *text_faults(table.header, texts_only, file=table.file),
+        *table.header_faults(known=(*SOURCE_KEYS, *convention), needed=_NEEDED),
+        *table.text_faults(texts_only),
     ]
     if not str(table.header.get("source", "-")).strip():
         faults.append(data_fault(table.file, "source", "it is empty", allowed="rig, run and date"))
@@ -167,7 +159,7 @@ def _header_faults(table: Table, kind: DataKind) -> list[Fault]:
 
 def _head_faults(table: Table, kind: DataKind) -> Iterator[Fault]:
     known = [column.name for column in (*kind.columns, *kind.uncertainties())] + [*kind.texts]
-    yield from name_faults(table, known)
+    yield from table.name_faults(known)
     for head in table.heads:
         name, unit = split_head(head) or ("", "")
         yield from _one_head(table, head, name, unit, kind, known)
@@ -182,17 +174,17 @@ def _one_head(
     if column is None:
         if name not in kind.texts and name.replace("_", "").islower():
             problem = f"a file of this kind has no such column{did_you_mean(name, known)}"
-            yield head_fault(table, head, problem, ", ".join(known))
+            yield table.head_fault(head, problem, ", ".join(known))
         elif name in kind.texts and unit:
-            yield head_fault(table, head, "a column of text has no unit", name)
+            yield table.head_fault(head, "a column of text has no unit", name)
         return
     try:
         if column.dimension is not None:
-            check_unit(unit, column.dimension)
+            parse_quantity(f"1 {unit}", column.dimension)
         elif unit and unit != "%":
             raise FieldError("this column has no unit", f"{name}, or {name} [%]")
     except FieldError as error:
-        yield head_fault(table, head, error.problem, error.allowed)
+        yield table.head_fault(head, error.problem, error.allowed)
 
 
 def _missing(table: Table, kind: DataKind, names: set[str]) -> Iterator[Fault]:
@@ -219,7 +211,7 @@ def _columns(table: Table, kind: DataKind) -> tuple[dict[str, FloatArray], list[
         if column is None:
             continue
         dimension = "share" if unit == "%" and column.dimension is None else column.dimension
-        columns[name], wrong = column_values(table, head, unit, dimension)
+        columns[name], wrong = table.values(head, unit, dimension)
         bad = {fault.key for fault in wrong}
         faults += wrong + [
             fault for fault in _range_faults(table, head, column, columns[name]) if fault.key not in bad
@@ -228,7 +220,7 @@ def _columns(table: Table, kind: DataKind) -> tuple[dict[str, FloatArray], list[
 
 
 def _range_faults(table: Table, head: str, column: Column, values: FloatArray) -> Iterator[Fault]:
-    cells = texts(table, head)
+    cells = table.texts(head)
     for line, cell, value in zip(table.lines, cells, values.tolist(), strict=True):
         try:
             column.check(value)
@@ -239,7 +231,7 @@ def _range_faults(table: Table, head: str, column: Column, values: FloatArray) -
 def _chamber_faults(table: Table, scene: AnyScene) -> Iterator[Fault]:
     assert isinstance(scene, Scene)
     letters = LETTERS[: scene.disc.chambers]
-    for line, cell in zip(table.lines, texts(table, "chamber"), strict=True):
+    for line, cell in zip(table.lines, table.texts("chamber"), strict=True):
         if len(cell) != 1 or cell not in letters:
             problem = f"the disc has no chamber of that name{did_you_mean(cell, letters)}"
             yield table.fault(line, "chamber", cell, problem, ", ".join(letters))
@@ -251,7 +243,7 @@ def _fill_faults(table: Table, scene: AnyScene, columns: Mapping[str, FloatArray
         return
     head = next(head for head in table.heads if (split_head(head) or ("",))[0] == "fill_ratio")
     total = 2 * scene.disc.initial_fill
-    rows = zip(table.lines, texts(table, head), columns["fill_ratio"].tolist(), strict=True)
+    rows = zip(table.lines, table.texts(head), columns["fill_ratio"].tolist(), strict=True)
     for line, cell, fill in rows:
         if total * (1 + _ROUNDED) < fill <= 1:
             problem = f"the chambers of a pair hold {total:.4g} together, twice disc.initial_fill"

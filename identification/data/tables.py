@@ -15,12 +15,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
+from ringbalance.scene.arrays import FloatArray, StringArray
 from ringbalance.scene.faults import Fault, did_you_mean, toml_text
+from ringbalance.scene.units import DIMENSIONS, FieldError, parse_number, parse_quantity
 
 LARGEST_FILE: Final = 8 * 2**20
 MOST_ROWS: Final = 2000
 """A row is a measurement; more of them are a recording, which is averaged or thinned out first. A fit
 holds the covariance of every pair of rows: more would take gigabytes."""
+SERIES: Final = "series"
 _MARK: Final = "#"
 _SEPARATORS: Final = ";\t,"
 _SETS_A_KEY: Final = re.compile(r'"?#\s*\w+\s*=')
@@ -28,6 +33,11 @@ _NAMED_SEPARATOR: Final = re.compile(r'"?sep=.{0,2}"?[,;\t]*', re.IGNORECASE)
 _LINE: Final = re.compile(r"line (\d+)")
 _WORKBOOKS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx or .ods, and of .xls."""
+_HEAD: Final = re.compile(r"([A-Za-z][A-Za-z0-9_ ]*?)(?: ?\[([^][]+)\])?")
+_SIZES: Final = (1e-15, 1e15)
+"""Of a number as it stands in a cell; zero is allowed too."""
+_NO_UNIT: Final = "1"
+_NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +57,60 @@ class Table:
         return data_fault(
             self.file, f'line {line}, column "{head}"', problem, value=toml_text(cell), allowed=allowed
         )
+
+    def name_faults(self, known: Collection[str] = ()) -> Iterator[Fault]:
+        """Heads that are no name with a unit, and names that stand twice. Args: `known`: names to suggest."""
+        names = [split_head(head) for head in self.heads]
+        for head, name in zip(self.heads, names, strict=True):
+            if name is None or not _NAME.fullmatch(name[0]):
+                problem = 'it is not a name with its unit in brackets, such as "pressure [kPa]"'
+                yield self.head_fault(head, problem + did_you_mean(name[0] if name else head, known))
+        once = [name[0] for name in names if name is not None]
+        for twice in sorted({each for each in once if once.count(each) > 1}):
+            yield data_fault(self.file, f"line {self.head_line}", f'the column "{twice}" stands twice')
+
+    def head_fault(self, head: str, problem: str, allowed: str = "") -> Fault:
+        """One error of the name or the unit of a column."""
+        place = f"line {self.head_line}, column {toml_text(head)}"
+        return data_fault(self.file, place, problem, allowed=allowed)
+
+    def values(self, head: str, unit: str, dimension: str | None) -> tuple[FloatArray, list[Fault]]:
+        """The numbers of a column, SI, and the errors of its cells; 0 stands for a cell with an error."""
+        at, values, faults = self.heads.index(head), np.zeros(len(self.rows)), []
+        for row, (line, cells) in enumerate(zip(self.lines, self.rows, strict=True)):
+            try:
+                values[row] = _cell_value(cells[at], unit, dimension)
+            except FieldError as error:
+                faults.append(self.fault(line, head, cells[at], error.problem, error.allowed))
+        return values, faults
+
+    @property
+    def series(self) -> StringArray:
+        """The column of series, or one series for all rows."""
+        return np.array(self.texts(SERIES) if SERIES in self.heads else ("one",) * len(self.rows))
+
+    def header_faults(self, *, known: Collection[str], needed: Collection[str]) -> Iterator[Fault]:
+        """Keys of the header that are not known, and those that are missing."""
+        for key in self.header:
+            if key not in known:
+                problem = f"this key of the first lines is not known{did_you_mean(key, known)}"
+                yield data_fault(self.file, toml_text(key), problem, allowed=", ".join(known))
+        for key in needed:
+            if key not in self.header:
+                problem = f'the key "{key}" is missing in the first lines, marked #'
+                yield data_fault(self.file, "", problem)
+
+    def text_faults(self, keys: Iterable[str]) -> Iterator[Fault]:
+        """Values of keys of the header that must be text, and are not."""
+        for key in keys:
+            value = self.header.get(key, "")
+            if not isinstance(value, str):
+                yield data_fault(self.file, key, "it is not text", value=toml_text(value), allowed='"..."')
+
+    def texts(self, head: str) -> tuple[str, ...]:
+        """The cells of a column of text."""
+        at = self.heads.index(head)
+        return tuple(cells[at] for cells in self.rows)
 
 
 def data_fault(file: str, place: str, problem: str, *, value: str = "", allowed: str = "") -> Fault:
@@ -215,14 +279,36 @@ def in_order(faults: Iterable[Fault]) -> list[Fault]:
     return sorted(faults, key=lambda fault: int(found[1]) if (found := _LINE.match(fault.key)) else 0)
 
 
-def header_faults(
-    header: Mapping[str, object], *, known: Collection[str], needed: Collection[str], file: str
-) -> Iterator[Fault]:
-    """Keys of a header that are not known, and those that are missing."""
-    for key in header:
-        if key not in known:
-            problem = f"this key of the first lines is not known{did_you_mean(key, known)}"
-            yield data_fault(file, toml_text(key), problem, allowed=", ".join(known))
-    for key in needed:
-        if key not in header:
-            yield data_fault(file, "", f'the key "{key}" is missing in the first lines, marked #')
+def split_head(head: str) -> tuple[str, str] | None:
+    """Name and unit of a column, the unit empty where there is none; None for what is no such name."""
+    match = _HEAD.fullmatch(head)
+    if match is None:
+        return None
+    unit = (match[2] or "").strip()
+    return match[1].strip(), "" if unit == _NO_UNIT else unit
+
+
+def _check_unit(unit: str, dimension: str) -> None:
+    """Raises: FieldError: no unit of that dimension; the error has those that are."""
+    parse_quantity(f"1 {unit}", dimension)
+
+
+def dimension_of(unit: str) -> str | None:
+    """The first dimension that has a unit; None where none has it."""
+    for dimension in DIMENSIONS:
+        try:
+            _check_unit(unit, dimension)
+        except FieldError:
+            continue
+        return dimension
+    return None
+
+
+def _cell_value(cell: str, unit: str, dimension: str | None) -> float:
+    """The number of a cell, SI. Raises: FieldError: no number, or one of a size that nobody measures."""
+    if not cell:
+        raise FieldError("the cell is empty", "a number in every row, or no such column")
+    value = parse_number(cell)
+    if value and not _SIZES[0] <= abs(value) <= _SIZES[1]:
+        raise FieldError("no measurement has a number of this size", "0, or 1e-15 to 1e15")
+    return value if dimension is None else parse_quantity(f"{cell} {unit}", dimension)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ringbalance.identification.data.kinds import AMPLITUDES, KINDS, Column, unknown_kind
-from ringbalance.scene.faults import option_error
+from ringbalance.scene.faults import SceneError
 
 
 def template(kind: str) -> str:
@@ -15,7 +15,7 @@ def template(kind: str) -> str:
     """
     if kind not in KINDS:
         problem, allowed = unknown_kind(kind), ", ".join(KINDS)
-        raise option_error(option="--template", value=kind, problem=problem, allowed=allowed)
+        raise SceneError.of_option(option="--template", value=kind, problem=problem, allowed=allowed)
     needed = [column for column in KINDS[kind].columns if not column.optional and not _is_other(column, kind)]
     heads = [*(["chamber"] if KINDS[kind].has_chamber else []), *(column.head for column in needed)]
     lines = [*_first_lines(kind), "##", *_explained(kind), ",".join([*heads, "series"])]

@@ -1,4 +1,4 @@
-"""Predictions of what was measured, one module per kind of data, through the program's own laws.
+"""Predictions of what was measured, for each kind of data, through the program's own laws.
 
-A module gives `predict(scene, observations, lambda_factor)`; a new kind is declared in `data/` as well.
+A new kind is entered in `kinds`, with its `predict(scene, observations, models)`, and declared in `data/`.
 """

@@ -55,13 +55,13 @@ class Models:
     other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
     """Makes another law of the scene's, to be compared with it."""
 
-
-def models_of(scene: Scene) -> Models:
-    """The models that `calibrate` takes."""
-    tube = tube_models(scene)
-    gravity = mean_gravity(scene) > scene.tolerance
-    law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
-    return Models(tube=tube, gravity=gravity, velocity=_primed_velocity(law, scene))
+    @classmethod
+    def of(cls, scene: Scene) -> Models:
+        """The models that `calibrate` takes."""
+        tube = tube_models(scene)
+        gravity = mean_gravity(scene) > scene.tolerance
+        law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
+        return cls(tube=tube, gravity=gravity, velocity=_primed_velocity(law, scene))
 
 
 def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
@@ -136,16 +136,18 @@ class Device:
         advance(plant[0], motion[0], lag + left + _SETTLED, work, 0, 0, work)
         return float(motion["state"][0, X])
 
+    @classmethod
+    def of(cls, scene: Scene, models: Models) -> Device:
+        """The device of a scene, with the geometry's lambda.
 
-def device_of(scene: Scene, models: Models) -> Device:
-    """The device of a scene, with the geometry's lambda; scenes that differ in rotor, sensor, controller or
-    the factor on lambda alone share theirs."""
-    rotor = replace(
-        scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=0.0, initial_phase=0.0
-    )
-    disc = replace(scene.disc, lambda_factor=None)
-    tube = replace(scene.tube, models=replace(models.tube, errors=scene.tube.models.errors))
-    return _device(replace(scene, rotor=rotor, disc=disc, tube=tube), models)
+        Scenes that differ in rotor, sensor, controller or the factor on lambda alone share theirs.
+        """
+        rotor = replace(
+            scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=0.0, initial_phase=0.0
+        )
+        disc = replace(scene.disc, lambda_factor=None)
+        tube = replace(scene.tube, models=replace(models.tube, errors=scene.tube.models.errors))
+        return _device(replace(scene, rotor=rotor, disc=disc, tube=tube), models)
 
 
 @lru_cache(maxsize=_KEPT)

@@ -7,38 +7,38 @@ Source: Eqs. 21 to 23 of the liquid-ring paper with the program's own law and mo
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
-from ringbalance.controller.rotor import chamber_directions, chamber_letters, influence
+from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict.device import Device, Models, device_of
-from ringbalance.identification.predict.vibration import parts, spread_out, vector_covariance, vectors
+from ringbalance.identification.predict.device import Device, Models
+from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Scene
 
 
-def measured(observations: Observations) -> FloatArray:
+def _measured(observations: Observations) -> FloatArray:
     """Changes of the vibration, real and then imaginary parts, m, shape (2 n,)."""
-    return parts(vectors(observations, when="_after") - vectors(observations, when="_before"))
+    return parts(observations.vectors(when="_after") - observations.vectors(when="_before"))
 
 
-def predict(scene: Scene, observations: Observations, models: Models) -> FloatArray:
-    """The same by the scene's law. Raises: ValueError: as `chamber_numbers`."""
-    device = device_of(scene, models)
-    before, after = device.once(observations, fills)
-    total, pair = (
-        2 * scene.disc.initial_fill,
-        chamber_numbers(scene, observations) % (scene.disc.chambers // 2),
-    )
+def _predict(scene: Scene, observations: Observations, models: Models) -> FloatArray:
+    """The same by the scene's law. Raises: ValueError: as `_chamber_numbers`."""
+    device = Device.of(scene, models)
+    before, after = device.once(observations, _fills)
+    total = 2 * scene.disc.initial_fill
+    pair = _chamber_numbers(scene, observations) % (scene.disc.chambers // 2)
     law = device.law.moment
     moved = law.pair_vector(fill_ratio=after, opposite_fill_ratio=total - after) - law.pair_vector(
         fill_ratio=before, opposite_fill_ratio=total - before
     )
-    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    k = scene.rotor.influence
     return parts(k * scene.disc.moment_factor * moved * chamber_directions(scene.disc.chambers)[pair])
 
 
-def chamber_numbers(scene: Scene, observations: Observations) -> IntArray:
+def _chamber_numbers(scene: Scene, observations: Observations) -> IntArray:
     """Index of the driven chamber of each row. Raises: ValueError: a letter that the disc does not have."""
     letters = chamber_letters(scene.disc.chambers)
     for line, letter in zip(observations.lines, observations.chamber, strict=True):
@@ -50,14 +50,11 @@ def chamber_numbers(scene: Scene, observations: Observations) -> IntArray:
     return np.array([letters.index(letter) for letter in observations.chamber], dtype=np.int64)
 
 
-def fills(device: Device, observations: Observations) -> FloatArray:
+def _fills(device: Device, observations: Observations) -> FloatArray:
     """Fill of the positive chamber of each row's pair before and after, shape (2, n)."""
     disc, columns = device.scene.disc, observations.columns
-    chambers, half, total = (
-        chamber_numbers(device.scene, observations),
-        disc.chambers // 2,
-        2 * disc.initial_fill,
-    )
+    chambers = _chamber_numbers(device.scene, observations)
+    half, total = disc.chambers // 2, 2 * disc.initial_fill
     now: dict[tuple[str, int], float] = {}
     found = np.empty((2, len(observations)))
     stated = columns.get("fill_ratio")
@@ -77,19 +74,19 @@ def fills(device: Device, observations: Observations) -> FloatArray:
     return found
 
 
-def covariance(observations: Observations) -> FloatArray:
+def _covariance(observations: Observations) -> FloatArray:
     """Of the measured parts, shape (2 n, 2 n); in units of one vector's where the noise is not given.
 
     A vibration that stands as that after one injection and that before the next one of its series was
     measured once: its error enters both changes, with opposite signs.
     """
     before, after = (
-        vector_covariance(observations, when=when, given=noise_given(observations))
+        observations.vector_covariance(when=when, given=_noise_given(observations))
         for when in ("_before", "_after")
     )
     full = spread_out(before + after)
     count = len(observations)
-    for later, earlier in shared_readings(observations):
+    for later, earlier in _shared_readings(observations):
         for row in range(2):
             for column in range(2):
                 value = -after[earlier, row, column]
@@ -98,14 +95,14 @@ def covariance(observations: Observations) -> FloatArray:
     return full
 
 
-def noise_given(observations: Observations) -> bool:
+def _noise_given(observations: Observations) -> bool:
     """Whether both vibrations of a row have their uncertainty."""
     return {"amplitude_before", "amplitude_after"} <= set(observations.uncertainty)
 
 
-def shared_readings(observations: Observations) -> list[tuple[int, int]]:
+def _shared_readings(observations: Observations) -> list[tuple[int, int]]:
     """Rows whose vibration before is that after the row above in their series, digit for digit."""
-    before, after = (vectors(observations, when=when) for when in ("_before", "_after"))
+    before, after = (observations.vectors(when=when) for when in ("_before", "_after"))
     last: dict[str, int] = {}
     found = []
     for i, series in enumerate(observations.series.tolist()):
@@ -113,3 +110,13 @@ def shared_readings(observations: Observations) -> list[tuple[int, int]]:
             found.append((i, last[series]))
         last[series] = i
     return found
+
+
+INJECTION: Final = PredictedKind(
+    predict=_predict,
+    measured=_measured,
+    covariance=_covariance,
+    noise_given=_noise_given,
+    column=lambda _: "amplitude_after",
+    informs=always("lambda_factor", "bore", "extra_loss"),
+)

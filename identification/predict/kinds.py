@@ -1,56 +1,37 @@
-"""Every kind of measurement that is predicted, by its name in the data."""
+"""Every kind of measurement that is predicted, by its name in the data.
+
+A prediction of a few lines stands here, a longer one in a module of its own.
+"""
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict import (
-    flows,
-    injections,
-    positionings,
-    pressures,
-    run_ups,
-    transfers,
-    trial_weights,
-)
-from ringbalance.identification.predict.vibration import parts, spread_out, vector_covariance, vectors
-from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.identification.predict.device import Device, Models
+from ringbalance.identification.predict.injections import INJECTION
+from ringbalance.identification.predict.positionings import POSITIONING
+from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.tube.state import tube_state
+from ringbalance.physics.tube.uncertainty import with_errors
+from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.tube_models import FINEST_MODELS
 
-
-def _never(_scene: Any, _observations: Observations) -> str:
-    return ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PredictedKind:
-    """How one kind of data is predicted; a vibration counts as its real and its imaginary part."""
-
-    predict: Callable[[Any, Observations, Any], FloatArray]
-    """Scene, observations and models to what was measured."""
-    measured: Callable[[Observations], FloatArray]
-    covariance: Callable[[Observations], FloatArray]
-    """Of the errors of `measured`; unit where the noise is to be estimated."""
-    noise_given: Callable[[Observations], bool]
-    column: Callable[[Observations], str]
-    """The measured column whose noise it is."""
-    informs: Callable[[Observations], tuple[str, ...]]
-    """Parameters that are fitted to such data where the user names none."""
-    free: Callable[[Observations], FloatArray] | None = None
-    """Effect of unknowns that are no parameters, such as the vibration without trial weight, one column
-    each."""
-    too_long: Callable[[Any, Observations], str] = _never
-    """Scene and observations to why predictions would take too long; empty where they do not."""
-
-
-def _always(*names: str) -> Callable[[Observations], tuple[str, ...]]:
-    return lambda _: names
+_ROUNDS: Final = 12
+_STEP: Final = 1e-4
+"""In ln u, of the slope of ln (k + 1)."""
+_DONE: Final = 1e-6
+"""Change of ln u after which the next one, its square, is round-off."""
 
 
 def _by_scene_alone(predict: Callable[[Any, Observations], FloatArray]) -> Callable[..., FloatArray]:
@@ -58,30 +39,13 @@ def _by_scene_alone(predict: Callable[[Any, Observations], FloatArray]) -> Calla
     return lambda scene, observations, _: predict(scene, observations)
 
 
-def _scalar_covariance(observations: Observations, column: str) -> FloatArray:
-    """Of errors that are independent from row to row, shape (n, n); unit where their noise is not given."""
-    given = observations.uncertainty.get(column)
-    return np.diag(np.ones(len(observations)) if given is None else (given / NORMAL_95) ** 2)
-
-
-def _numbers(column: Callable[[Observations], str], **declared: Any) -> PredictedKind:
-    """One measured number a row, its errors independent from row to row."""
-    return PredictedKind(
-        measured=lambda observations: observations.columns[column(observations)],
-        covariance=lambda observations: _scalar_covariance(observations, column(observations)),
-        noise_given=lambda observations: column(observations) in observations.uncertainty,
-        column=column,
-        **declared,
-    )
-
-
 def _vibrations(predict: Callable[[Any, Observations], FloatArray], **declared: Any) -> PredictedKind:
     """One measured vibration a row."""
     return PredictedKind(
         predict=_by_scene_alone(predict),
-        measured=lambda observations: parts(vectors(observations)),
+        measured=lambda observations: parts(observations.vectors()),
         covariance=lambda observations: spread_out(
-            vector_covariance(observations, given="amplitude" in observations.uncertainty)
+            observations.vector_covariance(given="amplitude" in observations.uncertainty)
         ),
         noise_given=lambda observations: "amplitude" in observations.uncertainty,
         column=lambda _: "amplitude",
@@ -89,47 +53,148 @@ def _vibrations(predict: Callable[[Any, Observations], FloatArray], **declared: 
     )
 
 
+def _trial_changes(scene: Scene, observations: Observations) -> FloatArray:
+    """Change of the vibration by known unbalances, real and then imaginary parts, m, shape (2 n,).
+
+    V = V0 + K U exp(j angle), K = kappa exp(-j lag).  V0 is that of the series and not of the scene: it is
+    fitted with every parameter, and known beforehand to nobody.
+    Source: Eq. 23 of the liquid-ring paper.
+    """
+    return parts(_change(scene, observations))
+
+
+def _trial_amplitudes(scene: Scene, observations: Observations) -> FloatArray:
+    """|V0 + K U exp(j angle)|, m zero to peak, shape (n,).
+
+    Without a phase V0 cannot be eliminated: it is the scene's vibration at the start, and its amplitude and
+    its phase are parameters.  Only its phase against K U matters, so that the phase and the lag are not
+    identified by themselves.
+    """
+    start = cmath.rect(scene.rotor.initial_amplitude, scene.rotor.initial_phase)
+    return np.asarray(np.abs(start + _change(scene, observations)))
+
+
+def _change(scene: Scene, observations: Observations) -> ComplexArray:
+    k = scene.rotor.influence
+    unbalance = observations.columns["unbalance"] * np.exp(1j * observations.columns["angle"])
+    return np.asarray(k * unbalance, dtype=np.complex128)
+
+
+def _effect_of_starts(observations: Observations) -> FloatArray:
+    """Effect of the two parts of every series' V0, shape (2 n, 2 series)."""
+    names = np.unique(observations.series)
+    belongs = (observations.series[:, None] == names[None, :]).astype(np.float64)
+    return np.kron(np.eye(2), belongs)
+
+
+def _transferred_column(observations: Observations) -> str:
+    """Whether mass or volume was measured of the liquid that an injection moves."""
+    return "mass" if "mass" in observations.columns else "volume"
+
+
+def _transferred(scene: Scene, observations: Observations, models: Models) -> FloatArray:
+    """V (x_before - x_after), m^3, times rho for a mass, kg, once the liquid rests again."""
+    device = Device.of(scene, models)
+    volume = device.law.chamber_volume * device.once(observations, _moved)
+    return np.asarray(
+        scene.liquid.density * volume if _transferred_column(observations) == "mass" else volume
+    )
+
+
+def _moved(device: Device, observations: Observations) -> FloatArray:
+    columns, total = observations.columns, 2 * device.scene.disc.initial_fill
+    rows = zip(columns["fill_ratio"], columns["pressure"], columns["gas_time"], strict=True)
+    return np.array(
+        [
+            min(x, total)
+            - device.injected(fill=min(float(x), total), chamber=0, pressure=float(p), gas_time=float(t))
+            for x, p, t in rows
+        ]
+    )
+
+
+def _flow_rates(scene: Scene, observations: Observations, models: Models) -> FloatArray:
+    """Flow through the tube alone, at rest: (k + 1) rho u^2/2 = p, Q = S u, k without rotation.
+
+    Returns: Q, m^3/s, shape (n,), by Newton's method in ln u.
+    Source: definition of k, Eq. 14 of the liquid-ring paper, between two reservoirs at rest.
+    """
+    return Device.of(scene, models).once(observations, _flow_rate)
+
+
+def _flow_rate(device: Device, observations: Observations) -> FloatArray:
+    scene = device.scene
+    head = observations.columns["pressure_difference"] / scene.liquid.density
+    log_u = np.log(np.sqrt(2 * head / (_loss(scene, np.sqrt(head)) + 1)))
+    for _ in range(_ROUNDS):
+        both = np.log(_loss(scene, np.exp(np.concatenate([log_u, log_u + _STEP]))) + 1)
+        loss, nearby = both[: head.size], both[head.size :]
+        change = (np.log(2 * head) - loss - 2 * log_u) / (2 + (nearby - loss) / _STEP)
+        log_u = log_u + np.clip(change, -1.0, 1.0)
+        if np.max(np.abs(change)) < _DONE:
+            break
+    return np.asarray(scene.tube.area * np.exp(log_u))
+
+
+def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:
+    """k of the tube at rest, by the finest models: the scene's are chosen for its own velocities."""
+    tube = replace(scene.tube, models=replace(FINEST_MODELS, errors=scene.tube.models.errors))
+    still = replace(scene, rotor=replace(scene.rotor, speed=0.0))
+    state = tube_state(still, velocity, tube=tube)
+    return with_errors(tube=tube, state=state).k
+
+
+def _pressures(scene: Scene, observations: Observations) -> FloatArray:
+    """Pressure of the turning liquid over that of its gas, rho omega^2 (r^2 - a^2)/2; zero above the liquid.
+
+    Returns: Pa, shape (n,). Source: Eq. 11 of the liquid-ring paper, integrated.
+    """
+    columns = observations.columns
+    surface = columns.get("surface_radius")
+    if surface is None:
+        surface = surface_radius(disc=scene.disc, fill_ratio=columns["fill_ratio"])
+    speed = columns.get("speed", np.full(len(observations), scene.rotor.speed))
+    depth = np.maximum(columns["radius"] ** 2 - surface**2, 0.0)
+    return np.asarray(scene.liquid.density * speed**2 * depth / 2)
+
+
+def _steady_whirls(scene: EccentricScene, observations: Observations) -> FloatArray:
+    """Vibration over the speed, both eccentric masses clamped where they stand at the start.
+
+    At constant speed, as in a run-up that is slow against the decay of the rotor's motion.
+    Returns: in the rotor's frame, real and then imaginary parts, m, shape (2 n,).
+    """
+    plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
+    speeds = observations.columns["speed"].tolist()
+    return parts(np.array([plant.steady_whirl(speed, angles) for speed in speeds], dtype=np.complex128))
+
+
 PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
     {
         "trial_weight": _vibrations(
-            trial_weights.predict,
-            informs=_always("influence_coefficient", "lag_angle"),
-            free=trial_weights.free,
+            _trial_changes,
+            informs=always("influence_coefficient", "lag_angle"),
+            free=_effect_of_starts,
         ),
-        "trial_amplitude": _numbers(
+        "trial_amplitude": PredictedKind.numbers(
             lambda _: "amplitude",
-            predict=_by_scene_alone(trial_weights.amplitudes),
-            informs=_always("influence_coefficient", "initial_amplitude", "initial_phase"),
+            predict=_by_scene_alone(_trial_amplitudes),
+            informs=always("influence_coefficient", "initial_amplitude", "initial_phase"),
         ),
-        "injection": PredictedKind(
-            predict=injections.predict,
-            measured=injections.measured,
-            covariance=injections.covariance,
-            noise_given=injections.noise_given,
-            column=lambda _: "amplitude_after",
-            informs=_always("lambda_factor", "bore", "extra_loss"),
+        "injection": INJECTION,
+        "transfer": PredictedKind.numbers(
+            _transferred_column, predict=_transferred, informs=always("bore", "extra_loss")
         ),
-        "transfer": _numbers(
-            transfers.column, predict=transfers.predict, informs=_always("bore", "extra_loss")
+        "flow": PredictedKind.numbers(
+            lambda _: "flow_rate", predict=_flow_rates, informs=always("bore", "extra_loss")
         ),
-        "flow": _numbers(lambda _: "flow_rate", predict=flows.predict, informs=_always("bore", "extra_loss")),
-        "pressure": _numbers(
-            lambda _: "pressure", predict=_by_scene_alone(pressures.predict), informs=_always("density")
+        "pressure": PredictedKind.numbers(
+            lambda _: "pressure", predict=_by_scene_alone(_pressures), informs=always("density")
         ),
         "run_up": _vibrations(
-            run_ups.predict,
-            informs=_always("rotor.stiffness", "rotor.damping", "imbalance.mass", "imbalance.phase"),
+            _steady_whirls,
+            informs=always("rotor.stiffness", "rotor.damping", "imbalance.mass", "imbalance.phase"),
         ),
-        "positioning": _numbers(
-            lambda _: "angle",
-            predict=_by_scene_alone(positionings.predict),
-            informs=positionings.informs,
-            too_long=positionings.too_long,
-        ),
+        "positioning": POSITIONING,
     }
 )
-
-
-def rows_of(observations: Observations, values: FloatArray) -> FloatArray:
-    """Values of `measured`, one row of numbers for each row of the file, shape (n, 1) or (n, 2)."""
-    return np.reshape(values, (-1, len(observations))).T

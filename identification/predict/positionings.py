@@ -13,10 +13,10 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import rest_state
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.predict.predicted import PredictedKind
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
 
@@ -26,12 +26,12 @@ _MOST_SUBSTEPS: Final = 20_000
 """Of one call of the plant, some 0.02 s: a signal, such as that of Ctrl-C, acts only between calls."""
 
 
-def predict(scene: EccentricScene, observations: Observations) -> FloatArray:
+def _predict(scene: EccentricScene, observations: Observations, _: object) -> FloatArray:
     """Angles moved, rad, shape (n,), by the plant's equations of motion.
 
     Rows of one series, mass, voltage and speed are one motion.
     """
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     found = np.empty(len(observations))
     for motion, rows in _motions(observations):
         found[rows] = _moved(plant, scene.masses.initial_angle, motion, observations.columns["time"][rows])
@@ -43,15 +43,15 @@ def _moved_masses(observations: Observations) -> IntArray:
     return np.asarray(observations.columns.get("moved_mass", np.ones(len(observations))) - 1, dtype=np.int64)
 
 
-def informs(observations: Observations) -> tuple[str, ...]:
+def _informs(observations: Observations) -> tuple[str, ...]:
     """Friction of every mass that moves, and the motor."""
     arms = (f"masses.friction_arm[{mass}]" for mass in sorted(set(_moved_masses(observations).tolist())))
     return (*arms, "motor.torque_constant", "motor.back_emf_constant")
 
 
-def too_long(scene: EccentricScene, observations: Observations) -> str:
+def _too_long(scene: EccentricScene, observations: Observations) -> str:
     """Why these motions would take too long to integrate, as a fit does some hundred times; else empty."""
-    plant, times = plant_parameters(scene), observations.columns["time"]
+    plant, times = PlantParameters.of(scene), observations.columns["time"]
     motions = _motions(observations)
     steps = sum(substeps(plant, motion.speed, 0.0, times[rows[-1]]) for motion, rows in motions)
     if steps <= MOST_STEPS:
@@ -87,7 +87,7 @@ def _moved(
     """Angle moved at rising times, rad."""
     speed, mass = float(motion.speed), motion.mass
     state, flags = rest_state(angles), np.where(np.arange(2) == mass, STUCK, LOCKED)
-    whirl = steady_whirl(plant, speed, angles) if speed else 0j
+    whirl = plant.steady_whirl(speed, angles) if speed else 0j
     state[0], state[1] = whirl.real, whirl.imag
     command, found, now = motion.voltage * (np.arange(2) == mass), np.empty(times.size), 0.0
     for place, time in enumerate(times.tolist()):
@@ -97,3 +97,8 @@ def _moved(
         now = time
         found[place] = state[4 + mass] - angles[mass]
     return found
+
+
+POSITIONING: Final = PredictedKind.numbers(
+    lambda _: "angle", predict=_predict, informs=_informs, too_long=_too_long
+)

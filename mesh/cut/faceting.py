@@ -17,7 +17,7 @@ from ringbalance.mesh.cut.integrals import gauss
 from ringbalance.mesh.cut.patches import wall_patches
 from ringbalance.mesh.cut.table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.facets import boundary_facets, corners_of, edges_of
+from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, edges_of
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 SMOOTH: Final = np.pi / 6

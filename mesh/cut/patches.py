@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.chamber_file.facets import boundary_facets, corners_of, key_of
+from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, key_of
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
 Powers = tuple[tuple[int, int], ...]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import half_angle, surface_radius
-from ringbalance.physics.convergence.grid import GridConvergence, gci
+from ringbalance.physics.convergence import GridConvergence, gci
 from ringbalance.physics.pressure.ring_bounds import Case
 from ringbalance.physics.pressure.ring_samples import (
     QUANTITIES,

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.convergence import gci
 from ringbalance.physics.results import Estimate, Statistics
 from ringbalance.physics.sloshing.imported import ring_waves
 from ringbalance.physics.sloshing.system import sloshing_system

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.convergence import gci
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.physics.sloshing.imported import RingWaves, ring_waves
 from ringbalance.physics.sloshing.modes import FORMAL_ORDER, default_sloshing_cells

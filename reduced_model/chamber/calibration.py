@@ -15,8 +15,8 @@ from ringbalance.reduced_model.chamber.element_check import ElementCheck, elemen
 from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect, gravity_effect
 from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
 from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
-from ringbalance.reduced_model.chamber.ring_values import RingValues, ring_values
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
+from ringbalance.reduced_model.chamber.values import RingValues, ring_values
 from ringbalance.reduced_model.tables.fit import table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.scene.arrays import FloatArray

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from ringbalance.mesh.cut.table import TOLERANCE
-from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.pressure.ring import RingQuantities
-from ringbalance.physics.results import Estimate, Status, StatusCode
-from ringbalance.reduced_model.chamber.imported_check import ImportedElements, imported_elements
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.physics import deferred
+from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
+from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
-from ringbalance.reduced_model.chamber.ring_values import RingValues
-from ringbalance.reduced_model.chamber.scene_ring import scene_ring
+from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.describe import scene_fault
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
 CHECKED: Final = ("wall_pressure", "moment", "moment_per_volume")
@@ -29,6 +31,8 @@ _RADIAL_CELLS: Final = 4
 """The pressure is quadratic in the place and so are the cells: only the arcs need more."""
 _MOST_ANGLE: Final = math.pi / 48
 """Central angle of the smallest cell, rad."""
+_CUT: Final = 1e-6
+"""Relative, of totals: walls that the surface cuts are drawn again by the parts of their cells."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -146,3 +150,88 @@ def _status(elements: RingQuantities | ImportedElements, excess: float) -> Statu
         )
         return Status(code=StatusCode.NOT_CONVERGED, text=text)
     return Status()
+
+
+def scene_ring(
+    scene: Scene,
+    *,
+    fill_ratio: npt.ArrayLike,
+    gravity: bool,
+    cells: Sequence[tuple[int, ...]] | None = None,
+) -> RingQuantities:
+    """Totals of one chamber's liquid, every one of them computed.
+
+    Args: `gravity`: whether gravity is modelled. `cells`: meshes, finest first; default as in
+        `ring_quantities`.
+    Raises: SceneError: a chamber so narrow or a ring so shallow that a solve failed; the numbers of a failed
+        solve would enter the tables of all other fill ratios.
+    """
+    ring = ring_quantities(
+        disc=scene.disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        fill_ratio=fill_ratio,
+        gravity=scene.environment.gravity if gravity else 0.0,
+        shaft=scene.environment.shaft,
+        cells=cells,
+    )
+    if np.all(ring.solved):
+        return ring
+    fault = scene_fault(
+        scene=scene,
+        table="disc",
+        key="central_angle",
+        problem=f"the pressure in a chamber of this shape cannot be solved ({ring.status.text})",
+        allowed="a wider chamber, or a thinner plate_thickness",
+    )
+    raise SceneError([fault])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ImportedElements:
+    """Totals of one chamber's liquid without gravity, on the scene's own mesh cut along the free surface."""
+
+    fill_ratio: FloatArray
+    wall_pressure: Estimate
+    """Pa, shape (n,)."""
+    moment: Estimate
+    """kg m, shape (n,)."""
+    volume: FloatArray
+    """Of the liquid as it is drawn, m^3, shape (n,)."""
+    cells: tuple[tuple[int, ...], ...]
+    """Of the scene's mesh."""
+    status: Status
+    statistics: Statistics
+
+
+def imported_elements(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> ImportedElements:
+    """Solve the pressure at a few fills; uncertainties hold the elements' error and the drawn volume's."""
+    disc, density = scene.disc, scene.liquid.density
+    rings = [
+        deferred.solved_ring(
+            geometry=geometry,
+            density=density,
+            angular_velocity=scene.rotor.speed,
+            surface_radius=float(radius),
+        )
+        for radius in surface_radius(disc=disc, fill_ratio=fill_ratio)
+    ]
+    pressure = np.array([float(ring.wall_pressure.value) for ring in rings])
+    moment = np.array([ring.first_moment[0] for ring in rings])
+    volume = np.array([ring.volume for ring in rings])
+    wanted = fill_ratio * chamber_volume(disc=disc)
+    drawn = np.abs(volume / wanted - 1)
+    status = next((ring.status for ring in rings if not ring.status.ok), Status())
+    return ImportedElements(
+        fill_ratio=fill_ratio,
+        wall_pressure=Estimate(
+            value=pressure,
+            uncertainty=np.array([float(ring.wall_pressure.uncertainty) for ring in rings]) + _CUT * pressure,
+        ),
+        # A free surface drawn by quadratic facets takes liquid off or adds some, all of it at the surface.
+        moment=Estimate(value=moment, uncertainty=(_CUT + 2 * drawn) * np.abs(moment)),
+        volume=volume,
+        cells=((len(geometry.cells),),),
+        status=status,
+        statistics=rings[-1].statistics,
+    )

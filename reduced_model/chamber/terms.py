@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.chamber.imported_walls import drawing_shares, share_across
 from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
 from ringbalance.reduced_model.contribution import Contribution
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, wall_radius
-from ringbalance.physics.gas.column import pressure_factor, vented_pressure
+from ringbalance.physics.gas import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
 from ringbalance.reduced_model.chamber.imported_walls import across_table
 from ringbalance.reduced_model.chamber.moment import CalibratedMoment
-from ringbalance.reduced_model.chamber.ring_values import ring_values
+from ringbalance.reduced_model.chamber.values import ring_values
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.tables.fit import flat_table, table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.reduced_model.chamber.moment import CalibratedMoment
-from ringbalance.reduced_model.law.conditions import Conditions, checked_conditions
-from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, checked_conditions
 from ringbalance.reduced_model.law.storage import save_record
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty, directed_flow

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.reduced_model.law.conditions import checked_conditions
-from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model import paper
+from ringbalance.reduced_model.law.flow_law import Flow, Regime, checked_conditions
 from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
 from ringbalance.reduced_model.law.storage import save_record
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.conditions import Conditions
+from ringbalance.reduced_model.law.flow_law import Conditions
 from ringbalance.reduced_model.tube.directed_flow import Drive, siphon_margin
 from ringbalance.reduced_model.tube.heads import velocity_of
 from ringbalance.reduced_model.tube.regime import TubeEnds

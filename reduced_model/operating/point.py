@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.physics.tube.uncertainty import INPUT_PART
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import hump_profile
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import HumpGas, Scene
 

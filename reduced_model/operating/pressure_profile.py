@@ -1,4 +1,7 @@
-"""The pressure along the tube's path, from the driven chamber over the crest to the opposite one."""
+"""The pressure along the tube's path, from the driven chamber over the crest to the opposite one.
+
+A tube at rest without liquid over its crest: how far each leg is full, and what lies between.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ringbalance.mesh.geometry import wall_radius
+from ringbalance.physics.gas import vented_pressure
+from ringbalance.physics.pressure.hydrostatics import column_radius
 from ringbalance.physics.roots import bracketed_root
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state
-from ringbalance.reduced_model.operating.rest import rest
 from ringbalance.reduced_model.tube.path import (
     Places,
     crest_span,
@@ -22,10 +27,13 @@ from ringbalance.reduced_model.tube.path import (
     path_radius,
     places,
     reversed_tube,
+    share_at_radius,
 )
 from ringbalance.reduced_model.tube.regime import TubeEnds
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
+
+_Filled = Callable[[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -242,7 +250,7 @@ def _blocked(scene: Scene, law: CalibratedLaw, state: DirectedState, primed: boo
         pressure = np.where(first, near, far) - ends.port_pressure
         return _Line(share=at.share, pressure=pressure, full=np.ones(first.shape, dtype=np.bool_))
     cavity = crest.cavity_pressure(ends) if primed and ends.upstream_covered() else None
-    stop = rest(scene=scene, ends=ends, cavity=cavity, crest_pressure=crest.column_pressure)
+    stop = _rest(scene=scene, ends=ends, cavity=cavity, crest_pressure=crest.column_pressure)
     at = places(tube=scene.tube, points=points, doubled=(stop.near, stop.far))
     hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=scene.tube, share=at.share))
     in_near = ((at.share < stop.near) | ((at.share == stop.near) & ~at.after)) & ends.upstream_covered()
@@ -251,3 +259,76 @@ def _blocked(scene: Scene, law: CalibratedLaw, state: DirectedState, primed: boo
     # A chamber that leaves its port open shows its own gas there.
     pressure[0] = pressure[0] if ends.upstream_covered() else max(pressure[0], ends.upstream_gas)
     return _Line(share=at.share, pressure=pressure, full=in_near | in_far)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Rest:
+    """Two columns and what lies between them."""
+
+    near: float
+    """s/L up to which the leg of the driven chamber is full."""
+    far: float
+    """s/L from which on the other leg is full."""
+    between: float
+    """Pressure of what lies between, gauge, Pa."""
+
+
+def _rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pressure: float) -> _Rest:
+    """Find the two columns of a tube at rest.
+
+    A separated column leaves a cavity at a given pressure.  An unprimed tube holds gas: vented, it is at the
+    opposite chamber's pressure; trapped, it is compressed isothermally from the hydrostatic pressures alone
+    until it leaves at the opposite port, and at least to what keeps the driven column below the crest.
+    Args: `ends`: pressures at the tube's ends, the driven chamber upstream; one that leaves its port open
+        supports no column. `cavity`: pressure of the cavity of a separated column, gauge, Pa; None for gas.
+        `crest_pressure`: D_m, column from the crest to the outer wall, Pa.
+    Source: hydrostatics in the rotating frame; Boyle's law.
+    """
+    outer, covered = wall_radius(disc=scene.disc), ends.upstream_covered()
+    near, far = ends.upstream_pressure(), ends.downstream_pressure()
+
+    def leg(pressure: float, *, far_leg: bool) -> float:
+        """Fraction of the path where a column ends that a pressure at the outer wall supports."""
+        radius = column_radius(
+            density=scene.liquid.density,
+            angular_velocity=scene.rotor.speed,
+            pressure=max(pressure, 0.0),
+            outer=outer,
+        )
+        return share_at_radius(tube=scene.tube, radius=radius, far_leg=far_leg)
+
+    def filled(pressure: float, near: float) -> tuple[float, float]:
+        """Fractions of the path where the two columns end, under a pressure between them."""
+        first = leg(near - pressure, far_leg=False) if covered else 0.0
+        return first, 1.0 if ends.downstream_open() else leg(far - pressure, far_leg=True)
+
+    if cavity is not None:
+        between = cavity
+    elif not covered:
+        between = float(np.clip(ends.upstream_gas, 0.0, max(far - ends.port_pressure, 0.0)))
+    elif scene.tube.hump_gas == "vented":
+        between = 0.0
+    else:
+        between = _trapped(vented_pressure(scene), ends, filled, crest_pressure)
+    first, last = filled(between, near)
+    return _Rest(near=first, far=last, between=between)
+
+
+def _trapped(ambient: float, ends: TubeEnds[float], filled: _Filled, crest_pressure: float) -> float:
+    """Pressure of the trapped gas, gauge; the gas that fills the tube between the columns is kept."""
+    near_pressure, largest = (
+        ends.upstream_pressure(),
+        max(ends.downstream_pressure() - ends.port_pressure, 0.0),
+    )
+    first, last = filled(0.0, ends.upstream_hydrostatic)
+
+    def excess(pressure: float) -> float:
+        near, far = filled(pressure, near_pressure)
+        return float((ambient + pressure) * (far - near) - ambient * (last - first))
+
+    if largest <= 0:
+        return 0.0
+    root = (
+        largest if excess(largest) < 0 else 0.0 if excess(0.0) >= 0 else bracketed_root(excess, 0.0, largest)
+    )
+    return float(np.clip(max(root, near_pressure - crest_pressure), 0.0, largest))

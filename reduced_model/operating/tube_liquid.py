@@ -24,11 +24,18 @@ class _HeldLiquid:
     """Moment towards the driven chamber, kg m."""
     across: float
     """Moment a quarter of a turn ahead of it, towards the crest, kg m."""
+    rounding: float
+    """Of the moment, at most, kg m."""
 
     @property
     def moment(self) -> complex:
         """Along and across, kg m."""
         return complex(self.along, self.across)
+
+    def change_from(self, before: _HeldLiquid) -> float:
+        """Size of the difference of two moments, kg m; zero where that is rounding."""
+        change = abs(self.moment - before.moment)
+        return change if change > self.rounding + before.rounding else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,8 +84,8 @@ def tube_liquid(scene: Scene, *, law: CalibratedLaw) -> TubeLiquid:
         before=before,
         flowing=flowing,
         after=after,
-        flowing_vibration=influence * abs(flowing.moment - before.moment),
-        lasting_vibration=influence * abs(after.moment - before.moment),
+        flowing_vibration=influence * flowing.change_from(before),
+        lasting_vibration=influence * after.change_from(before),
         limit=scene.controller.limit,
         returned_volume=_returned(scene, flowing=profiles[1], after=profiles[2]),
     )
@@ -90,8 +97,15 @@ def _held(scene: Scene, profile: HumpProfile) -> _HeldLiquid:
     # A piece counts where both of its ends are full; where fullness changes a place stands twice.
     wet = profile.full[1:] & profile.full[:-1]
     line = scene.liquid.density * scene.tube.area * np.diff(profile.path) * wet
-    moment = complex(np.sum(line * (arm[1:] + arm[:-1]) / 2))
-    return _HeldLiquid(state=_state(profile), mass=float(np.sum(line)), along=moment.real, across=moment.imag)
+    pieces = line * (arm[1:] + arm[:-1]) / 2
+    moment = complex(np.sum(pieces))
+    return _HeldLiquid(
+        state=_state(profile),
+        mass=float(np.sum(line)),
+        along=moment.real,
+        across=moment.imag,
+        rounding=pieces.size * float(np.finfo(float).eps * np.sum(np.abs(pieces))),
+    )
 
 
 def _state(profile: HumpProfile) -> str:

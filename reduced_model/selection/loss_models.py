@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
+from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import CORRELATION, FINEST_MODELS, LEFT_OUT, TubeModels
 
 CONSTANT: Final = "k = 50"
@@ -30,40 +30,36 @@ MODELS: Final = {
 }
 LOSSES: Final = tuple(MODELS)
 """In order of increasing cost."""
-FORMULAS: Final = {CONSTANT: 1, CORRELATIONS: 20, ROTATING: 60, TABLES: 260}
-"""Formulas per call, as counted work; the tables' look-ups among them."""
 _MOST_STEPS: Final = 60
 _ROUND_OFF: Final = 1e-14
 
 
-def _with_loss(tube: Tube, loss: str) -> Tube:
-    """The tube with one model of its loss; a tube that prescribes k has that k and alpha = 1 on every one.
+def with_loss(scene: Scene, loss: str) -> Scene:
+    """The scene with one model of its tube's loss; where it prescribes k, with that k and alpha = 1 on all.
 
-    Raises: ValueError: none of `LOSSES`.
+    Args: `loss`: one of `LOSSES`.
+    Raises: ValueError: a model that does not exist.
     """
     if loss not in MODELS:
         raise ValueError(f"loss must be one of {', '.join(LOSSES)}, not {loss!r}")
-    return replace(tube, models=CONSTANT_MODELS if tube.drag_coefficient is not None else MODELS[loss])
+    models = MODELS[loss] if scene.tube.drag_coefficient is None else CONSTANT_MODELS
+    return replace(scene, tube=replace(scene.tube, models=models))
 
 
-def loss_at(scene: Scene, *, loss: str, velocity: npt.ArrayLike, tube: Tube | None = None) -> TubeState:
-    """Loss of a scene's tube by one model.
+def loss_at(scene: Scene, *, loss: str, velocity: npt.ArrayLike) -> TubeState:
+    """Loss of a scene's tube by one model of `LOSSES`, at velocities above zero, m/s, any shape.
 
-    Args: `loss`: one of `LOSSES`. `velocity`: u, m/s, any shape, positive. `tube`: in place of the scene's,
-        such as the same one from its other end.
     Raises: ValueError: a model that does not exist.
     """
-    return tube_state(scene, velocity, tube=_with_loss(tube or scene.tube, loss))
+    return tube_state(with_loss(scene, loss), velocity)
 
 
-def head_at(
-    scene: Scene, *, loss: str, velocity: FloatArray, to_crest: bool, tube: Tube | None = None
-) -> FloatArray:
+def head_at(scene: Scene, *, loss: str, velocity: FloatArray, to_crest: bool) -> FloatArray:
     """Head of a full tube, (k + 1) u^2/2, or of its column up to the crest's lowest pressure, m^2/s^2."""
-    state = loss_at(scene, loss=loss, velocity=velocity, tube=tube)
+    state = loss_at(scene, loss=loss, velocity=velocity)
     if not to_crest:
         return np.asarray((state.k + 1) * velocity**2 / 2)
-    return crest_head(scene=scene, tube=tube or scene.tube, state=state, velocity=velocity)
+    return crest_head(scene=scene, tube=scene.tube, state=state, velocity=velocity)
 
 
 def velocity_under_head(

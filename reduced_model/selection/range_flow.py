@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.gas.column import pressure_factor
+from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.selection.loss_models import CORRELATIONS, ROTATING, velocity_under_head

@@ -12,33 +12,31 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.gas.supply import HEAT_CAPACITY_RATIO
+from ringbalance.physics.gas import HEAT_CAPACITY_RATIO
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.chamber.range import mean_gravity
-from ringbalance.reduced_model.chamber.terms import PLATES
+from ringbalance.reduced_model.chamber.terms import MEAN, PLATES
 from ringbalance.reduced_model.chamber.values import by_closed_form
-from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reduced_model.contribution import Contribution, percent
 from ringbalance.reduced_model.selection.estimates import (
-    CREST,
     FILLING,
-    GRAVITY,
     HELD,
     INERTIA,
     LAG,
     RIPPLE_AND_SLOSHING,
     SURFACE_TENSION,
-    TUBE_LOSS,
     WALL_FRICTION,
-    TermEstimate,
-    percent,
     term_estimates,
 )
 from ringbalance.reduced_model.selection.range_flow import steady
 from ringbalance.reduced_model.selection.tube_terms import (
     BENDS,
+    CREST,
     ENDS,
     PART_TERMS,
     ROTATION,
     ROUGHNESS,
+    TUBE_LOSS,
     loss_effect,
     tube_models,
 )
@@ -83,7 +81,7 @@ class Term:
     """Those of chamber and tube are part of a flow law; those of an injection go beyond it."""
     models: tuple[str, ...]
     """In order of cost; the first neglects the term, and is the only one where none holds it."""
-    select: Callable[[Term, Scene, TermEstimate], Selection]
+    select: Callable[[Term, Scene, Contribution], Selection]
 
     @property
     def has_model(self) -> bool:
@@ -109,13 +107,14 @@ def models_used(
     rows = []
     for term in TERMS:
         estimate = estimates[term.name]
+        reason = estimate.reason(scene.tolerance)
         model, more = _selected(term, scene, estimate, law=law, obstacles=obstacles, asked=asked)
         rows.append(
             ModelUsed(
                 term=term.name,
                 model=model,
-                why=f"{estimate.reason}; {more}" if more else estimate.reason,
-                estimated_contribution=estimate.contribution,
+                why=f"{reason}; {more}" if more else reason,
+                estimated_contribution=estimate.value,
             )
         )
     return tuple(rows)
@@ -143,7 +142,6 @@ def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
     known = {r.term: r.estimated_contribution for r in rows if r.estimated_contribution is not None}
     unknown = tuple(row.term for row in rows if row.estimated_contribution is None)
     bound = float(sum(known.values()))
-    names = f" ({', '.join(known)})" if known else ""
     # Without their numbers in the scene these two are a default range.
     ranges = [term for term in unknown if term in (FILLING, LAG)]
     others = [term for term in unknown if term not in ranges]
@@ -153,17 +151,24 @@ def neglected_in_injections(used: Sequence[ModelUsed]) -> _Neglected:
         terms=tuple(known),
         bound=bound,
         unknown=unknown,
-        text=(
-            f"neglected terms{names} change the liquid moved by the shortest injection that matters by at "
-            f"most {percent(bound)}{more}"
-        ),
+        text=f"{_change(known, bound, unknown)}{more}",
+    )
+
+
+def _change(terms: Collection[str], bound: float, unknown: Collection[str]) -> str:
+    if not terms:
+        told = " that the scene gives numbers for" if unknown else ""
+        return f"no term of an injection{told} is neglected"
+    return (
+        f"neglected terms ({', '.join(terms)}) change the liquid moved by the shortest injection that "
+        f"matters by {f'at most {percent(bound)}' if bound else 'nothing'}"
     )
 
 
 def _selected(
     term: Term,
     scene: Scene,
-    estimate: TermEstimate,
+    estimate: Contribution,
     *,
     law: str,
     obstacles: Mapping[str, str],
@@ -179,29 +184,29 @@ def _selected(
     return model, more
 
 
-def _by_tolerance(term: Term, _: Scene, estimate: TermEstimate) -> Selection:
+def _by_tolerance(term: Term, scene: Scene, estimate: Contribution) -> Selection:
     """The cheapest model where the contribution is within the tolerance, else the one that holds it."""
-    if not estimate.above:
+    if not estimate.above(scene.tolerance):
         return LEFT_OUT, ""
     return (term.models[-1] if term.has_model else NOT_MODELLED), ""
 
 
-def _plates(term: Term, scene: Scene, _: TermEstimate) -> Selection:
+def _plates(term: Term, scene: Scene, _: Contribution) -> Selection:
     strips, exact = paper.chamber_volume_paper(disc=scene.disc), chamber_volume(disc=scene.disc)
     simpler = "flat strips" if scene.disc.geometry is None else "a plain sector"
     off = f"costs nothing; {simpler} would be {percent(abs(strips / exact - 1))} off in volume"
     return term.models[-1], off
 
 
-def _gravity(term: Term, scene: Scene, _: TermEstimate) -> Selection:
+def _gravity(term: Term, scene: Scene, _: Contribution) -> Selection:
     return term.models[mean_gravity(scene) > scene.tolerance], ""
 
 
-def _sloshing(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
+def _sloshing(term: Term, scene: Scene, estimate: Contribution) -> Selection:
     return _by_tolerance(term, scene, estimate)[0], "it vanishes in the mean over a turn"
 
 
-def _crest(term: Term, scene: Scene, _: TermEstimate) -> Selection:
+def _crest(term: Term, scene: Scene, _: Contribution) -> Selection:
     if scene.tube.hump_radius is None:
         return term.models[0], "Eq. 18 as it stands"
     moved = by_closed_form(scene, scene.disc.max_fill_ratio / 2).wall_pressure / 1e6
@@ -213,12 +218,12 @@ def _crest(term: Term, scene: Scene, _: TermEstimate) -> Selection:
     )
 
 
-def _tube_loss(term: Term, scene: Scene, _: TermEstimate) -> Selection:
+def _tube_loss(term: Term, scene: Scene, _: Contribution) -> Selection:
     prescribed = scene.tube.drag_coefficient is not None
     return term.models[not (prescribed or tube_models(scene).constant)], ""
 
 
-def _tube_part(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
+def _tube_part(term: Term, scene: Scene, estimate: Contribution) -> Selection:
     """The model that keeps the tolerance together with what is left out beside it."""
     if scene.tube.drag_coefficient is not None:
         return LEFT_OUT, ""
@@ -227,12 +232,13 @@ def _tube_part(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
     if model == CORRELATION:
         off = loss_effect(steady(scene), replace(FINEST_MODELS, **{part: model})).k
         return term.models[1], f"the finest model would change it by {percent(off)}"
-    if model == FINEST and estimate.contribution is not None and not estimate.above and scene.tolerance:
+    below = estimate.value is not None and not estimate.above(scene.tolerance)
+    if model == FINEST and below and scene.tolerance:
         return term.models[-1], "with what else is left out it would exceed the tolerance"
     return term.models[0 if model == LEFT_OUT else -1], ""
 
 
-def _filling(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
+def _filling(term: Term, scene: Scene, estimate: Contribution) -> Selection:
     """With how far heat from the walls of a chamber moves the estimate."""
     model, _ = _by_tolerance(term, scene, estimate)
     if model == LEFT_OUT or estimate.time is None:
@@ -246,7 +252,7 @@ def _filling(term: Term, scene: Scene, estimate: TermEstimate) -> Selection:
 TERMS: Final = (
     Term(name=PLATES, part="chamber", models=("flat strips", "exact geometry"), select=_plates),
     Term(
-        name=GRAVITY,
+        name=MEAN,
         part="chamber",
         models=(LEFT_OUT, "quasi-static, free surface found, mean over a turn"),
         select=_gravity,

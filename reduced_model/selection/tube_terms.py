@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
+from types import MappingProxyType
+from typing import Final, Literal
 
 import numpy as np
 
@@ -14,11 +15,7 @@ from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.terms import MEAN, PLATES, chamber_contributions
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.law.building import tube_path
-from ringbalance.reduced_model.selection.loss_models import (
-    CONSTANT_MODELS,
-    MODELS,
-    ROTATING,
-)
+from ringbalance.reduced_model.selection.loss_models import CONSTANT_MODELS, MODELS, ROTATING
 from ringbalance.reduced_model.selection.range_flow import (
     SHARES,
     flows,
@@ -34,15 +31,13 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import CORRELATION, FINEST_MODELS, LEFT_OUT, Fidelity, TubeModels
 
-LOSS: Final = "k as a function of velocity"
+TUBE_LOSS: Final = "loss of the tube"
 ROTATION: Final = "friction by rotation"
 ROUGHNESS: Final = "roughness of the tube's wall"
 BENDS: Final = "bends of the tube"
 ENDS: Final = "entrance and exit of the tube"
-TABLE: Final = "finite elements for rotation and ends"
-LEVEL: Final = "plates, in the level of a chamber"
-GRAVITY: Final = "gravity, in the level of a chamber"
-HUMP: Final = "priming and separation over the siphon crest"
+FINITE_ELEMENTS: Final = "finite elements for rotation and ends"
+CREST: Final = "priming over the siphon crest"
 PARTS: Final[Mapping[str, tuple[Fidelity, ...]]] = {
     "roughness": (LEFT_OUT,),
     "rotation": (LEFT_OUT, CORRELATION),
@@ -119,18 +114,32 @@ def with_tube_models(scene: Scene) -> Scene:
     return replace(scene, tube=replace(scene.tube, models=tube_models(scene)))
 
 
-_LACKING: Final = (
-    (LOSS, CONSTANT_MODELS, "k = 50 against k by finite elements and correlations"),
-    (ROTATION, without("rotation"), "k without rotation against that"),
-    (TABLE, MODELS[ROTATING], "correlations alone against that"),
+LOSS_STEPS: Final = MappingProxyType(
+    {
+        TUBE_LOSS: (CONSTANT_MODELS, "k = 50 against k by finite elements and correlations"),
+        ROTATION: (without("rotation"), "k without rotation against that"),
+        FINITE_ELEMENTS: (MODELS[ROTATING], "correlations alone against that"),
+    }
 )
-"""What the models of the loss may lack, and models that lack it."""
+"""What each of `LOSSES` adds to the one before it, with a loss that lacks that, and how it is estimated."""
+LEVEL_STEPS: Final = (PLATES, MEAN)
+"""What the closed form adds to Eq. 12, and the integrals over the tilted liquid to that."""
 
 
-def loss_contributions(scene: Scene) -> Mapping[str, Contribution]:
-    """What the models of the loss leave out, relative to k, by name; zero where the scene prescribes k."""
+def loss_contributions(scene: Scene, *, of: Literal["k", "velocity"] = "k") -> Mapping[str, Contribution]:
+    """What the models of the loss leave out, relative, by name; zero where the scene prescribes k.
+
+    Rough, because none counts where the tube is blocked.
+    """
     return {
-        term: _contribution(term, loss_effect(scene, models).k, formula) for term, models, formula in _LACKING
+        term: Contribution(
+            term=term,
+            value=getattr(loss_effect(scene, models), of),
+            formula=formula,
+            source="over the range of velocities",
+            rough=True,
+        )
+        for term, (models, formula) in LOSS_STEPS.items()
     }
 
 
@@ -139,31 +148,19 @@ def flow_contributions(scene: Scene) -> Mapping[str, Contribution]:
 
     Source: stands with each; u^2 is proportional to the head over k + 1.
     """
-    losses = {
-        term: _contribution(term, loss_effect(scene, models).velocity, formula)
-        for term, models, formula in _LACKING
-    }
     fills = scene.disc.max_fill_ratio * np.array(SHARES)
     chamber = chamber_contributions(scene, fills[closed_ring(scene, fills)])["pressures"]
     lever = _lever(scene)
     levels = {
-        name: Contribution(
-            term=name,
-            value=None if chamber[of].value is None else chamber[of].value * lever,  # type: ignore[operator]
-            formula=f"({chamber[of].formula}) |P_A - P_C|/(2 (p + P_A - P_C))",
-            source=chamber[of].source,
+        term: replace(
+            chamber[term],
+            value=(chamber[term].value or 0.0) * lever,
+            formula=f"({chamber[term].formula}) |P_A - P_C|/(2 (p + P_A - P_C))",
             rough=True,
         )
-        for name, of in ((LEVEL, PLATES), (GRAVITY, MEAN))
+        for term in LEVEL_STEPS
     }
-    return losses | levels | {HUMP: crest_contribution(scene)}
-
-
-def _contribution(term: str, value: float, formula: str) -> Contribution:
-    """Rough, because none counts where the tube is blocked."""
-    return Contribution(
-        term=term, value=value, formula=formula, source="over the range of velocities", rough=True
-    )
+    return {**loss_contributions(scene, of="velocity"), **levels, CREST: crest_contribution(scene)}
 
 
 def _lever(scene: Scene) -> float:
@@ -181,7 +178,7 @@ def crest_contribution(scene: Scene) -> Contribution:
     """What a full siphon in place of the regimes over the crest leaves out, relative to the velocity."""
     crest = tube_path(scene).crest
     return Contribution(
-        term=HUMP,
+        term=CREST,
         value=0.0 if crest is None else _lost_at_crest(scene, crest),
         formula="1 - u_separated/u_siphon, or 1 where the column to the siphon crest outweighs the gas",
         source="energy balance up to the siphon crest",

@@ -27,7 +27,7 @@ from ringbalance.scene.uncertain import half_widths
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""
-TABLE_ERROR: Final = 1e-9
+_TABLE_ERROR: Final = 1e-9
 """Aimed at, relative, between the nodes."""
 _UNCERTAINTY_NODES: Final = 513
 _FIRST_NODES: Final = 129
@@ -79,8 +79,7 @@ def tube_heads(scene: Scene) -> TubeHeads:
     place = crest_end_uncertainty(scene.tube, half_widths(scene).get("hump_position", 0.0))
     start, stop = np.log(TABLE_VELOCITIES)
     widths = _widths(scene, np.linspace(start, stop, _UNCERTAINTY_NODES), place=place)
-    heads = _exact_heads(scene, tolerance=TABLE_ERROR, first=_FIRST_NODES)
-    return replace(heads, **widths)  # type: ignore[arg-type]
+    return replace(exact_heads(scene), **widths)  # type: ignore[arg-type]
 
 
 def nominal_heads(scene: Scene) -> TubeHeads:
@@ -89,11 +88,14 @@ def nominal_heads(scene: Scene) -> TubeHeads:
     The nodes do not depend on the scene, so that the error, below 1e-4 of a head, is smooth in its values.
     Raises: ValueError: as `tube_heads`.
     """
-    return _exact_heads(scene, tolerance=math.inf, first=_NOMINAL_NODES)
+    return exact_heads(scene, tolerance=math.inf, first=_NOMINAL_NODES)
 
 
-def _exact_heads(scene: Scene, *, tolerance: float, first: int) -> TubeHeads:
-    """Without uncertainties, on a number of nodes at first and on more up to an error between them."""
+def exact_heads(scene: Scene, *, tolerance: float = _TABLE_ERROR, first: int = _FIRST_NODES) -> TubeHeads:
+    """The heads without uncertainties, on a number of nodes at first and on more up to an error between them.
+
+    Raises: ValueError: as `tube_heads`.
+    """
     start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
     found = [
         refined_table(function=head, start=start, stop=stop, tolerance=tolerance, first=first)

@@ -38,6 +38,8 @@ _BARS: Final = 5
 _BINS: Final = 16
 _WIDEST: Final = 2.5
 """Times the requirement at which a bar is cut off."""
+_LABEL_ANGLES: Final = (-90, -75, -105, -60, -120, -45, -135)
+"""Where the label of a ring may stand, deg; the first of equals is taken."""
 
 
 def operating_map(found: Record) -> Drawing:
@@ -229,7 +231,7 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
         panels = [style.figure_of(axes).add_axes((left, 0.02, 0.42, 0.9)) for left in (0.02, 0.55)]
         whole, close = 1.15 * float(np.abs([*vector, *ends, limit]).max()), 4 * limit
         for panel, span, title in zip(panels, (whole, close), ("whole run", "near the limit"), strict=True):
-            _residual(panel, vector, limit, span)
+            _residual(panel, vector, limit, span, ends)
             panel.set_title(title, loc="left", fontsize="medium", color=style.INK)
         panels[1].text(-0.98 * close, -0.98 * close, "circle: limit", color=style.PAPER)
         if ends.size:
@@ -263,7 +265,8 @@ def reachable(length: float, direction: float, pairs: int) -> Any:
     return sums[ConvexHull(np.c_[sums.real, sums.imag]).vertices]
 
 
-def _residual(panel: Axes, vector: Any, limit: float, span: float) -> None:
+def _residual(panel: Axes, vector: Any, limit: float, span: float, ends: Any) -> None:
+    """Args: `ends`: corners of what is drawn dashed, for the labels of the rings to keep away from."""
     panel.set(xlim=(-span, span), ylim=(-span, span), aspect="equal")
     panel.axhline(0, color=style.GRID, linewidth=0.8)
     panel.axvline(0, color=style.GRID, linewidth=0.8)
@@ -273,7 +276,16 @@ def _residual(panel: Axes, vector: Any, limit: float, span: float) -> None:
     rings = [ring for ring in style.nice_span(span) if ring > 0]
     for ring in rings:
         panel.add_patch(Circle((0, 0), ring, fill=False, color=style.GRID, linewidth=0.8))
-        panel.text(0, -ring, f"{style.plain_number(ring)} µm", color=style.MUTED, ha="center", va="top")
+        label = _clearest(ring, vector, ends)
+        panel.text(
+            label.real,
+            label.imag,
+            f"{style.plain_number(ring)} µm",
+            color=style.MUTED,
+            ha="center",
+            va="center",
+            bbox={"facecolor": style.SURFACE, "edgecolor": "none", "pad": 1},
+        )
     panel.set_xticks([])
     panel.set_yticks([])
     panel.text(span, 0, "0°", color=style.MUTED, ha="right", va="bottom")
@@ -284,6 +296,14 @@ def _residual(panel: Axes, vector: Any, limit: float, span: float) -> None:
         panel.plot(
             vector.real[place], vector.imag[place], "o", color=style.FOUND, markerfacecolor=face, markersize=6
         )
+
+
+def _clearest(ring: float, vector: Any, ends: Any) -> complex:
+    """Where on the lower half of a ring a label lies farthest from the run and from the dashed sides."""
+    sides = np.linspace(ends, np.roll(ends, -1), 40).ravel() if ends.size else ends
+    places = ring * np.exp(1j * np.radians(_LABEL_ANGLES))
+    gaps = np.abs(places[:, None] - np.concatenate([vector, sides])).min(axis=1)
+    return complex(places[int(np.argmax(gaps))])
 
 
 def requirement_bars(rows: Iterable[Record]) -> Drawing | None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from ringbalance.reduced_model.budget import UNSTATED, believed
 from ringbalance.reports.figures.operation import tornado
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, number, shown
 from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.section import Cells, Record, Section, Table
-from ringbalance.reports.traces import believed, read, states_uncertainty, traced
+from ringbalance.reports.traces import read, states_uncertainty, traced
 from ringbalance.verification.standing import budget_standing
 
 _NAMES: Final = {
@@ -26,10 +27,6 @@ _NAMES: Final = {
 }
 _EXACT: Final = 1e-6
 """Relative total below which a number is a closed form of inputs that are taken as exact."""
-_UNSTATED: Final = (
-    " The scene states no uncertainty of its inputs: what theirs would add is in no ±, and a value without "
-    "one is as good as they are."
-)
 _DRAWN: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}
 _REGIMES: Final = {
     "blocked": "is blocked",
@@ -63,7 +60,7 @@ def _budget_table(evidence: Record) -> Table:
     return Table(
         caption="Numbers to use, with their expanded uncertainties (95 %): ± is the root of the sum of "
         "squares of the three parts. Pressures are gauge."
-        f"{'' if states_uncertainty(evidence) else _UNSTATED}",
+        f"{'' if states_uncertainty(evidence) else f' {UNSTATED}'}",
         heads=(
             "Quantity",
             "Value ± total",
@@ -90,7 +87,7 @@ def _row(evidence: Record, name: str) -> Cells:
         _part(budget[part] * unit.factor, budget["total"] * unit.factor, f"{path}.{part}")
         for part in ("numerical", "input", "model")
     ]
-    total = believed(evidence, budget["value"], budget["total"])
+    total = believed(budget["value"], budget["total"], stated=states_uncertainty(evidence))
     exact = total is None or total < _EXACT * abs(budget["value"])
     parts = [MISSING] * len(parts) if exact else parts
     value = traced(

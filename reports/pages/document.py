@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from types import MappingProxyType
 from typing import Final
 
@@ -126,9 +127,11 @@ def _evidence_hash(evidence: Record) -> str:
 
 
 def _kept(evidence: Record) -> str:
-    """Heavy cases that were not run for this report, with the date and the scene of the run that is shown."""
+    """Cases that were not run for this report, with the date of the run shown and a heavy one's scene."""
     kept = [case for case in evidence["verification"] if case.get("date")]
     told = [f"{c['id']} of {c['date']}, values {str(c.get('scene_sha256', ''))[:_KEPT]}" for c in kept]
+    dates = Counter(evidence["times"].get("kept_cases", {}).values())
+    told += [f"{n} that look at no scene, run by the same program on {day}" for day, n in dates.items()]
     return "; ".join(told) or "none: every case shown was run for this report, or not at all"
 
 

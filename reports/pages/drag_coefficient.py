@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube.range import VELOCITIES
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.figures.drag_coefficient import apparent_figure, map_figure
 from ringbalance.reports.numbers import MISSING, given, measured, percent, shown
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
@@ -273,4 +273,4 @@ def _series(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, show=_view)
+SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, apart=True, show=_view)

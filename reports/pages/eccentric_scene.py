@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.uncertainty import DRAWS
+from ringbalance.controller.eccentric_mass.study import DRAWS
 from ringbalance.reports import summary
 from ringbalance.reports.figures.eccentric import (
     DEVIATIONS,
@@ -147,37 +147,51 @@ def _bar(row: Record) -> Record:
 def _requirements(requirements: list[Record], evidence: Record) -> Table:
     def cells(place: int, row: Record) -> Cells:
         path = f"requirements.{place}"
-        unit, reached, interval = row["unit"] or "1", row["achieved"], row["achieved_interval"]
+        unit = row["unit"] or "1"
         needed = _span(row["required_interval"], unit)
         return (
             f"{row['quantity'][0].upper()}{row['quantity'][1:]}",
             f"{row['sense']} {traced(given(row['required'], unit, digits=3), f'{path}.required')}"
             f"{f' ({needed})' if needed else ''}",
             _KEY.sub(lambda match: input_name(match[0]), row["set_by"]),
-            "not reached" if reached is None else traced(shown(reached, unit, digits=3), f"{path}.achieved"),
-            _spread(row, f"{path}.reached") or _span(interval, unit) or MISSING,
+            _reached(row, f"{path}.achieved"),
+            _never(row, f"{path}.reached") or _span(row["achieved_interval"], unit) or MISSING,
             row["verdict"],
             ", ".join(named_with_origin(evidence, path) for path in _causes(row)),
         )
 
     return Table(
         caption="Requirements: what sets each, what this run and these loops come to, with its 95 % "
-        "interval, and the inputs on which it depends most. Where only part of the interval meets a "
-        "requirement, the verdict cannot be told. A settling time counts where the vibration stays within "
-        "the limit to the end of the run, any run-up included.",
+        "interval, and the inputs on which it depends most. Where only part of the interval, or of the runs "
+        "with inputs drawn from their uncertainty, meets a requirement, the verdict cannot be told. A "
+        "settling time counts where the vibration stays within the limit to the end of the run, any run-up "
+        "included.",
         heads=("Quantity", "Required", "Set by", "Reached", "Interval", "Verdict", "Depends on"),
         rows=[cells(place, row) for place, row in enumerate(requirements)],
         style="words",
     )
 
 
-def _spread(row: Record, path: str) -> str:
+def _reached(row: Record, path: str) -> str:
+    """What the scene as it stands comes to; said where drawn inputs may not come to anything."""
+    if row["achieved"] is None:
+        return "not reached"
+    told = traced(shown(row["achieved"], row["unit"] or "1", digits=3), path)
+    return f"{told} with the scene’s values" if _misses(row) else told
+
+
+def _never(row: Record, path: str) -> str:
     """How many of the drawn runs come to a result that not all come to; else empty."""
+    if row["achieved"] is None or not _misses(row):
+        return ""
     if row["reached"] == 1.0:
-        return "not always reached" if row["lost"] else ""
-    return (
-        f"reached in {traced(percent(row['reached']), path)} of runs" if row["achieved"] is not None else ""
-    )
+        return "none: with an input at the end of its own interval the run never gets there"
+    share = traced(percent(row["reached"]), path)
+    return f"none: of the runs with drawn inputs {share} get there, the others never do"
+
+
+def _misses(row: Record) -> bool:
+    return row["reached"] < 1.0 or bool(row["lost"])
 
 
 def _span(interval: Sequence[float] | None, unit: str) -> str:

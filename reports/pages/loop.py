@@ -8,6 +8,7 @@ from typing import Any, Final
 from ringbalance.reports.figures.operation import residual_polar, settling_histogram
 from ringbalance.reports.numbers import MISSING, given, number, percent, shown
 from ringbalance.reports.pages.first_page import RETUNED, place_of_run
+from ringbalance.reports.pages.within_reach import runs_settled
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
 from ringbalance.reports.traces import found_at, traced
 
@@ -57,11 +58,9 @@ def _tuned(tuning: Record) -> str:
     reached = (tuning["settling_time_s"] or {}).get("p95")
     if reached is None:
         return f"{tuning['status'][0].upper()}{tuning['status'][1:]}."
-    fraction, low, high = (percent(f) for f in (tuning["fraction_settled"], *tuning["fraction_settled_95"]))
     return (
-        f"With the fuller models that the tolerance selects, {fraction} (95 % confidence: {low} to {high}) "
-        f"of {tuning['runs']} runs settle with the recommended settings, {percent(0.95)} of all within "
-        f"{shown(reached, 's', digits=2)}."
+        f"With the fuller models that the tolerance selects, {runs_settled(tuning)} settle with the "
+        f"recommended settings, {percent(0.95)} of all within {shown(reached, 's', digits=2)}."
     )
 
 

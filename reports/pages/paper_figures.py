@@ -12,10 +12,10 @@ import numpy as np
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.figures.paper import figure_4, figure_6, figure_7, figure_7_phase, figure_8
 from ringbalance.reports.numbers import given, number, percent, short, shown
 from ringbalance.reports.section import Record, Section, Table, Work

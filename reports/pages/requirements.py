@@ -16,6 +16,7 @@ from ringbalance.reports.pages.within_reach import (
     LIKELY,
     ideal_valve,
     line_verdict,
+    runs_settled,
     settles,
     tuning_of,
     what_enlarges,
@@ -257,10 +258,7 @@ def _settling(evidence: Record) -> Requirement | None:
     return Requirement(
         name="Settling time with the recommended settings",
         wanted=_NONE if unasked else f"at most {given(until, 's')} in {percent(LIKELY)} of runs",
-        result=f"{_times(evidence, times)}settled: "
-        f"{traced(percent(tuning['fraction_settled']), 'summary.tuning.fraction_settled')} of "
-        f"{tuning['runs']} runs, with 95 % confidence {percent(low)} to {percent(high)}"
-        f"{ideal_valve(evidence)}",
+        result=f"{_times(evidence, times)}settled: {runs_settled(tuning)}{ideal_valve(evidence)}",
         verdict=UNASKED if unasked else judged,
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "controller.period"),
         required=wanted,

@@ -203,4 +203,4 @@ def _swing(found: Record) -> Drawing:
     )
 
 
-SECTION: Final = Section(name="sloshing", title="Waves on the ring", collect=_collect, show=_view)
+SECTION: Final = Section(name="sloshing", title="Waves on the ring", collect=_collect, apart=True, show=_view)

@@ -277,4 +277,6 @@ def three_dimensional_check(evidence: Record) -> Record | None:
     }
 
 
-SECTION: Final = Section(name="inside", title="Flow inside the tube", collect=_collect, show=_view)
+SECTION: Final = Section(
+    name="inside", title="Flow inside the tube", collect=_collect, apart=True, show=_view
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from ringbalance.reports.numbers import percent
 from ringbalance.reports.section import Record
 from ringbalance.reports.summary import MET, MISSED, OPEN, below
 
@@ -27,6 +28,15 @@ def line_verdict(evidence: Record) -> str:
     if line["given"] and tuning_of(evidence).get("fraction_settled") is not None and settles(evidence) == MET:
         return MET
     return below((end["smallest_correction_m"] for end in line["ends"]), line["largest_correction_m"])
+
+
+def runs_settled(tuning: Record) -> str:
+    """How many of the runs settle: a count, which claims nothing finer than their number."""
+    low, high = map(percent, tuning["fraction_settled_95"])
+    return (
+        f"{round(tuning['fraction_settled'] * tuning['runs'])} of {tuning['runs']} runs "
+        f"(95 % confidence: {low} to {high})"
+    )
 
 
 def settles(evidence: Record) -> str:

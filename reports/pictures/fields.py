@@ -13,7 +13,7 @@ from ringbalance.mesh.chamber import chamber_mesh, default_cells
 from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
-from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reduced_model import paper
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Scene
 

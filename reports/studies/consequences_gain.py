@@ -9,10 +9,10 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from ringbalance.controller.ensemble.moment import moment_table
+from ringbalance.controller.ensemble.moment import MomentTable
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.ensemble.run import MemberRuns
-from ringbalance.controller.ensemble.samples import Members, members_alike
+from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
@@ -129,7 +129,7 @@ def loop_gain(scene: Scene, model: BalancerModel, *, transfer: PairTransfer) -> 
 
 def _moment_per_fill(scene: Scene, model: BalancerModel) -> float:
     """|dM/dx| at equal fills with the total held, kg m."""
-    table = moment_table(model=model, total=2 * scene.disc.initial_fill)
+    table = MomentTable.of(model=model, total=2 * scene.disc.initial_fill)
     x, step = scene.disc.initial_fill, SMALL_FILL
     ends = table.at(np.array([x - step, x + step]))
     return float(abs(ends[1] - ends[0])) / (2 * step)
@@ -170,7 +170,7 @@ def _bracket(gains: FloatArray, seen: _Seen) -> tuple[FloatArray, FloatArray]:
 
 
 def _members(scene: Scene, gains: FloatArray, slowed: FloatArray) -> Members:
-    alike = members_alike(scene, size=gains.size)
+    alike = Members.alike(scene, size=gains.size)
     return replace(alike, velocity_factor=np.repeat(slowed, gains.shape[1]), proportional=gains.ravel())
 
 

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from ringbalance.physics.gas.column import vented_pressure
+from ringbalance.physics.gas import vented_pressure
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.operating.point import priming_pressure
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.reports.studies.drag_point import DragPoint, LiquidBatch, drag_point
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.liquids import known_liquids, liquid_at

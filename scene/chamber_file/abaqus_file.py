@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.contents import Contents, Elements, numbers_in, unreadable, whole
+from ringbalance.scene.chamber_file.contents import Contents, Elements, MeshFileError, numbers_in, whole
 from ringbalance.scene.chamber_file.elements import CELL_KINDS, FACET_KINDS, NODES, faces
 
 _KINDS: Final = (
@@ -63,7 +63,9 @@ def read_abaqus(content: bytes) -> Contents:
     for keyword, options, data in _keywords(content.decode("utf-8", errors="replace")):
         _add(parts, keyword, options, data)
     if not parts.numbers or not parts.blocks:
-        raise unreadable("this is not an Abaqus mesh: it has no *NODE or no *ELEMENT", "an Abaqus .inp file")
+        raise MeshFileError.of(
+            "this is not an Abaqus mesh: it has no *NODE or no *ELEMENT", "an Abaqus .inp file"
+        )
     sets = {name: np.concatenate(each) for name, each in parts.sets.items()}
     blocks = [block for each in parts.blocks for block in _named(*each, sets)]
     surfaces = [block for name, sides in parts.surfaces.items() for block in _sides(name, sides, parts, sets)]
@@ -96,9 +98,11 @@ def _keywords(text: str) -> Iterator[tuple[str, dict[str, str], list[str]]]:
 
 def _add(parts: _Parts, keyword: str, options: dict[str, str], data: list[str]) -> None:
     if keyword == "include":
-        raise unreadable("it includes another file, which is not read", "one file with the whole mesh")
+        raise MeshFileError.of("it includes another file, which is not read", "one file with the whole mesh")
     if keyword == "instance" and data:
-        raise unreadable("*INSTANCE moves the part", "a part in its final place, or a mesh without parts")
+        raise MeshFileError.of(
+            "*INSTANCE moves the part", "a part in its final place, or a mesh without parts"
+        )
     if keyword == "node":
         table = _table(data, 4, "*NODE")
         parts.numbers.append(whole(table[:, 0], "*NODE"))
@@ -118,7 +122,7 @@ def _add(parts: _Parts, keyword: str, options: dict[str, str], data: list[str]) 
 def _table(data: list[str], width: int, what: str) -> FloatArray:
     values = numbers_in(" ".join(data).replace(",", " ").encode(), what)
     if not len(values) or len(values) % width:
-        raise unreadable(f"{what} does not have {width} numbers for each entry: the file is damaged")
+        raise MeshFileError.of(f"{what} does not have {width} numbers for each entry: the file is damaged")
     return values.reshape(-1, width)
 
 
@@ -126,7 +130,7 @@ def _kind(name: str) -> str:
     found = next((kind for pattern, kind in _KINDS if re.fullmatch(pattern, name.upper())), None)
     if found is None:
         allowed = "C3D4, C3D10, C3D8 or C3D20 for the chamber, S3, S4, S6 or S8 for its faces"
-        raise unreadable(f"*ELEMENT has the unknown type {name[:20].upper() or 'none'}", allowed)
+        raise MeshFileError.of(f"*ELEMENT has the unknown type {name[:20].upper() or 'none'}", allowed)
     return found
 
 
@@ -186,7 +190,7 @@ def _face(kind: str, side: str) -> list[int]:
     found = faces(kind) if kind in CELL_KINDS else ()
     numbered = _FACES.get(len(found), ())
     if side not in [f"S{count}" for count in range(1, 1 + len(numbered))]:
-        raise unreadable(
+        raise MeshFileError.of(
             f"*SURFACE names face {side[:9]} of {kind} cells, which have no such face", "S1 to S6"
         )
     corners = set(numbered[int(side[1]) - 1])

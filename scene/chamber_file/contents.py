@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.rules.check import Finding
-
-_MOST_SHOWN = 4
-"""Entities that one message lists; more are counted."""
 
 
 class MeshFileError(Exception):
@@ -22,10 +19,10 @@ class MeshFileError(Exception):
         self.findings = tuple(findings)
         super().__init__("; ".join(each.problem for each in self.findings))
 
-
-def unreadable(problem: str, allowed: str = "") -> MeshFileError:
-    """The error of a file in which nothing further can be looked at."""
-    return MeshFileError([Finding(problem=problem, allowed=allowed)])
+    @classmethod
+    def of(cls, problem: str, allowed: str = "") -> MeshFileError:
+        """The error of a file in which nothing further can be looked at."""
+        return cls([Finding(problem=problem, allowed=allowed)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +60,9 @@ def numbers_in(body: bytes, what: str) -> FloatArray:
         try:
             return np.fromstring(body, dtype=np.float64, sep=" ")
         except (DeprecationWarning, ValueError) as error:
-            raise unreadable(f"{what} holds something other than numbers: the file is damaged") from error
+            raise MeshFileError.of(
+                f"{what} holds something other than numbers: the file is damaged"
+            ) from error
 
 
 def whole(values: FloatArray, what: str) -> IntArray:
@@ -72,22 +71,5 @@ def whole(values: FloatArray, what: str) -> IntArray:
         found = values.astype(np.int64)
         exact = (found == values) & (np.abs(values) < 2**53)
     if not exact.all():
-        raise unreadable(f"{what} has a fraction where a whole number belongs: the file is damaged")
+        raise MeshFileError.of(f"{what} has a fraction where a whole number belongs: the file is damaged")
     return found
-
-
-def shown(labels: Sequence[str]) -> str:
-    """A few labels, and the number of the others."""
-    few = ", ".join(labels[:_MOST_SHOWN])
-    more = len(labels) - _MOST_SHOWN
-    return f"{few} and {more} more" if more > 0 else few
-
-
-def grouped(
-    kind: str, numbers: IntArray, nodes: IntArray, groups: IntArray, names: dict[int, str]
-) -> Iterator[Elements]:
-    """Elements of one kind by the group that each belongs to; group 0, or one without entry, is no name."""
-    for group in np.unique(groups).tolist():
-        inside = groups == group
-        named = (names[group],) if group in names else ()
-        yield Elements(kind=kind, numbers=numbers[inside], nodes=nodes[inside], names=named)

@@ -14,15 +14,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.contents import (
-    Contents,
-    Elements,
-    MeshFileError,
-    grouped,
-    numbers_in,
-    unreadable,
-    whole,
-)
+from ringbalance.scene.chamber_file.contents import Contents, Elements, MeshFileError, numbers_in, whole
 from ringbalance.scene.chamber_file.elements import GMSH_KINDS, GMSH_ORDER, NODES
 
 _FORMATS: Final = "Gmsh 2.2 or 4.1 (File > Export, or -format msh41), Abaqus .inp, .vtu, or .step"
@@ -86,19 +78,21 @@ class _Binary:
 
 
 def _short(what: str) -> MeshFileError:
-    return unreadable(f"{what} ends before all that it announces: the file is damaged or cut off")
+    return MeshFileError.of(f"{what} ends before all that it announces: the file is damaged or cut off")
 
 
 def read_gmsh(content: bytes) -> Contents:
     """What a .msh file holds. Raises: MeshFileError: it is no such file, or damaged."""
     if content.lstrip()[:2] in (b"(0", b"(1", b"(2"):
-        raise unreadable("this is an ANSYS Fluent mesh, which has the same file ending as Gmsh's", _FORMATS)
+        raise MeshFileError.of(
+            "this is an ANSYS Fluent mesh, which has the same file ending as Gmsh's", _FORMATS
+        )
     sections = _sections(content)
     version, binary = _version(sections)
     names = _physical_names(sections.get("PhysicalNames", b""))
     for name in ("Nodes", "Elements"):
         if name not in sections:
-            raise unreadable(f"the file has no section ${name}", _FORMATS)
+            raise MeshFileError.of(f"the file has no section ${name}", _FORMATS)
     return _read_2(sections, names, binary) if version == "2.2" else _read_4(sections, names, binary)
 
 
@@ -112,12 +106,12 @@ def _sections(content: bytes) -> dict[str, bytes]:
         if end < 0:
             raise _short(f"section ${name}")
         if name in found:
-            raise unreadable(f"section ${name} stands in the file twice", "each section once")
+            raise MeshFileError.of(f"section ${name} stands in the file twice", "each section once")
         if name in _READ:
             found[name] = content[match.end() : end]
         at = end + len(match[1]) + 4
     if "MeshFormat" not in found:
-        raise unreadable("this is not a Gmsh mesh: it has no $MeshFormat", _FORMATS)
+        raise MeshFileError.of("this is not a Gmsh mesh: it has no $MeshFormat", _FORMATS)
     return found
 
 
@@ -126,11 +120,11 @@ def _version(sections: Mapping[str, bytes]) -> tuple[str, bool]:
     words = line.decode("ascii", errors="replace").split()
     if len(words) != 3 or words[0] not in ("2.2", "4.1"):
         problem = f"its Gmsh version {words[0][:20] if words else 'missing'} is not one that is read"
-        raise unreadable(problem, _FORMATS)
+        raise MeshFileError.of(problem, _FORMATS)
     if words[1] not in ("0", "1") or words[2] != "8":
-        raise unreadable("its $MeshFormat is neither text nor binary with numbers of 8 bytes", _FORMATS)
+        raise MeshFileError.of("its $MeshFormat is neither text nor binary with numbers of 8 bytes", _FORMATS)
     if words[1] == "1" and rest[:4] != b"\x01\x00\x00\x00":
-        raise unreadable("it is a binary file of a machine with another byte order", "a text file")
+        raise MeshFileError.of("it is a binary file of a machine with another byte order", "a text file")
     return words[0], words[1] == "1"
 
 
@@ -139,7 +133,7 @@ def _physical_names(body: bytes) -> Names:
     for line in body.decode("utf-8", errors="replace").splitlines()[1:]:
         match = _NAME.match(line)
         if match is None:
-            raise unreadable("$PhysicalNames has a line that is not: dimension, number, name in quotes")
+            raise MeshFileError.of("$PhysicalNames has a line that is not: dimension, number, name in quotes")
         found[int(match[1]), int(match[2])] = match[3]
     return found
 
@@ -213,7 +207,7 @@ def _read_2(sections: Mapping[str, bytes], names: Names, binary: bool) -> Conten
 def _counted(body: bytes, what: str) -> tuple[int, bytes]:
     line, _, rest = body.partition(b"\n")
     if not line.strip().isdigit() or len(line) > 20:
-        raise unreadable(f"{what} does not begin with its count: the file is damaged")
+        raise MeshFileError.of(f"{what} does not begin with its count: the file is damaged")
     return int(line), rest
 
 
@@ -251,7 +245,7 @@ def _named_2(kind: int, tags: int, rows: IntArray, names: Names) -> Iterator[Ele
     groups = np.abs(rows[:, 1]) if tags else np.zeros(len(rows), dtype=np.int64)
     named = {group: _name(names, dimension, group) for group in set(groups.tolist()) if group}
     whole_block = _block(kind, rows[:, 0], rows[:, 1 + tags :], ())
-    yield from grouped(whole_block.kind, whole_block.numbers, whole_block.nodes, groups, named)
+    yield from _grouped(whole_block.kind, whole_block.numbers, whole_block.nodes, groups, named)
 
 
 def _dimension(kind: int) -> int:
@@ -263,7 +257,7 @@ def _nodes_of(kind: int) -> int:
     """Number of nodes of a type; an unknown type ends the reading, as its length is unknown."""
     if kind not in GMSH_KINDS:
         problem = f"section $Elements has elements of Gmsh type {kind}, of third order or none of a mesh"
-        raise unreadable(problem, "elements of first or second order (Mesh.ElementOrder = 1 or 2)")
+        raise MeshFileError.of(problem, "elements of first or second order (Mesh.ElementOrder = 1 or 2)")
     return NODES[GMSH_KINDS[kind]]
 
 
@@ -283,3 +277,13 @@ def _contents(numbers: IntArray, places: FloatArray, blocks: list[Elements], nam
     used = {name for block in blocks for name in block.names}
     other = tuple(name for name in names.values() if name not in used)
     return Contents(node_numbers=numbers, coordinates=places, blocks=tuple(blocks), other_names=other)
+
+
+def _grouped(
+    kind: str, numbers: IntArray, nodes: IntArray, groups: IntArray, names: dict[int, str]
+) -> Iterator[Elements]:
+    """Elements of one kind by the group that each belongs to; group 0, or one without entry, is no name."""
+    for group in np.unique(groups).tolist():
+        inside = groups == group
+        named = (names[group],) if group in names else ()
+        yield Elements(kind=kind, numbers=numbers[inside], nodes=nodes[inside], names=named)

@@ -3,41 +3,43 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+import os
+import stat
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.scene.arrays import IntArray
-from ringbalance.scene.chamber_file.assembly import Body, assembled, drawing_nodes
-from ringbalance.scene.chamber_file.contents import MeshFileError
+from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
+from ringbalance.scene.chamber_file.assembly import Body
+from ringbalance.scene.chamber_file.contents import Contents, MeshFileError
+from ringbalance.scene.chamber_file.elements import dimension
+from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, unfitting
+from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
 from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.chamber_file.names import boundaries_of
-from ringbalance.scene.chamber_file.placing import (
-    Placed,
-    covered_findings,
-    opening_findings,
-    placed,
-    port_findings,
-    port_radius,
-)
-from ringbalance.scene.chamber_file.reading import content_of, contents_of, is_step
+from ringbalance.scene.chamber_file.placing import Placed, placed, port_radius
 from ringbalance.scene.chamber_file.record import ChamberGeometry
-from ringbalance.scene.chamber_file.scale import scale_findings
 from ringbalance.scene.chamber_file.shape import oriented
-from ringbalance.scene.chamber_file.step_file import STEP_UNIT
-from ringbalance.scene.chamber_file.topology import facets_of, topology_findings
-from ringbalance.scene.dimensions import DIMENSIONS
+from ringbalance.scene.chamber_file.step_file import STEP_ENDINGS, STEP_UNIT, meshed_step
+from ringbalance.scene.chamber_file.topology import Facets
+from ringbalance.scene.chamber_file.vtu_file import read_vtu
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
-from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.rules.check import Finding, written
+from ringbalance.scene.rules.check import Finding
 from ringbalance.scene.uncertain import SHAPE
+from ringbalance.scene.units import DIMENSIONS
 
-_PORT: Final = "tube.port_radius"
+_LARGEST_FILE: Final = 2**28
+_READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(
+    {".msh": read_gmsh, ".inp": read_abaqus, ".vtu": read_vtu}
+)
+FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
 
 
 def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
@@ -80,7 +82,7 @@ def _unit_faults(reading: Reading) -> Iterator[Fault]:
     path = "disc.mesh_unit"
     if not reading.known("disc.mesh"):
         return
-    step = is_step(Path(reading.values["disc.mesh"]))
+    step = _is_step(Path(reading.values["disc.mesh"]))
     if step and reading.given(path):
         yield reading.fault(path, problem="a STEP file has its own unit", allowed="leave the key out")
     elif not step and reading.lacks(path):
@@ -91,8 +93,8 @@ def _unit_faults(reading: Reading) -> Iterator[Fault]:
 def _following(reading: Reading, geometry: ChamberGeometry, found: Placed) -> Reading:
     values: dict[str, Any] = {f"disc.{key}": value for key, value in found.dimensions.items()}
     port = port_radius(found.points, geometry.boundaries)
-    if port is not None and reading.lacks(_PORT):
-        values[_PORT] = port
+    if port is not None and reading.lacks(PORT_RADIUS):
+        values[PORT_RADIUS] = port
     return reading.following({**values, "disc.geometry": geometry})
 
 
@@ -100,56 +102,26 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     """The mesh of a scene. Raises: MeshFileError: with all that is wrong with it."""
     name = reading.values["disc.mesh"]
     path = Path(reading.file).parent / name
-    content = content_of(path)
-    unit = STEP_UNIT if is_step(path) else reading.values["disc.mesh_unit"]
-    contents = contents_of(path, content, tolerance=reading.values["accuracy.tolerance"])
-    body = assembled(contents, scale=float(DIMENSIONS["length"].units[unit].factor))
+    content = _content_of(path)
+    unit = STEP_UNIT if _is_step(path) else reading.values["disc.mesh_unit"]
+    contents = _contents_of(path, content, tolerance=reading.values["accuracy.tolerance"])
+    body = Body.of(contents, scale=float(DIMENSIONS["length"].units[unit].factor))
     body, misshapen = oriented(body)
-    facets = facets_of(body)
+    facets = Facets.of(body)
     boundaries, misnamed = boundaries_of(body, facets)
     axis, middle = reading.values["disc.mesh_axis"], reading.values.get("disc.mesh_middle")
     found, misplaced = placed(body, boundaries, facets.nodes[facets.outer], axis=axis, middle=middle)
     everything = [
-        *topology_findings(body, facets, drawing_nodes=drawing_nodes(contents)),
+        *facets.findings(body, drawing_nodes=_drawing_nodes(contents)),
         *misshapen,
         *misnamed,
         *misplaced,
-        *_unfitting(reading, body, found, boundaries, unit),
+        *unfitting(reading, body, found, boundaries, unit),
     ]
     if everything:
         raise MeshFileError(everything)
-    size = reading.values["accuracy.tolerance"] if is_step(path) else 0.0
+    size = reading.values["accuracy.tolerance"] if _is_step(path) else 0.0
     return _record(name, content, body, boundaries, found, (unit, axis, middle, size)), found
-
-
-def _unfitting(
-    reading: Reading, body: Body, found: Placed, boundaries: dict[str, IntArray], unit: str
-) -> Iterator[Finding]:
-    """What does not fit between the mesh and other keys of the scene."""
-    extent = found.dimensions["central_angle"]
-    if reading.lacks("disc.chambers") and even_number_of_chambers(extent) is None:
-        problem = f"chambers is needed: the mesh takes {written(extent, 'deg')}, no even part of 360 deg"
-        yield Finding(problem=problem, allowed="chambers in [disc]")
-    chambers = reading.values.get("disc.chambers") or even_number_of_chambers(extent)
-    if chambers is not None:
-        yield from opening_findings(body, found.points, chambers=chambers)
-    port, own = reading.values.get(_PORT), port_radius(found.points, boundaries)
-    wrong = tuple(scale_findings(reading, found.dimensions, unit=unit, port=own))
-    if wrong:
-        yield from wrong
-        return
-    if port is not None:
-        yield from port_findings(found.points, boundaries, found.dimensions, port=port)
-    radii = {
-        "port_radius": port or own,
-        "inlet_radius": reading.values.get("gas.inlet_radius"),
-    }
-    yield from covered_findings(
-        body,
-        found.points,
-        radii={name: value for name, value in radii.items() if value is not None},
-        fill=reading.values.get("disc.max_fill_ratio", 0.5),
-    )
 
 
 def _record(
@@ -176,3 +148,52 @@ def _record(
         cells=cells,
         boundaries=arrays,
     )
+
+
+def _is_step(path: Path) -> bool:
+    """Whether a file is a solid that is yet to be meshed, and has its own unit."""
+    return path.suffix.lower() in STEP_ENDINGS
+
+
+def _content_of(path: Path) -> bytes:
+    """The bytes of a mesh file. Raises: MeshFileError: it cannot be read, or is larger than any mesh."""
+    if path.suffix.lower() not in (*_READERS, *STEP_ENDINGS):
+        raise MeshFileError.of(
+            f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", FORMATS
+        )
+    try:
+        # Without blocking: a pipe that nobody writes to must not hold the program.
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        with os.fdopen(handle, "rb") as stream:
+            kind = os.fstat(stream.fileno())
+            if not stat.S_ISREG(kind.st_mode):
+                raise MeshFileError.of("this is a folder or a device, not a file", FORMATS)
+            content = stream.read(_LARGEST_FILE + 1)
+    except FileNotFoundError as error:
+        raise MeshFileError.of(
+            f"there is no file {path}", "a path from the folder of the scene file"
+        ) from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise MeshFileError.of(f"the file cannot be read: {reason}") from error
+    if len(content) > _LARGEST_FILE:
+        raise MeshFileError.of("the file is too large to be checked", f"up to {_LARGEST_FILE // 2**20} MiB")
+    if not content.strip():
+        raise MeshFileError.of("the file is empty", FORMATS)
+    return content
+
+
+def _contents_of(path: Path, content: bytes, *, tolerance: float) -> Contents:
+    """What a mesh file's bytes hold; a solid is meshed. Raises: MeshFileError.
+
+    Args: `tolerance`: of the scene, from which the size of a solid's cells follows.
+    """
+    if _is_step(path):
+        return meshed_step(content, tolerance=tolerance)
+    return _READERS[path.suffix.lower()](content)
+
+
+def _drawing_nodes(contents: Contents) -> IntArray:
+    """Numbers of nodes that points and lines of the drawing have, such as centres of arcs."""
+    lower = [block.nodes.ravel() for block in contents.blocks if dimension(block.kind) < 2]
+    return np.concatenate([np.empty(0, dtype=np.int64), *lower])

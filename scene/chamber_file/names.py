@@ -11,8 +11,7 @@ import numpy as np
 from ringbalance.scene.arrays import BoolArray, IntArray
 from ringbalance.scene.chamber_file.assembly import Body
 from ringbalance.scene.chamber_file.contents import Elements
-from ringbalance.scene.chamber_file.elements import CORNERS
-from ringbalance.scene.chamber_file.facets import key_of
+from ringbalance.scene.chamber_file.elements import CORNERS, key_of
 from ringbalance.scene.chamber_file.record import OUTER_WALL
 from ringbalance.scene.chamber_file.topology import Facets
 from ringbalance.scene.faults import closest, did_you_mean, toml_text

@@ -12,17 +12,15 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray, clipped
 from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.facets import corners_of, edges_of
+from ringbalance.scene.chamber_file.elements import corners_of, edges_of
 from ringbalance.scene.chamber_file.keys import Axis
 from ringbalance.scene.chamber_file.names import PORT
 from ringbalance.scene.chamber_file.record import OUTER_WALL
 from ringbalance.scene.rules.check import Finding, written
 
-_DRAWING_ROUNDING: Final = 1e-5
+DRAWING_ROUNDING: Final = 1e-5
 _DIGITS: Final = 7
 """Of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
-_FRAME: Final = [0, 1, 2, -1]
-"""Corners of a cell that span it; for its share of the volume."""
 _SHARES: Final = tuple(step / 32 for step in range(33))
 """Of an edge of second order, between which it is as good as straight: a share 1e-3 of its bulge."""
 
@@ -67,10 +65,10 @@ def placed(
         "plate_thickness": 0.0,
     }
     found = [*_about_axis(body, inner, outer, extent, where), *_walls(points, boundaries)]
-    return Placed(points=points, dimensions=rounded(dimensions)), tuple(found)
+    return Placed(points=points, dimensions=_rounded(dimensions)), tuple(found)
 
 
-def rounded(dimensions: Mapping[str, float]) -> dict[str, float]:
+def _rounded(dimensions: Mapping[str, float]) -> dict[str, float]:
     """Dimensions to as many digits as a file's rounding leaves."""
     return {key: float(f"{value:.{_DIGITS}g}") for key, value in dimensions.items()}
 
@@ -121,7 +119,7 @@ def _from_origin(first: FloatArray, last: FloatArray) -> FloatArray:
 
 
 def _about_axis(body: Body, inner: float, outer: float, extent: float, node: int) -> Iterator[Finding]:
-    if extent > math.pi * (1 + _DRAWING_ROUNDING) or inner <= 1e-6 * outer:
+    if extent > math.pi * (1 + DRAWING_ROUNDING) or inner <= 1e-6 * outer:
         label = body.node_labels(np.array([node]))
         what = "touches the shaft's axis" if inner <= 1e-6 * outer else "reaches round the shaft's axis"
         problem = f"the chamber {what}: it takes {written(extent, 'deg')}, nearest to the axis is {label}"
@@ -140,58 +138,6 @@ def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[F
         problem = f'"{OUTER_WALL}" reaches to a radius of {written(float(wall.max()), "mm")}, but "{name}" '
         problem += f"to {written(highest, 'mm')}: names exchanged, or the shaft is not mesh_axis"
         yield Finding(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
-
-
-def opening_findings(body: Body, points: FloatArray, *, chambers: int) -> Iterator[Finding]:
-    """Nodes outside the sector that a chamber has at most. Args: `points`: as placed."""
-    half = math.pi / chambers
-    angle = np.abs(np.arctan2(points[:, 1], points[:, 0]))
-    wrong = np.flatnonzero(angle > half * (1 + _DRAWING_ROUNDING))
-    if len(wrong):
-        worst = wrong[np.argsort(-angle[wrong])]
-        problem = f"nodes lie outside the opening angle, 360 deg / {chambers} chambers about the middle "
-        problem += f"({len(wrong)}); farthest: {body.node_labels(worst)}"
-        limit = written(half, "deg")
-        yield Finding(problem=problem, allowed=f"within {limit} on both sides of the middle (mesh_middle)")
-
-
-def port_findings(
-    points: FloatArray, boundaries: Mapping[str, IntArray], dimensions: Mapping[str, float], *, port: float
-) -> Iterator[Finding]:
-    """A port's radius beside the named port."""
-    if PORT not in boundaries:
-        return
-    radius = np.hypot(points[:, 0], points[:, 1])[boundaries[PORT]]
-    low, high = float(radius.min()), float(radius.max())
-    rounding = 1e-6 * dimensions["outer_radius"]
-    if not low - rounding <= port <= high + rounding:
-        where = f"from {written(low, 'mm')} to {written(high, 'mm')}"
-        problem = f'port_radius is {written(port, "mm")}, but the boundary "{PORT}" lies {where}'
-        yield Finding(problem=problem, allowed="a radius on the port, or no port_radius")
-
-
-def covered_findings(
-    body: Body, points: FloatArray, *, radii: Mapping[str, float], fill: float
-) -> Iterator[Finding]:
-    """Ports that the liquid leaves free at the start, and a gas inlet that it covers when it is most.
-
-    Args: `radii`: of "port_radius" and "inlet_radius", as far as known. `fill`: greatest fill ratio of a
-        chamber, of which one holds half at the start.
-    """
-    at = np.hypot(points[:, 0], points[:, 1])[body.cells]
-    low, high = at.min(axis=1), at.max(axis=1)
-    volumes = np.abs(np.linalg.det(np.diff(points[body.corners[:, _FRAME]], axis=1)))
-    for name, radius in radii.items():
-        shares = clipped((high - radius) / np.maximum(high - low, 1e-300), 0.0, 1.0)
-        outside = float((shares * volumes).sum() / volumes.sum())
-        if name == "port_radius" and outside > fill / 2:
-            problem = f"at the start (fill {fill / 2:.3g}) the liquid does not cover {name}, "
-            problem += f"{written(radius, 'mm')}: {100 * outside:.3g} % of the chamber lies outside it"
-            yield Finding(problem=problem, allowed="a port nearer to the outer wall, or more liquid")
-        if name == "inlet_radius" and outside < fill:
-            problem = f"at max_fill_ratio ({fill:.3g}) the liquid covers {name}, {written(radius, 'mm')}: "
-            problem += f"{100 * outside:.3g} % of the chamber lies outside it"
-            yield Finding(problem=problem, allowed="an inlet nearer to the inner wall, or less liquid")
 
 
 def port_radius(points: FloatArray, boundaries: Mapping[str, IntArray]) -> float | None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
+
+import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 
@@ -12,6 +15,8 @@ CellKind = Literal["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron
 """One kind in a mesh; names and orders of nodes are meshio's."""
 OUTER_WALL: Final = "outer_wall"
 """The boundary that every chamber has."""
+STRETCHED: Final = ("outer_radius", "inner_radius", "axial_width", "central_angle")
+"""Keys of [disc] that can be changed on a mesh."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +46,30 @@ class ChamberGeometry:
     def __str__(self) -> str:
         """The file and what it holds, for people."""
         return f"{self.file}: {len(self.cells)} {self.kind} cells, {', '.join(self.boundaries)}"
+
+    def stretched(self, *, dimensions: Mapping[str, float], quantity: str, value: float) -> ChamberGeometry:
+        """The mesh stretched along the radius, the angle or the shaft until one dimension has another value.
+
+        A radius r becomes R1 + (r - R1) (R2' - R1) / (R2 - R1), so that the other radius stays; angles and
+        heights are multiplied.
+        Args: `dimensions`: of the mesh as it is, SI, by key of `STRETCHED`. `value`: SI.
+        Range: small changes; a fillet or a gas tube is stretched with the rest.
+        """
+        x, y, z = self.points.T
+        radius, angle = np.hypot(x, y), np.arctan2(y, x)
+        inner, outer = dimensions["inner_radius"], dimensions["outer_radius"]
+        new_inner = value if quantity == "inner_radius" else inner
+        new_outer = value if quantity == "outer_radius" else outer
+        radius = new_inner + (radius - inner) * (new_outer - new_inner) / (outer - inner)
+        factor = value / dimensions[quantity]
+        angle = angle * (factor if quantity == "central_angle" else 1.0)
+        z = z * (factor if quantity == "axial_width" else 1.0)
+        points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+        points.flags.writeable = False
+        digest = hashlib.sha256(f"{self.digest} {quantity} {value!r}".encode()).hexdigest()
+        first = self.stretch or Stretch(base=self, before=dimensions, after=dimensions)
+        stretch = replace(first, after={**dimensions, quantity: value})
+        return replace(self, points=points, digest=digest, stretch=stretch)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Final
 
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.elements import CORNERS, between, mirrored, shape_gradients
+from ringbalance.scene.chamber_file.elements import CORNERS, between, reference_nodes, shape_gradients
 from ringbalance.scene.rules.check import Finding
 
 _AT_ONCE: Final = 4096
@@ -27,7 +28,7 @@ def oriented(body: Body) -> tuple[Body, tuple[Finding, ...]]:
     lowest, highest, size = _jacobians(body)
     flat = np.maximum(np.abs(lowest), np.abs(highest)) < _FLAT * size**3
     if not flat.all() and (highest[~flat] <= 0).all():
-        body = replace(body, cells=body.cells[:, mirrored(body.kind)])
+        body = replace(body, cells=body.cells[:, _mirrored(body.kind)])
         lowest, highest = -highest, -lowest
     inverted = ~flat & (highest <= 0)
     folded = ~flat & (lowest <= _FLAT * size**3) & (highest > 0)
@@ -86,3 +87,10 @@ def _farthest_middle(body: Body, cell: int) -> int:
     points = body.points[body.cells[cell]]
     straight = np.array([points[list(corners)].mean(axis=0) for corners in between(body.kind)])
     return int(body.cells[cell][np.linalg.norm(points - straight, axis=1).argmax()])
+
+
+@cache
+def _mirrored(kind: str) -> IntArray:
+    """The order in which a cell's nodes make the cell of opposite orientation."""
+    nodes = reference_nodes(kind).round(3).tolist()
+    return np.array([nodes.index([y, x, z]) for x, y, z in nodes], dtype=np.int64)

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-from ringbalance.scene.chamber_file.contents import Contents, unreadable
+from ringbalance.scene.chamber_file.contents import Contents, MeshFileError
 from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
 
 STEP_ENDINGS: Final = (".step", ".stp")
@@ -29,9 +29,9 @@ def meshed_step(content: bytes, *, tolerance: float) -> Contents:
     """
     if find_spec("gmsh") is None:
         problem = "a STEP file needs the extra cad, which meshes it"
-        raise unreadable(problem, 'pip install "ringbalance[cad]", or a mesh in place of the solid')
+        raise MeshFileError.of(problem, 'pip install "ringbalance[cad]", or a mesh in place of the solid')
     if b"ISO-10303-21" not in content[:1000]:
-        raise unreadable("this is not a STEP file: it does not begin with ISO-10303-21")
+        raise MeshFileError.of("this is not a STEP file: it does not begin with ISO-10303-21")
     share = min(max(tolerance ** (1 / 3) / 2, _FINEST), _COARSEST)
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "solid.step", Path(folder) / "solid.msh"
@@ -46,9 +46,9 @@ def meshed_step(content: bytes, *, tolerance: float) -> Contents:
                 cwd=folder,
             )
         except subprocess.TimeoutExpired as error:
-            raise unreadable(f"Gmsh has not meshed the solid within {_LONGEST} s", "a mesh") from error
+            raise MeshFileError.of(f"Gmsh has not meshed the solid within {_LONGEST} s", "a mesh") from error
         if child.returncode or not target.exists():
             lines = child.stderr.decode("utf-8", errors="replace").strip().splitlines()
             reason = "".join(each for each in (lines or ["it ended"])[-1] if each.isprintable())[:200]
-            raise unreadable(f"Gmsh cannot mesh the solid: {reason}", "one solid with a closed surface")
+            raise MeshFileError.of(f"Gmsh cannot mesh the solid: {reason}", "one solid with a closed surface")
         return read_gmsh(target.read_bytes())

@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.elements import CORNERS
-from ringbalance.scene.chamber_file.facets import corners_of, edges_of, key_of, repeats, sides_of
+from ringbalance.scene.chamber_file.elements import CORNERS, corners_of, edges_of, key_of, repeats, sides_of
 from ringbalance.scene.rules.check import Finding
 
 _SAME: Final = 1e-7
@@ -41,35 +40,37 @@ class Facets:
     shared: BoolArray
     """Keys in rising order that more than two cells have."""
 
+    @classmethod
+    def of(cls, body: Body) -> Facets:
+        """The sides of all cells of a body."""
+        nodes, corners = sides_of(body.cells, body.kind), corners_of(body.kind)
+        keys = key_of(nodes[:, :corners], len(body.points))
+        counts = repeats(keys)
+        return cls(
+            nodes=nodes,
+            corners=corners,
+            cells=np.repeat(np.arange(len(body.cells)), len(nodes) // len(body.cells)),
+            keys=keys,
+            outer=np.flatnonzero(counts == 1),
+            shared=counts > 2,
+        )
 
-def facets_of(body: Body) -> Facets:
-    """The sides of all cells of a body."""
-    nodes, corners = sides_of(body.cells, body.kind), corners_of(body.kind)
-    keys = key_of(nodes[:, :corners], len(body.points))
-    counts = repeats(keys)
-    return Facets(
-        nodes=nodes,
-        corners=corners,
-        cells=np.repeat(np.arange(len(body.cells)), len(nodes) // len(body.cells)),
-        keys=keys,
-        outer=np.flatnonzero(counts == 1),
-        shared=counts > 2,
-    )
+    def findings(self, body: Body, *, drawing_nodes: IntArray) -> Iterator[Finding]:
+        """What is wrong with how cells hang together.
 
-
-def topology_findings(body: Body, facets: Facets, *, drawing_nodes: IntArray) -> Iterator[Finding]:
-    """What is wrong with how cells hang together. Args: `drawing_nodes`: numbers of nodes of the drawing."""
-    yield from _repeated(body)
-    crowded = [*_same_cells(body), *_crowded_facets(body, facets)]
-    yield from crowded
-    doubled = [*_doubled_nodes(body, facets)]
-    hanging = [] if doubled else [*_hanging_nodes(body, facets)]
-    yield from (*doubled, *hanging)
-    parts = [*_several_volumes(body, facets)]
-    yield from parts
-    if not (crowded or doubled or hanging or parts):
-        yield from _pinched(body, facets)
-    yield from _unused(body, drawing_nodes)
+        Args: `drawing_nodes`: numbers of nodes of the drawing.
+        """
+        yield from _repeated(body)
+        crowded = [*_same_cells(body), *_crowded_facets(body, self)]
+        yield from crowded
+        doubled = [*_doubled_nodes(body, self)]
+        hanging = [] if doubled else [*_hanging_nodes(body, self)]
+        yield from (*doubled, *hanging)
+        parts = [*_several_volumes(body, self)]
+        yield from parts
+        if not (crowded or doubled or hanging or parts):
+            yield from _pinched(body, self)
+        yield from _unused(body, drawing_nodes)
 
 
 def _repeated(body: Body) -> Iterator[Finding]:

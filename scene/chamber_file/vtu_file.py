@@ -21,13 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.contents import (
-    Contents,
-    Elements,
-    numbers_in,
-    unreadable,
-    whole,
-)
+from ringbalance.scene.chamber_file.contents import Contents, Elements, MeshFileError, numbers_in, whole
 from ringbalance.scene.chamber_file.elements import NODES, VTK_KINDS
 from ringbalance.scene.chamber_file.names import KNOWN_NAMES
 
@@ -60,7 +54,9 @@ def read_vtu(content: bytes) -> Contents:
     root, coding = _document(content)
     pieces = root.findall("./UnstructuredGrid/Piece")
     if len(pieces) != 1:
-        raise unreadable(f"it has {len(pieces)} pieces of an UnstructuredGrid", "a .vtu file with one piece")
+        raise MeshFileError.of(
+            f"it has {len(pieces)} pieces of an UnstructuredGrid", "a .vtu file with one piece"
+        )
     piece = pieces[0]
     points = _numbers(piece.findall("./Points/DataArray"), coding, "Points")
     cells = {each.get("Name", ""): each for each in piece.findall("./Cells/DataArray")}
@@ -69,14 +65,16 @@ def read_vtu(content: bytes) -> Contents:
         for name in ("connectivity", "offsets", "types")
     )
     if len(points) % 3 or len(offsets) != len(types):
-        raise unreadable(f"the lengths of its arrays do not fit: {_DAMAGED}")
+        raise MeshFileError.of(f"the lengths of its arrays do not fit: {_DAMAGED}")
     data = {
         name: _numbers([each], coding, name)
         for each in piece.findall("./CellData/DataArray")
         if (name := each.get("Name", "")) in (*KNOWN_NAMES, "chamber")
     }
     if any(len(values) != len(types) for values in data.values()):
-        raise unreadable("data of cells must have one number for each cell, 0 where the name does not hold")
+        raise MeshFileError.of(
+            "data of cells must have one number for each cell, 0 where the name does not hold"
+        )
     marks = {name: values != 0 for name, values in data.items()}
     return Contents(
         node_numbers=np.arange(len(points) // 3),
@@ -92,19 +90,21 @@ def _document(content: bytes) -> tuple[ElementTree.Element, _Coding]:
     if match is not None:
         appended, content = content[match.end() :], content[: match.start()] + b"</VTKFile>"
     if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
-        raise unreadable("it declares XML entities, which no mesh needs", "a .vtu file without DOCTYPE")
+        raise MeshFileError.of("it declares XML entities, which no mesh needs", "a .vtu file without DOCTYPE")
     try:
         root = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError) as error:
-        raise unreadable(f"this is not XML, and so no .vtu file: {error}") from error
+        raise MeshFileError.of(f"this is not XML, and so no .vtu file: {error}") from error
     if root.tag != "VTKFile" or root.get("type") != "UnstructuredGrid":
-        raise unreadable("this is XML, but not a VTK UnstructuredGrid", "a .vtu file")
+        raise MeshFileError.of("this is XML, but not a VTK UnstructuredGrid", "a .vtu file")
     order = {"LittleEndian": "<", "BigEndian": ">"}.get(root.get("byte_order", "LittleEndian"), "<")
     kind = _TYPES.get(root.get("header_type", "UInt32"), "u4")
     raw = match is not None and match[1] == b"raw"
     compressor = root.get("compressor", "")
     if compressor not in ("", "vtkZLibDataCompressor", "vtkLZMADataCompressor"):
-        raise unreadable(f"its compressor {compressor[:40]} is not one that is read", "zlib, lzma or none")
+        raise MeshFileError.of(
+            f"its compressor {compressor[:40]} is not one that is read", "zlib, lzma or none"
+        )
     header: np.dtype[np.unsignedinteger] = np.dtype(order + kind)
     return root, _Coding(header=header, order=order, compressor=compressor, appended=appended, raw=raw)
 
@@ -113,13 +113,13 @@ def _numbers(arrays: list[ElementTree.Element], coding: _Coding, what: str) -> F
     """The numbers of an array, however it is stored."""
     kind = _TYPES.get(arrays[0].get("type", "")) if arrays else None
     if kind is None:
-        raise unreadable(f"its array {what[:40]} is missing, or of no type that is known: {_DAMAGED}")
+        raise MeshFileError.of(f"its array {what[:40]} is missing, or of no type that is known: {_DAMAGED}")
     text, form = (arrays[0].text or "").encode(), arrays[0].get("format", "ascii")
     if form == "ascii":
         return numbers_in(text, what)
     offset = arrays[0].get("offset", "0")
     if form == "appended" and (not offset.isdigit() or len(offset) > 12):
-        raise unreadable(f"its array {what[:40]} has no place in the appended data: {_DAMAGED}")
+        raise MeshFileError.of(f"its array {what[:40]} has no place in the appended data: {_DAMAGED}")
     try:
         if form == "appended":
             stored = coding.appended[int(offset) :]
@@ -128,7 +128,7 @@ def _numbers(arrays: list[ElementTree.Element], coding: _Coding, what: str) -> F
             content = _unpacked(text.strip(), coding, coded=True)
         return np.frombuffer(content, dtype=coding.order + kind).astype(np.float64)
     except (ValueError, IndexError, binascii.Error, zlib.error, lzma.LZMAError, EOFError) as error:
-        raise unreadable(f"its array {what[:40]} cannot be unpacked: {_DAMAGED}") from error
+        raise MeshFileError.of(f"its array {what[:40]} cannot be unpacked: {_DAMAGED}") from error
 
 
 def _unpacked(stored: bytes, coding: _Coding, *, coded: bool) -> bytes:
@@ -177,7 +177,7 @@ def _expanded(packed: bytes, compressor: str, most: int) -> bytes:
 
 def _bounded(size: int) -> None:
     if not 0 <= size <= _LARGEST:
-        raise unreadable(f"one of its arrays would have {size} bytes", f"up to {_LARGEST} bytes")
+        raise MeshFileError.of(f"one of its arrays would have {size} bytes", f"up to {_LARGEST} bytes")
 
 
 def _blocks(
@@ -192,12 +192,12 @@ def _blocks(
         at = np.flatnonzero((types == kind) & (code == names))
         if kind not in VTK_KINDS:
             problem = f"cell {at[0]} is of VTK type {kind}, which no chamber can have"
-            raise unreadable(problem, "tetrahedra or hexahedra of first or second order")
+            raise MeshFileError.of(problem, "tetrahedra or hexahedra of first or second order")
         width = NODES[VTK_KINDS[kind]]
         if (offsets[at] - starts[at] != width).any() or (starts[at] < 0).any():
-            raise unreadable(f"the offsets of its cells do not fit their types: {_DAMAGED}")
+            raise MeshFileError.of(f"the offsets of its cells do not fit their types: {_DAMAGED}")
         if len(at) and offsets[at].max() > len(connectivity):
-            raise unreadable(f"its connectivity ends too early: {_DAMAGED}")
+            raise MeshFileError.of(f"its connectivity ends too early: {_DAMAGED}")
         held = tuple(name for place, name in enumerate(marks) if names >> place & 1)
         nodes = connectivity[starts[at][:, None] + np.arange(width)]
         yield Elements(kind=VTK_KINDS[kind], numbers=at, nodes=nodes, names=held)

@@ -2,35 +2,26 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 from ringbalance.scene import eccentric_control_models as control
 from ringbalance.scene import eccentric_models as machine
 from ringbalance.scene.keys.declaration import needed
-from ringbalance.scene.keys.schema import (
-    RUN,
-    Schema,
-    table_of,
-    top_keys,
-    uncertainty_by_table,
-    with_origins,
-)
+from ringbalance.scene.keys.schema import Schema, Table
 
 _ECCENTRIC = {
-    "rotor": table_of(machine.EccentricRotor, "the rotor on its bearing, and its speed"),
-    "imbalance": table_of(machine.Imbalance, "the imbalance to be balanced"),
-    "masses": table_of(machine.EccentricMasses, "the two eccentric masses on their track"),
-    "motor": table_of(machine.Motor, "motor and gears of each mass"),
-    "sensor": table_of(machine.EccentricSensor, "the sensors; exact when left out"),
-    "imbalance_filter": table_of(control.ImbalanceFilter, "the Kalman filter that finds the imbalance"),
-    "friction_filter": table_of(control.FrictionFilter, "the extended Kalman filter that finds the friction"),
-    "lqr": table_of(control.Lqr, "the regulator that moves the masses"),
-    "fine_tuning": table_of(control.FineTuning, "the search by trial for a smaller vibration"),
-    "supervisor": table_of(control.Supervisor, "the order of the stages, and when each ends"),
+    "rotor": Table.of(machine.EccentricRotor, "the rotor on its bearing, and its speed"),
+    "imbalance": Table.of(machine.Imbalance, "the imbalance to be balanced"),
+    "masses": Table.of(machine.EccentricMasses, "the two eccentric masses on their track"),
+    "motor": Table.of(machine.Motor, "motor and gears of each mass"),
+    "sensor": Table.of(machine.EccentricSensor, "the sensors; exact when left out"),
+    "imbalance_filter": Table.of(control.ImbalanceFilter, "the Kalman filter that finds the imbalance"),
+    "friction_filter": Table.of(control.FrictionFilter, "the extended Kalman filter that finds the friction"),
+    "lqr": Table.of(control.Lqr, "the regulator that moves the masses"),
+    "fine_tuning": Table.of(control.FineTuning, "the search by trial for a smaller vibration"),
+    "supervisor": Table.of(control.Supervisor, "the order of the stages, and when each ends"),
 }
-ECCENTRIC_MASS = Schema(
-    top=MappingProxyType(top_keys(needed('"eccentric_mass" for eccentric masses'))),
-    tables=with_origins({**_ECCENTRIC, "uncertainty": uncertainty_by_table(_ECCENTRIC), **RUN}),
+ECCENTRIC_MASS = Schema.of(
+    _ECCENTRIC,
+    balancer=needed('"eccentric_mass" for eccentric masses'),
     scene=machine.EccentricScene,
 )
 """A scene whose balancer is two eccentric masses."""

@@ -10,9 +10,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.faults import did_you_mean
-from ringbalance.scene.units import FieldError, parse_quantity, unit_names
+from ringbalance.scene.units import DIMENSIONS, FieldError, parse_quantity
 
 _LARGEST_NUMBER = 1e9
 _LONGEST_NAME = 200
@@ -73,7 +72,7 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
     kind = DIMENSIONS[dimension]
     limits = bounds or Bounds()
     interval = f" {limits}".replace(" at least", " of at least") if bounds else ""
-    allowed = f'{kind.name}{interval}, such as "{kind.example}", in {unit_names(dimension)}'
+    allowed = f'{kind.name}{interval}, such as "{kind.example}", in {kind.unit_names}'
 
     def read(value: object) -> float:
         number = parse_quantity(value, dimension)
@@ -89,7 +88,7 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
 
 def angle_of_turn() -> Reader:
     """Reader of a phase or lag, rad; beyond a full turn either way it is wrapped to within half a turn."""
-    allowed = f'an angle such as "{DIMENSIONS["angle"].example}", in {unit_names("angle")}'
+    allowed = f'an angle such as "{DIMENSIONS["angle"].example}", in {DIMENSIONS["angle"].unit_names}'
 
     def read(value: object) -> float:
         angle = parse_quantity(value, "angle")
@@ -298,5 +297,5 @@ def _absolute(value: object, dimension: str, allowed: str) -> float:
 def _half_width_allowed(dimension: str | None) -> str:
     own = "a bare number"
     if dimension is not None:
-        own = f"{DIMENSIONS[dimension].name} in {unit_names(dimension)}"
+        own = f"{DIMENSIONS[dimension].name} in {DIMENSIONS[dimension].unit_names}"
     return f'a percentage of the quantity such as "5 %", or {own}'

@@ -1,14 +1,20 @@
-"""A TOML document against the declared keys: what could be read, and an error for all that could not."""
+"""A TOML document against the declared keys: what could be read, and an error for all that could not.
+
+What a file leaves out follows from its other values where a default says so, or is an error.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import PurePath
 from typing import Any, Literal
 
 from ringbalance.scene.faults import MISSING, Fault, closest, did_you_mean, toml_key, toml_text
 from ringbalance.scene.keys.declaration import Entries, Key
-from ringbalance.scene.keys.schema import Place, Schema
+from ringbalance.scene.keys.derivations import shortest_path
+from ringbalance.scene.keys.schema import LIQUID_RING, Place, Schema
 from ringbalance.scene.units import FieldError
 
 _MOST_GUESSED = 100
@@ -83,6 +89,43 @@ class Reading:
     def _default_text(self, path: str) -> str:
         source = "from the mesh" if path in self.derived else "by default"
         return f"{toml_text(self.values[path])} (SI, {source})" if self.known(path) else MISSING
+
+    def completed(self) -> Reading:
+        """Fill in the defaults that follow from other values, as far as those are known.
+
+        What a default follows from is there already, because a key is declared after it.
+        """
+        unnamed = self.lacks("name")
+        known = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self
+        for name, table in self.schema.tables.items():
+            for key, declared in table.keys.items():
+                path, needs = f"{name}.{key}", declared.presence.needs
+                if needs and known.lacks(path) and known.known(*needs):
+                    result = declared.presence.value(*(known.values[need] for need in needs))
+                    known = known.adding({} if result is None else {path: result})
+        return known.adding(_shortest_length(known)) if self.schema is LIQUID_RING else known
+
+    def missing_faults(self) -> Iterator[Fault]:
+        """One error for each missing key, defaults included; one for a whole table that is missing."""
+        for name, table in self.schema.tables.items():
+            keys = [key for key, declared in table.keys.items() if declared.presence.kind == "needed"]
+            if not keys and name != "liquid":
+                continue
+            if self.given(name):
+                paths = (f"{name}.{key}" for key in keys)
+                yield from (_missing(self, path) for path in paths if self.lacks(path))
+            elif name not in self.broken:
+                inside = ", ".join(keys) or "name and temperature, or density and kinematic_viscosity"
+                yield Fault(
+                    file=self.file,
+                    table=name,
+                    key="",
+                    value=MISSING,
+                    problem="every scene needs this table",
+                    allowed=f"a table with {inside}",
+                )
+        if self.schema is LIQUID_RING:
+            yield from _needed_by_others(self)
 
 
 def read_document(
@@ -255,3 +298,31 @@ def _meant(rejected: _Rejected, schema: Schema) -> str:
             return f"{home}.{word}"
     near = closest(word, schema.names_at(place[:-1]))
     return ".".join([*map(str, place[:-1]), near]) if near else ""
+
+
+def _shortest_length(reading: Reading) -> Mapping[str, float]:
+    """With a given k the length matters for the liquid's inertia only: that of the shortest tube is used."""
+    hump_settled = reading.known("tube.hump_radius") or reading.lacks("tube.hump_radius")
+    settled = reading.known("tube.drag_coefficient", "tube.port_radius") and hump_settled
+    if not settled or not reading.lacks("tube.length"):
+        return {}
+    port_radius, hump_radius = reading.values["tube.port_radius"], reading.values.get("tube.hump_radius")
+    if hump_radius is not None and hump_radius >= port_radius:
+        return {}
+    length = shortest_path(port_radius=port_radius, hump_radius=hump_radius, separation=math.pi)
+    return {"tube.length": length}
+
+
+def _missing(reading: Reading, path: str, problem: str = "every scene needs it") -> Fault:
+    return reading.fault(path, problem=problem, allowed=reading.allowed(path))
+
+
+def _needed_by_others(reading: Reading) -> Iterator[Fault]:
+    if reading.given("tube") and reading.lacks("tube.length") and reading.lacks("tube.drag_coefficient"):
+        yield _missing(reading, "tube.length", "k cannot be calculated without it")
+    if reading.values.get("tube.entrance") == "rounded" and reading.lacks("tube.entrance_radius"):
+        yield _missing(reading, "tube.entrance_radius", "a rounded entrance needs its radius")
+    pair = ("gas.conductance", "gas.critical_ratio")
+    for present, absent in (pair, pair[::-1]):
+        if reading.known(present) and reading.lacks(absent):
+            yield _missing(reading, absent, f"{present.split('.')[1]} has no meaning without it")

@@ -9,18 +9,9 @@ from typing import Any, Literal, get_args
 
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.chamber_file.keys import MeshKeys
-from ringbalance.scene.keys.declaration import (
-    Entries,
-    Key,
-    Presence,
-    derived,
-    keys_of,
-    standard,
-    unused,
-)
+from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
-from ringbalance.scene.measured import Measured
-from ringbalance.scene.origins import Origin
+from ringbalance.scene.origins import Measured, Origin
 
 Balancer = Literal["liquid_ring", "eccentric_mass"]
 BALANCERS: tuple[str, ...] = get_args(Balancer)
@@ -38,6 +29,11 @@ class Table:
     keys: Mapping[str, Key]
     record: type | None = None
     """What is made of it; None when the scene has its values elsewhere."""
+
+    @classmethod
+    def of(cls, record: type, text: str) -> Table:
+        """A table that becomes a record. Args: `text`: what it describes."""
+        return cls(text=text, keys=keys_of(record), record=record)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,10 +63,33 @@ class Schema:
             keys = takes.keys if isinstance(takes, Entries) else {}
         return keys
 
+    @classmethod
+    def of(
+        cls,
+        tables: Mapping[str, Table],
+        *,
+        balancer: Presence,
+        scene: Callable[..., Any],
+        uncertainty: Table | None = None,
+    ) -> Schema:
+        """The schema of a kind of balancer, with what every scene file has.
 
-def table_of(record: type, text: str) -> Table:
-    """A table that becomes a record. Args: `text`: what it describes."""
-    return Table(text=text, keys=keys_of(record), record=record)
+        Args: `balancer`: how that key may be absent. `uncertainty`: that table, by default with a table of
+        half-widths for each table, where tables share names of keys.
+        """
+        whole = {**tables, "uncertainty": uncertainty or _uncertainty_by_table(tables), **_RUN}
+        return cls(
+            top=MappingProxyType(
+                {
+                    "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
+                    "balancer": Key(takes=choice(Balancer), presence=balancer),
+                }
+            ),
+            tables=MappingProxyType(
+                {n: replace(each, keys={**each.keys, ORIGIN: _origins(each)}) for n, each in whole.items()}
+            ),
+            scene=scene,
+        )
 
 
 def _disc() -> Table:
@@ -95,14 +114,6 @@ def _rotor() -> Table:
     )
 
 
-def top_keys(balancer: Presence) -> dict[str, Key]:
-    """Keys before the first table. Args: `balancer`: how that key may be absent."""
-    return {
-        "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
-        "balancer": Key(takes=choice(Balancer), presence=balancer),
-    }
-
-
 def _half_width_of(table: str, key: Key) -> Key:
     rule = "that of the known liquid" if table == "liquid" else "exact"
     dimension = key.takes.dimension if isinstance(key.takes, Reader) else None
@@ -122,7 +133,7 @@ def _uncertainty(tables: Mapping[str, Table]) -> Table:
     return Table(text=_UNCERTAINTY, keys=keys)
 
 
-def uncertainty_by_table(tables: Mapping[str, Table]) -> Table:
+def _uncertainty_by_table(tables: Mapping[str, Table]) -> Table:
     """[uncertainty] with a table of half-widths for each table, where tables share names of keys."""
     keys = {
         table: {name: _half_width_of(table, key) for name, key in content.keys.items() if key.uncertain}
@@ -141,13 +152,6 @@ def uncertainty_by_table(tables: Mapping[str, Table]) -> Table:
     )
 
 
-def with_origins(tables: Mapping[str, Table]) -> Mapping[str, Table]:
-    """The tables, each with the key that says where its values come from."""
-    return MappingProxyType(
-        {name: replace(table, keys={**table.keys, ORIGIN: _origins(table)}) for name, table in tables.items()}
-    )
-
-
 def _origins(table: Table) -> Key:
     meaning = unused("given", "where the value comes from")
     each = Key(takes=choice(Origin), presence=meaning)
@@ -161,29 +165,32 @@ _TOLERANCE = Key(
     takes=share(Bounds(above=0, below=1), example=0.01),
     presence=standard("1 %", "relative bound on discretisation and left-out terms, against the top model"),
 )
-RUN = {
-    "run": table_of(loop_models.RunSettings, "a simulation's seed and end"),
+_RUN = {
+    "run": Table.of(loop_models.RunSettings, "a simulation's seed and end"),
     "accuracy": Table(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
-    "measured": table_of(
+    "measured": Table.of(
         Measured, "the measurements that `ringbalance fit` has fitted the scene to; `fit --save` writes it"
     ),
 }
+
+
 _LIQUID_RING = {
     "disc": _disc(),
-    "liquid": table_of(models.Liquid, "the balancing liquid"),
-    "tube": table_of(models.Tube, "the tube that connects two opposite chambers"),
-    "gas": table_of(models.Gas, "the gas that drives the liquid"),
-    "environment": table_of(loop_models.Environment, "gravity and how the shaft lies in it"),
+    "liquid": Table.of(models.Liquid, "the balancing liquid"),
+    "tube": Table.of(models.Tube, "the tube that connects two opposite chambers"),
+    "gas": Table.of(models.Gas, "the gas that drives the liquid"),
+    "environment": Table.of(loop_models.Environment, "gravity and how the shaft lies in it"),
     "rotor": _rotor(),
-    "sensor": table_of(loop_models.Sensor, "the vibration sensor; exact when left out"),
-    "controller": table_of(loop_models.ControllerSettings, "the control algorithm"),
-    "requirement": table_of(
+    "sensor": Table.of(loop_models.Sensor, "the vibration sensor; exact when left out"),
+    "controller": Table.of(loop_models.ControllerSettings, "the control algorithm"),
+    "requirement": Table.of(
         loop_models.Requirement, "what is required of the balancer; reports compare it with what is reached"
     ),
 }
-LIQUID_RING = Schema(
-    top=MappingProxyType(top_keys(standard("liquid_ring", "kind of balancer"))),
-    tables=with_origins({**_LIQUID_RING, "uncertainty": _uncertainty(_LIQUID_RING), **RUN}),
+LIQUID_RING = Schema.of(
+    _LIQUID_RING,
+    balancer=standard("liquid_ring", "kind of balancer"),
+    uncertainty=_uncertainty(_LIQUID_RING),
     scene=models.Scene,
 )
 """A scene whose balancer is a liquid ring."""

@@ -15,7 +15,7 @@ from threading import Thread
 from types import TracebackType
 from typing import Final, ParamSpec, TypeVar
 
-from ringbalance.scene.faults import option_error
+from ringbalance.scene.faults import SceneError
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -69,6 +69,10 @@ class Workers(ProcessPoolExecutor):
                 _LOG.warning(_WORKER_ENDED)
         return again()
 
+    def taken(self, future: Future[_R], here: Callable[[], _R]) -> _R:
+        """What a worker returns; what none has begun, this process does."""
+        return here() if future.cancel() else self.result(future, here)
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
@@ -83,7 +87,7 @@ def checked_workers(workers: int) -> int:
     """The number of processes that the option `--workers` asks for. Raises: SceneError: below one."""
     if workers < 1:
         problem = "there is no process to work"
-        raise option_error(
+        raise SceneError.of_option(
             option="--workers", value=workers, problem=problem, allowed="a whole number of at least 1"
         )
     return workers

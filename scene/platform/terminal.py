@@ -1,14 +1,37 @@
-"""The console that every command prints to: tables that fit the encoding, readers that may go away."""
+"""What a command shows: a console for its results, a console for messages, progress and the time taken.
+
+Progress goes to standard error: a bar on a terminal, elsewhere a line now and then; a run shorter than ten
+seconds that writes to no terminal says nothing.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event, Thread
+from time import monotonic
+from typing import Any, Final
 
 from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn
 from rich.text import Text
 
+FIRST_LINE: Final = 10.0
+"""Seconds without a terminal before the first line."""
+NEXT_LINE: Final = 30.0
+"""Seconds from one line to the next."""
+_LOADED: Final = time.perf_counter()
+_STAT: Final = Path("/proc/self/stat")
+_STARTED_AT: Final = 19
+"""Of the fields behind the program's name in brackets: ticks from the machine's start to the process's."""
 
-class Terminal(Console):
+
+class _Terminal(Console):
     """A rich console over standard output (results) or standard error (messages)."""
 
     def on_broken_pipe(self) -> None:
@@ -31,11 +54,73 @@ class Terminal(Console):
         return text.encode(self.encoding, errors).decode(self.encoding, "surrogateescape")
 
 
-def results_console() -> Terminal:
+def results_console() -> Console:
     """Standard output, for results."""
-    return Terminal()
+    return _Terminal()
 
 
-def messages_console() -> Terminal:
+def messages_console() -> Console:
     """Standard error, for progress and messages."""
-    return Terminal(stderr=True)
+    return _Terminal(stderr=True)
+
+
+class Activity:
+    """What a command is doing at present; lives inside one `activity`.
+
+    Args: `text`: what it does first. `bar`: the display on a terminal.
+    """
+
+    def __init__(self, text: str, bar: Progress) -> None:
+        self.text = text
+        self._bar = bar
+        self._task: TaskID = bar.add_task(escape(text), total=None)
+
+    def show(self, text: str, *, done: float | None = None, total: float | None = None) -> None:
+        """Replace what is shown.
+
+        Args: `text`: the activity, with its numbers. `done`: amount of work that is done. `total`: amount of
+            work altogether, in the same unit; None where it is not known.
+        """
+        self.text = text
+        self._bar.update(self._task, description=escape(text), completed=done, total=total)
+
+
+@contextmanager
+def activity(command: str, text: str) -> Iterator[Activity]:
+    """Show what a command is doing while a block runs.
+
+    Args: `command`: its name, which begins each line. `text`: what it does first.
+    Yields: The activity, to be kept up to date.
+    """
+    console = messages_console()
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        shown, ended = Activity(text, bar), Event()
+        lines = Thread(target=_write_lines, args=(command, shown, ended), daemon=True)
+        if not console.is_terminal:
+            lines.start()
+        try:
+            yield shown
+        finally:
+            ended.set()
+
+
+def _write_lines(command: str, shown: Activity, ended: Event) -> None:
+    start, wait = monotonic(), FIRST_LINE
+    while not ended.wait(wait):
+        try:
+            sys.stderr.write(f"{command}: {shown.text} ({monotonic() - start:.0f} s)\n")
+            sys.stderr.flush()
+        except (AttributeError, OSError, ValueError):  # closed, or none at all: nobody reads it
+            return
+        wait = NEXT_LINE
+
+
+def since_start() -> float:
+    """Wall time since this process began, s; where the system does not tell, since this module was loaded."""
+    try:
+        fields = _STAT.read_text(encoding="utf-8").rpartition(")")[2].split()
+        begun = int(fields[_STARTED_AT]) / os.sysconf("SC_CLK_TCK")
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - begun
+    except (OSError, ValueError, IndexError, AttributeError):
+        return time.perf_counter() - _LOADED

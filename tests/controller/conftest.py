@@ -243,3 +243,20 @@ def pulse() -> Callable[..., Passage]:
         return pass_time(dynamics, fill=fill, total=0.5, instants=instants, **given)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def resumed() -> Callable[..., Passage]:
+    """The interval after another one, from the state in which that ended."""
+
+    def make(dynamics: Dynamics, before: Passage, duration: float) -> Passage:
+        return pass_time(
+            dynamics,
+            fill=before.fill,
+            total=0.5,
+            primed=before.primed,
+            motion=before.motion,
+            instants=np.array([duration]),
+        )
+
+    return make

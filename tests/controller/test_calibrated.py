@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.controller.ensemble.samples import member_uncertainty
+from ringbalance.controller.ensemble.samples import MemberUncertainty
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive, Event
 from ringbalance.controller.loop import simulate
@@ -107,6 +107,6 @@ def test_the_moment_is_as_uncertain_as_the_measured_factor(
         uncertainty=(InputUncertainty(quantity="lambda_factor", half_width=0.04, relative=False),),
     )
     known = replace(measured, uncertainty=())
-    with_factor, without = (member_uncertainty(asked, calibrated) for asked in (measured, known))
+    with_factor, without = (MemberUncertainty.of(asked, calibrated) for asked in (measured, known))
     assert with_factor.moment == pytest.approx(np.hypot(without.moment, 0.05))
     assert "lambda's factor" in with_factor.sources[1]

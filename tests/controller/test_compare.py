@@ -12,9 +12,8 @@ import pytest
 from ringbalance.cli import main
 from ringbalance.controller.compare import compare
 from ringbalance.controller.compare_cli import tuned_text
-from ringbalance.controller.compare_rotor import own_scene, rotor_of, scene_on
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import influence, steady_whirl
+from ringbalance.controller.compare_rotor import OneRotor, own_scene
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import (
@@ -43,13 +42,13 @@ def small() -> EccentricScene:
 
 def test_eccentric_masses_on_the_liquid_rings_rotor(paper_scene: Scene, driven: EccentricScene) -> None:
     """Speed, influence coefficient and lag, first vibration, noise and limit are those of the other scene."""
-    told = eccentric_scene(scene_on(rotor_of(paper_scene), driven))
+    told = eccentric_scene(OneRotor.of(paper_scene).scene(driven))
     speed = told.rotor.speed_profile[0].speed
     assert speed == paper_scene.rotor.speed
-    found = influence(plant_parameters(told), speed)
+    found = PlantParameters.of(told).influence(speed)
     assert abs(found) == pytest.approx(0.0108, rel=1e-12)
     assert math.degrees(-cmath.phase(found)) == pytest.approx(17.0, rel=1e-12)
-    whirl = steady_whirl(plant_parameters(told), speed, told.masses.initial_angle)
+    whirl = PlantParameters.of(told).steady_whirl(speed, told.masses.initial_angle)
     assert abs(whirl) == pytest.approx(10e-6, rel=1e-9)
     assert math.degrees(cmath.phase(whirl)) == pytest.approx(90.0, rel=1e-9)
     assert told.rotor.mass == pytest.approx(driven.rotor.mass)
@@ -64,7 +63,7 @@ def test_eccentric_masses_on_the_liquid_rings_rotor(paper_scene: Scene, driven: 
 
 def test_the_scene_made_for_that_rotor_has_it_already(paper_scene: Scene, small: EccentricScene) -> None:
     """What the comments of the small scene say its numbers come from."""
-    told = eccentric_scene(scene_on(rotor_of(paper_scene), small))
+    told = eccentric_scene(OneRotor.of(paper_scene).scene(small))
     assert told.rotor.stiffness == pytest.approx(small.rotor.stiffness, rel=1e-5)
     assert told.rotor.damping == pytest.approx(small.rotor.damping, rel=1e-5)
     assert told.imbalance.mass == pytest.approx(small.imbalance.mass, rel=1e-4)
@@ -82,9 +81,9 @@ def test_a_liquid_ring_on_the_eccentric_masses_rotor(paper_scene: Scene, small: 
         ),
     )
     other = replace(small, rotor=replace(small.rotor, stiffness=2 * small.rotor.stiffness))
-    told = liquid_ring_scene(scene_on(rotor_of(other), wrong))
-    parameters = plant_parameters(other)
-    alpha = influence(parameters, small.rotor.speed_profile[0].speed)
+    told = liquid_ring_scene(OneRotor.of(other).scene(wrong))
+    parameters = PlantParameters.of(other)
+    alpha = parameters.influence(small.rotor.speed_profile[0].speed)
     assert told.rotor.influence_coefficient == pytest.approx(abs(alpha))
     assert told.rotor.lag_angle == pytest.approx(-cmath.phase(alpha))
     assert told.rotor.initial_amplitude == pytest.approx(abs(alpha) * parameters.unbalance)
@@ -104,7 +103,7 @@ def test_a_liquid_ring_on_its_own_rotor_is_left_alone(paper_scene: Scene) -> Non
 def test_eccentric_masses_start_in_steady_whirl_at_constant_speed(driven: EccentricScene) -> None:
     told = eccentric_scene(own_scene(driven))
     assert [corner.speed for corner in told.rotor.speed_profile] == pytest.approx([100 * RPM])
-    decay = told.rotor.damping / (2 * plant_parameters(told).mass)
+    decay = told.rotor.damping / (2 * PlantParameters.of(told).mass)
     assert math.exp(-decay * told.supervisor.start) < 1e-5
     assert told.run.time_limit == pytest.approx(driven.run.time_limit + told.supervisor.start)
 
@@ -123,20 +122,20 @@ def _at(driven: EccentricScene, speed: float) -> EccentricScene:
 
 def test_what_cannot_be_compared(driven: EccentricScene, paper_scene: Scene) -> None:
     with pytest.raises(SceneError, match="does not turn forwards"):
-        rotor_of(_at(driven, 0.0))
+        OneRotor.of(_at(driven, 0.0))
     with pytest.raises(SceneError, match="does not turn forwards"):
-        rotor_of(_at(driven, -10.0))
+        OneRotor.of(_at(driven, -10.0))
     with pytest.raises(SceneError, match="never becomes steady"):
-        rotor_of(replace(driven, rotor=replace(driven.rotor, damping=0.0)))
+        OneRotor.of(replace(driven, rotor=replace(driven.rotor, damping=0.0)))
     with pytest.raises(SceneError, match="does not vibrate"):
-        rotor_of(replace(driven, imbalance=replace(driven.imbalance, mass=0.0)))
+        OneRotor.of(replace(driven, imbalance=replace(driven.imbalance, mass=0.0)))
     ahead = replace(paper_scene, rotor=replace(paper_scene.rotor, lag_angle=-0.3))
     with pytest.raises(SceneError, match=r"no bearing of this kind gives a lag of -17\.19 deg"):
-        scene_on(rotor_of(ahead), driven)
-    light = rotor_of(replace(driven, rotor=replace(driven.rotor, mass=0.2)))
+        OneRotor.of(ahead).scene(driven)
+    light = OneRotor.of(replace(driven, rotor=replace(driven.rotor, mass=0.2)))
     heavy = replace(driven, masses=replace(driven.masses, mass=3.0))
     with pytest.raises(SceneError, match="heavier than the rotor itself"):
-        scene_on(light, heavy)
+        light.scene(heavy)
 
 
 def test_two_liquid_rings(paper_scene: Scene) -> None:
@@ -194,7 +193,7 @@ def test_the_small_masses_balance_the_liquid_rings_rotor_with_every_seed(
     paper_scene: Scene, small: EccentricScene
 ) -> None:
     """With seed 3 a friction arm is estimated 1.3 % too small: 2.5 of its standard deviations."""
-    told = eccentric_scene(scene_on(rotor_of(paper_scene), small))
+    told = eccentric_scene(OneRotor.of(paper_scene).scene(small))
     brief = replace(told, run=replace(told.run, time_limit=5.0))
     for seed in range(5):
         assert simulate_eccentric(brief, seed=seed).settled

@@ -17,7 +17,7 @@ from ringbalance.controller.liquid_ring import compiled_column
 from ringbalance.controller.liquid_ring.compiled_gas import line_rates
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
-from ringbalance.physics.gas.supply import GasLine
+from ringbalance.physics.gas import GasLine
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime

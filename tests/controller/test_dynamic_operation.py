@@ -12,10 +12,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ringbalance.controller.liquid_ring.column import Column, column_of
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
-from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Motion
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.loop import simulate
@@ -41,7 +40,7 @@ def test_a_lag_is_an_exact_delay(
 ) -> None:
     own = model if law == "paper" else calibrated
     ring = LiquidRing(model=own, chambers=4, gas_pressure=0.7e6, integrator=quadrature)
-    start = initial_state(disc=scene.disc)
+    start = DiscState.initial(disc=scene.disc)
     prompt = ring.advance(start, gas_times={0: 0.3}, duration=0.3, points=30)
     late = replace(ring, dynamics=plant(own, "valve lag", valve_lag=0.04))
     begun = late.advance(start, gas_times={0: 0.3}, duration=0.3, points=30)
@@ -239,19 +238,14 @@ def test_an_operation_with_all_terms_against_scipy(
 # --- how an operation's tail runs on ---
 
 
-def test_a_stretch_may_be_cut_anywhere(calibrated: BalancerModel, plant: Plant, pulse: Pulse) -> None:
+def test_a_stretch_may_be_cut_anywhere(
+    calibrated: BalancerModel, plant: Plant, pulse: Pulse, resumed: Callable[..., Passage]
+) -> None:
     own = plant(calibrated, "tube inertia", "gas filling", "valve lag", valve_lag=0.007, **PIPED)
     whole = pulse(own, 0.05, np.array([0.4]))
     for cut in (0.003, 0.03, 0.0572, 0.08):
         first = pulse(own, 0.05, np.array([cut]))
-        second = pass_time(
-            own,
-            fill=first.fill,
-            total=0.5,
-            primed=first.primed,
-            motion=first.motion,
-            instants=np.array([0.4 - cut]),
-        )
+        second = resumed(own, first, 0.4 - cut)
         assert second.fill == pytest.approx(whole.fill, abs=1e-9)
         assert second.motion.record.work == pytest.approx(whole.motion.record.work, rel=1e-6)
 
@@ -392,5 +386,5 @@ def test_energy_is_pressure_times_displaced_volume(scene: Scene, model: Balancer
 
 
 def test_a_column_is_only_made_for_laws_with_forces(scene: Scene, laws: Any) -> None:
-    assert column_of(law=laws["constant"], tube=scene.tube) is None
-    assert isinstance(column_of(law=calibrate(scene).flow_law, tube=scene.tube), Column)
+    assert Column.of(law=laws["constant"], tube=scene.tube) is None
+    assert isinstance(Column.of(law=calibrate(scene).flow_law, tube=scene.tube), Column)

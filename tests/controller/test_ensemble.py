@@ -16,26 +16,19 @@ import pytest
 
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.ensemble.compiled_noise import member_noise
-from ringbalance.controller.ensemble.moment import moment_table
+from ringbalance.controller.ensemble.moment import MomentTable
 from ringbalance.controller.ensemble.monte_carlo import (
     QUANTILES,
-    binomial_share,
+    Probability,
     simulate_ensemble,
     simulate_members,
 )
-from ringbalance.controller.ensemble.samples import (
-    BLOCK,
-    Members,
-    MemberUncertainty,
-    drawn_members,
-    member_uncertainty,
-    members_alike,
-)
-from ringbalance.controller.ensemble.transfer import pair_transfer
+from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
+from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.sensor import Sensor
+from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -94,7 +87,7 @@ def alone(scene: Scene, model: BalancerModel, members: Members, member: int) -> 
 def various(scene: Scene, *, size: int) -> Members:
     """Members that differ in everything, some of them badly: overshooting, and with a wrong lag."""
     random = np.random.default_rng(11)
-    base = members_alike(scene, size=size)
+    base = Members.alike(scene, size=size)
     lag = base.lag_angle + random.uniform(-0.4, 0.4, size)
     lag[-1] += 2.5
     return Members(
@@ -170,7 +163,7 @@ def test_the_table_gives_the_fills_of_the_quadrature(
     model: BalancerModel, laws: Mapping[str, Any], name: str
 ) -> None:
     other = replace(model, flow=laws[name])
-    transfer = pair_transfer(model=other, total=0.5, gas_pressure=1e5)
+    transfer = PairTransfer.of(model=other, total=0.5, gas_pressure=1e5)
     rate = model.tube_area / model.chamber_volume
     times = np.array([1e-3, 0.05, 0.4, 1.5, 4.0])
     worst = 0.0
@@ -184,7 +177,7 @@ def test_the_table_gives_the_fills_of_the_quadrature(
 
 
 def test_the_closed_form_ends_where_it_stalls(model: BalancerModel) -> None:
-    paper = pair_transfer(model=model, total=0.5, gas_pressure=0.1e6)
+    paper = PairTransfer.of(model=model, total=0.5, gas_pressure=0.1e6)
     # Eq. 19 at 0.1 MPa stalls where the levels differ by 0.1/0.763.
     law = model.flow
     assert isinstance(law, PaperLaw)
@@ -204,7 +197,7 @@ def test_the_moment_table_is_the_curve(model: BalancerModel) -> None:
         def pair_vector(self, *, fill_ratio: Any, opposite_fill_ratio: Any) -> Any:
             return of(fill_ratio) - of(opposite_fill_ratio)
 
-    table = moment_table(model=replace(model, moment=Curve()), total=0.5)
+    table = MomentTable.of(model=replace(model, moment=Curve()), total=0.5)
     x = np.random.default_rng(0).uniform(0, 0.5, 200)
     assert np.max(np.abs(table.at(x) - of(x) + of(0.5 - x))) < 1e-10
 
@@ -253,8 +246,8 @@ def test_the_same_seed_gives_the_same_numbers_for_any_threads(scene: Scene, mode
 
 def test_a_larger_ensemble_begins_with_the_smaller(scene: Scene, model: BalancerModel) -> None:
     asked = noisy(scene, time_limit=10.0)
-    uncertainty_95 = member_uncertainty(asked, model)
-    drawn = drawn_members(asked, uncertainty_95=uncertainty_95, seed=1, block=0)
+    uncertainty_95 = MemberUncertainty.of(asked, model)
+    drawn = Members.drawn(asked, uncertainty_95=uncertainty_95, seed=1, block=0)
     a, b = (simulate_members(asked, model, members=drawn.first(n), seed=1) for n in (7, 50))
     assert np.array_equal(a.settling_time, b.settling_time[:7])
     counted = simulate_ensemble(asked, model, 50, 1)
@@ -305,7 +298,7 @@ def test_more_uncertainty_more_overshoot(scene: Scene, model: BalancerModel) -> 
 
 def test_members_are_drawn_with_the_half_widths(scene: Scene) -> None:
     uncertainty_95 = MemberUncertainty(velocity=0.1, moment=0.02, influence_coefficient=0.2, lag_angle=0.05)
-    drawn = drawn_members(scene, uncertainty_95=uncertainty_95, seed=0, block=0)
+    drawn = Members.drawn(scene, uncertainty_95=uncertainty_95, seed=0, block=0)
     for values, low, high in (
         (drawn.velocity_factor, 1 / 1.1, 1.1),
         (drawn.moment_factor, 1 / 1.02, 1.02),
@@ -317,7 +310,7 @@ def test_members_are_drawn_with_the_half_widths(scene: Scene) -> None:
 
 
 def test_the_spread_says_where_it_comes_from(scene: Scene, model: BalancerModel) -> None:
-    found = member_uncertainty(replace(scene, uncertainty=()), model)
+    found = MemberUncertainty.of(replace(scene, uncertainty=()), model)
     # k = 50 within 10 %: (k + 1) within 5/51, the velocity within half of that.
     assert found.velocity == pytest.approx(5 / 51 / 2)
     assert all("assumed" in source for source in found.sources[2:])
@@ -325,10 +318,10 @@ def test_the_spread_says_where_it_comes_from(scene: Scene, model: BalancerModel)
 
 def test_a_share_has_its_interval() -> None:
     # Wilson's interval for 5 of 50.
-    found = binomial_share(count=5, of=50)
+    found = Probability.counted(count=5, of=50)
     assert (found.low, found.high) == pytest.approx((0.0435, 0.2136), abs=2e-4)
-    assert binomial_share(count=0, of=100).low == 0.0
-    assert binomial_share(count=0, of=100).high == pytest.approx(0.037, abs=1e-3)
+    assert Probability.counted(count=0, of=100).low == 0.0
+    assert Probability.counted(count=0, of=100).high == pytest.approx(0.037, abs=1e-3)
 
 
 def test_the_document_is_small_clean_json(scene: Scene, model: BalancerModel) -> None:

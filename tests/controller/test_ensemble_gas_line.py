@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.ensemble.samples import drawn_members, member_uncertainty, members_alike
+from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import InputUncertainty, Scene
@@ -64,7 +64,7 @@ def test_a_members_own_gas_line_moves_the_plant_and_not_what_the_controller_know
     """A slower and a faster line, each as a scene of its own with the nominal offset."""
     asked = piped(scene, 0.02)
     factors = np.array([[1.0, 0.7, 1.3], [1.0, 1.2, 0.9], [1.0, 2.0, 0.5], [1.0, 1.6, 0.8]])
-    members = replace(members_alike(asked, size=3), gas_line=factors)
+    members = replace(Members.alike(asked, size=3), gas_line=factors)
     found = simulate_members(asked, calibrated, members=members)
     amplitude = found.final_amplitude
     assert abs(amplitude[1] - amplitude[0]) > 0.05e-6
@@ -84,9 +84,9 @@ def test_a_stated_uncertainty_of_the_gas_line_is_drawn(scene: Scene, model: Bala
     asked = replace(
         piped(scene, 0.02), uncertainty=(own("conductance", 0.2, True), own("valve_lag", 0.001, False))
     )
-    width = member_uncertainty(asked, model)
+    width = MemberUncertainty.of(asked, model)
     assert width.gas_line == pytest.approx({"conductance": 0.2, "valve_lag": 0.2})
-    line = drawn_members(asked, uncertainty_95=width, seed=0, block=0).gas_line
+    line = Members.drawn(asked, uncertainty_95=width, seed=0, block=0).gas_line
     assert line is not None
     for row, factor in zip(line, (1.2, 1.0, 1.0, 1.2), strict=True):
         assert np.mean((row >= 1 / factor) & (row <= factor)) == pytest.approx(
@@ -94,8 +94,8 @@ def test_a_stated_uncertainty_of_the_gas_line_is_drawn(scene: Scene, model: Bala
         )
     # What was drawn before is drawn as before.
     alone = replace(asked, uncertainty=())
-    plain = drawn_members(alone, uncertainty_95=replace(width, gas_line={}), seed=0, block=0)
-    again = drawn_members(asked, uncertainty_95=width, seed=0, block=0)
+    plain = Members.drawn(alone, uncertainty_95=replace(width, gas_line={}), seed=0, block=0)
+    again = Members.drawn(asked, uncertainty_95=width, seed=0, block=0)
     assert plain.gas_line is None
     assert np.array_equal(plain.velocity_factor, again.velocity_factor)
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.gas_use import gas_use
+from ringbalance.controller.gas_use import GasUse
 from ringbalance.controller.liquid_ring.interval import Passage
 from ringbalance.controller.liquid_ring.motion import Dynamics
-from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.loop import simulate
@@ -194,25 +194,25 @@ def test_a_pressure_on_the_axis_counts_with_its_column(
 
 def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene) -> None:
     ring = LiquidRing(model=model, chambers=4, gas_pressure=0.7e6, integrator=quadrature)
-    advance = ring.advance(initial_state(disc=scene.disc), gas_times={0: 4.0}, duration=4.0, points=4000)
+    advance = ring.advance(DiscState.initial(disc=scene.disc), gas_times={0: 4.0}, duration=4.0, points=4000)
     (operation,) = advance.operations
     assert operation.event is Event.EMPTY
     emptied = float(advance.instants[np.argmax(advance.fill_ratio[0] == 0)])
     assert operation.run_dry == pytest.approx(4.0 - emptied, abs=2e-3)
-    found = gas_use(scene=scene, model=model, operations=advance.operations)
+    found = GasUse.of(scene=scene, model=model, operations=advance.operations)
     # A choked nozzle of 1.5 mm at 0.801 MPa and 20 degC passes 3.34 g/s of air at the most, 1.2929 kg/m^3.
     grams = 0.0404 * math.pi / 4 * 1.5e-3**2 * 801325.0 / math.sqrt(293.15)
     assert found.passed_through == pytest.approx(grams * operation.run_dry / 1.2929, rel=2e-3)
     assert found.below_residual == found.run_dry == 1
     assert "1 of them ran it dry" in found.warning
     (brief,) = ring.advance(
-        initial_state(disc=scene.disc), gas_times={0: 0.1}, duration=0.1, points=1
+        DiscState.initial(disc=scene.disc), gas_times={0: 0.1}, duration=0.1, points=1
     ).operations
-    assert gas_use(scene=scene, model=model, operations=[brief]).warning == ""
+    assert GasUse.of(scene=scene, model=model, operations=[brief]).warning == ""
     residual = found.residual_fill_ratio
     assert 0 < residual < 0.2
     low = replace(brief, fill_after=0.9 * residual)
-    assert "below a fill ratio of" in gas_use(scene=scene, model=model, operations=[low]).warning
+    assert "below a fill ratio of" in GasUse.of(scene=scene, model=model, operations=[low]).warning
     # The supply adds its gauge pressure to the ambient gas that was there.
     content = 0.7e6 * model.chamber_volume / AMBIENT * 273.15 / scene.gas.temperature
     assert found.normal_volume == pytest.approx(content + found.passed_through)
@@ -226,11 +226,11 @@ def test_with_a_line_the_chamber_runs_dry_too(calibrated: BalancerModel, plant: 
         integrator=quadrature,
         dynamics=plant(calibrated, "gas filling", "tube inertia", conductance=1e-8, critical_ratio=0.3),
     )
-    begun = ring.advance(initial_state(disc=scene.disc), gas_times={0: 2.0}, duration=2.0, points=4000)
+    begun = ring.advance(DiscState.initial(disc=scene.disc), gas_times={0: 2.0}, duration=2.0, points=4000)
     operation = begun.operations[0]
     emptied = float(begun.instants[np.argmax(begun.fill_ratio[0] < 1e-12)])
     assert operation.run_dry == pytest.approx(2.0 - emptied, abs=2e-3)
-    brief = ring.advance(initial_state(disc=scene.disc), gas_times={0: 0.01}, duration=0.01, points=1)
+    brief = ring.advance(DiscState.initial(disc=scene.disc), gas_times={0: 0.01}, duration=0.01, points=1)
     done = brief.operations[0]
     # Choked, so the pressure rises by C p_0 p_1/V until the valve shuts.
     volume = 0.75 * calibrated.chamber_volume

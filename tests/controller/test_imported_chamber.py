@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.ensemble.samples import members_alike
+from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.loop import simulate
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.law.building import nominal_law
@@ -62,7 +62,7 @@ def test_chambers_beside_their_middles_act_as_a_rotor_with_less_lag(exact: Scene
 def test_a_member_of_an_ensemble_is_the_run(exact: Scene, model: BalancerModel, most: float) -> None:
     bent = replace(model, moment=Bent(model.moment, ANGLE, most))
     run, plain = (simulate(exact, m) for m in (bent, model))
-    found = simulate_members(exact, bent, members=members_alike(exact, size=2))
+    found = simulate_members(exact, bent, members=Members.alike(exact, size=2))
     assert abs(run.amplitude[-1] - plain.amplitude[-1]) > 1e-8
     assert found.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=1e-13)
     assert found.samples[0] == len(run.samples)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
-from ringbalance.controller.algorithms.law_based import InfluenceEstimate, updated
+from ringbalance.controller.algorithms.law_based import InfluenceEstimate
 from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
 from ringbalance.controller.liquid_ring.closed_form import closed_form
 from ringbalance.controller.liquid_ring.opening import gas_time
@@ -145,8 +145,7 @@ def test_what_no_pair_can_give_is_asked_of_those_at_their_ends() -> None:
 
 
 def learn(*, k: complex, seen: complex, noise: float, standard_deviation: float = 0.0) -> InfluenceEstimate:
-    return updated(
-        InfluenceEstimate(value=k, variance=abs(0.5 * k) ** 2),
+    return InfluenceEstimate(value=k, variance=abs(0.5 * k) ** 2).updated(
         moment_change=2e-4 + 1e-4j,
         vibration_change=seen * (2e-4 + 1e-4j),
         noise_variance=noise,
@@ -184,8 +183,7 @@ def test_the_average_of_many_noisy_responses_is_the_coefficient() -> None:
     for _ in range(400):
         change = complex(*random.standard_normal(2)) * 1e-4
         noise = complex(*random.standard_normal(2)) * 1e-6
-        estimate = updated(
-            estimate,
+        estimate = estimate.updated(
             moment_change=change,
             vibration_change=true * change + noise,
             noise_variance=2e-12,

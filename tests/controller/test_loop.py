@@ -15,7 +15,7 @@ import pytest
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.loop import MAX_SAMPLES, simulate
 from ringbalance.controller.simulation import Outcome, Simulation, Verdict
@@ -65,10 +65,8 @@ def test_proportional_control_along_one_axis_by_hand(scene: Scene, model: Balanc
         expected.append((time, gas, x, after))
         x, time = after, time + gas + 0.5
         amplitude = 10e-6 - 0.0108 * 72e-3 * 1000 * volume * (0.25 - x)
-    found = [
-        (i.time, i.operation.duration, i.operation.fill_before, i.operation.fill_after)
-        for i in run.injections
-    ]
+    gone = [(i.time, i.operation) for i in run.injections]
+    found = [(time, one.duration, one.fill_before, one.fill_after) for time, one in gone]
     assert {i.chamber for i in run.injections} == {"A"}
     assert np.array(found) == pytest.approx(np.array(expected), rel=1e-9)
     assert run.settled
@@ -356,7 +354,7 @@ def test_self_siphoning_loses_the_correction_and_is_reported(scene: Scene, sipho
 
 def test_levels_run_back_by_the_law_while_waiting(siphoning: BalancerModel, scene: Scene) -> None:
     plant = LiquidRing(model=siphoning, chambers=4, gas_pressure=1e5, integrator=quadrature)
-    state = initial_state(disc=scene.disc)
+    state = DiscState.initial(disc=scene.disc)
     driven = plant.advance(state, gas_times={2: 0.4}, duration=0.4, points=3)
     assert driven.state.pairs[0].primed
     assert not driven.state.pairs[1].primed
@@ -372,7 +370,9 @@ def test_a_pair_whose_valve_closes_first_runs_back_during_the_other(
     siphoning: BalancerModel, scene: Scene
 ) -> None:
     plant = LiquidRing(model=siphoning, chambers=4, gas_pressure=1e5, integrator=quadrature)
-    both = plant.advance(initial_state(disc=scene.disc), gas_times={0: 0.2, 1: 0.9}, duration=0.9, points=3)
+    both = plant.advance(
+        DiscState.initial(disc=scene.disc), gas_times={0: 0.2, 1: 0.9}, duration=0.9, points=3
+    )
     assert sorted(both.instants) == pytest.approx([0.2, 0.3, 0.6, 0.9])
     first = {o.chamber: o for o in both.operations}[0]
     rate = 2 * 20 * siphoning.tube_area / siphoning.chamber_volume
@@ -385,7 +385,7 @@ def test_a_pair_whose_valve_closes_first_runs_back_during_the_other(
 def test_gas_into_both_chambers_of_a_pair_is_refused(scene: Scene, model: BalancerModel) -> None:
     plant = LiquidRing(model=model, chambers=4, gas_pressure=1e5, integrator=quadrature)
     with pytest.raises(ValueError, match="one pair"):
-        plant.advance(initial_state(disc=scene.disc), gas_times={1: 0.2, 3: 0.2}, duration=0.2, points=1)
+        plant.advance(DiscState.initial(disc=scene.disc), gas_times={1: 0.2, 3: 0.2}, duration=0.2, points=1)
 
 
 def test_python_takes_a_model_or_a_law(scene: Scene, model: BalancerModel) -> None:

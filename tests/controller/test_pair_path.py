@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.ensemble.compiled_transfer import gas_off, gas_on
-from ringbalance.controller.ensemble.transfer import pair_transfer
-from ringbalance.controller.liquid_ring.pair_path import flow_paths
+from ringbalance.controller.ensemble.transfer import PairTransfer, gas_off, gas_on
+from ringbalance.controller.liquid_ring.pair_path import FlowPaths
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.reduced_model.calibration import calibrate
@@ -25,7 +24,7 @@ ODE = adaptive_ode(tolerance=1e-13)
 
 def worst_error(model: BalancerModel, *, pressure: float, total: float = 0.5, tries: int = 30) -> float:
     """Largest error in fill; a column that holds in one way and not in the other is an error of 1."""
-    shared = pair_transfer(model=model, total=total, gas_pressure=pressure).shared[0]
+    shared = PairTransfer.of(model=model, total=total, gas_pressure=pressure).shared[0]
     random, worst = np.random.default_rng(3), 0.0
     for _ in range(tries):
         on, wet = random.random() < 0.6, random.random() < 0.5
@@ -73,7 +72,7 @@ def test_every_flow_of_a_calibrated_law_is_right(slow: BalancerModel, pressure: 
 
 def test_that_disc_does_run_back(slow: BalancerModel) -> None:
     drive = Drive(law=slow.flow, fill=0.2, total=0.5, exchange_rate=0.02, gas_pressure=0.0, primed=True)
-    assert set(flow_paths(drive, primed=True).sense) >= {-1, 1}
+    assert set(FlowPaths.of(drive, primed=True).sense) >= {-1, 1}
 
 
 def test_changes_are_found_to_the_last_bit(laws: Mapping[str, Any]) -> None:
@@ -82,7 +81,7 @@ def test_changes_are_found_to_the_last_bit(laws: Mapping[str, Any]) -> None:
 
     law = replace(laws["constant"], function=steps)
     drive = Drive(law=law, fill=0.2, total=0.5, exchange_rate=0.02, gas_pressure=1e5, primed=True)
-    found = flow_paths(drive, primed=True)
+    found = FlowPaths.of(drive, primed=True)
     # The second change lies in the same cell of the scan as the first.
     assert list(found.sense) == [0, 1, 1]
     assert list(found.edges) == [0.1, 0.1001]

@@ -9,22 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
-from ringbalance.controller.liquid_ring.reach import (
-    largest_pair_moment,
-    starting_pressure,
-    unreachable_moment,
-)
-from ringbalance.controller.rotor import (
-    chamber_directions,
-    chamber_letters,
-    disc_unbalance,
-    influence,
-    vibration,
-    wrapped,
-)
+from ringbalance.controller.liquid_ring.reach import starting_pressure
+from ringbalance.controller.rotor import chamber_directions, chamber_letters, disc_unbalance, wrapped
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 
 # lambda rho V / 2 per fill difference, by hand: 72 mm, 1000 kg/m^3, V of Eq. 4.
@@ -82,15 +72,15 @@ def test_many_states_at_once_equal_one_by_one(model: BalancerModel) -> None:
 
 def test_the_vibration_lags_behind_the_unbalance(scene: Scene) -> None:
     still = replace(scene.rotor, initial_amplitude=0.0)
-    seen = complex(vibration(rotor=still, moment=1e-4 * cmath.exp(0.3j)))
+    seen = complex(still.vibration(1e-4 * cmath.exp(0.3j)))
     assert cmath.phase(seen) == pytest.approx(0.3 - math.radians(17), abs=1e-12)
     assert abs(seen) == pytest.approx(0.0108e-4, rel=1e-12)
 
 
 def test_the_opposite_moment_cancels_the_initial_vibration(scene: Scene) -> None:
-    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    k = scene.rotor.influence
     initial = 10e-6 * cmath.exp(0.5j * math.pi)
-    assert abs(complex(vibration(rotor=scene.rotor, moment=-initial / k))) < 1e-20
+    assert abs(complex(scene.rotor.vibration(-initial / k))) < 1e-20
 
 
 @pytest.mark.parametrize("turns", [-3, 0, 2])
@@ -102,38 +92,44 @@ def plant_of(model: BalancerModel, chambers: int) -> LiquidRing:
     return LiquidRing(model=model, chambers=chambers, gas_pressure=0.7e6, integrator=quadrature)
 
 
+def left_over(plant: LiquidRing, state: DiscState, rotor: Rotor, *, wanted: complex) -> float:
+    """What the disc cannot form of a moment, kg m: of a rotor that vibrates 1 m per kg m, against it."""
+    against = replace(
+        rotor,
+        influence_coefficient=1.0,
+        lag_angle=0.0,
+        initial_amplitude=abs(wanted),
+        initial_phase=cmath.phase(-wanted),
+    )
+    return plant.unreachable_vibration(state=state, rotor=against)
+
+
 @pytest.mark.parametrize("n", [4, 6, 8])
 def test_the_reach_is_the_polygon_of_full_pairs(scene: Scene, model: BalancerModel, n: int) -> None:
-    state = initial_state(disc=replace(scene.disc, chambers=n))
+    state = DiscState.initial(disc=replace(scene.disc, chambers=n))
     plant = plant_of(model, n)
-    pair = largest_pair_moment(plant=plant, state=state)
+    pair = plant.largest_pair_moment(state=state)
     assert pair == pytest.approx(PER_DIFFERENCE * 0.5, rel=1e-12)
     # All pairs full towards one corner: the side of the polygon is 2 M, its corners at M/sin(pi/n).
     corner = pair / math.sin(math.pi / n) * cmath.exp(1j * (math.pi / n if n % 4 == 0 else 0.0))
-    assert unreachable_moment(plant=plant, state=state, wanted=corner * 0.999) == 0.0
-    assert unreachable_moment(plant=plant, state=state, wanted=corner * 1.5) == pytest.approx(
+    assert left_over(plant, state, scene.rotor, wanted=corner * 0.999) == 0.0
+    assert left_over(plant, state, scene.rotor, wanted=corner * 1.5) == pytest.approx(
         abs(corner) / 2, rel=1e-9
     )
 
 
 def test_four_chambers_reach_a_square(scene: Scene, model: BalancerModel) -> None:
-    state, plant = initial_state(disc=scene.disc), plant_of(model, 4)
+    state, plant = DiscState.initial(disc=scene.disc), plant_of(model, 4)
     pair = PER_DIFFERENCE * 0.5
-    assert unreachable_moment(plant=plant, state=state, wanted=pair * (1.3 + 0.9j)) == pytest.approx(
-        0.3 * pair
-    )
-    assert unreachable_moment(plant=plant, state=state, wanted=pair * (1.3 + 1.4j)) == pytest.approx(
-        0.5 * pair
-    )
+    assert left_over(plant, state, scene.rotor, wanted=pair * (1.3 + 0.9j)) == pytest.approx(0.3 * pair)
+    assert left_over(plant, state, scene.rotor, wanted=pair * (1.3 + 1.4j)) == pytest.approx(0.5 * pair)
 
 
 def test_two_chambers_reach_a_line(scene: Scene, model: BalancerModel) -> None:
-    state = initial_state(disc=replace(scene.disc, chambers=2))
+    state = DiscState.initial(disc=replace(scene.disc, chambers=2))
     plant, pair = plant_of(model, 2), PER_DIFFERENCE * 0.5
-    assert unreachable_moment(plant=plant, state=state, wanted=0.7 * pair) == pytest.approx(0.0, abs=1e-18)
-    assert unreachable_moment(plant=plant, state=state, wanted=(0.7 + 0.2j) * pair) == pytest.approx(
-        0.2 * pair
-    )
+    assert left_over(plant, state, scene.rotor, wanted=0.7 * pair) == pytest.approx(0.0, abs=1e-18)
+    assert left_over(plant, state, scene.rotor, wanted=(0.7 + 0.2j) * pair) == pytest.approx(0.2 * pair)
 
 
 def test_the_starting_pressure_of_the_paper_is_eq_19_at_rest(model: BalancerModel) -> None:

@@ -15,7 +15,7 @@ from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.liquid_ring.closed_form import closed_form
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.rotor import disc_unbalance, vibration
+from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.simulation import Outcome, Simulation, Verdict
 from ringbalance.controller.tuning.loop_factor import (
     LoopFactor,
@@ -60,7 +60,7 @@ def test_the_rate_is_what_a_short_injection_does(scene: Scene, model: BalancerMo
 
     def seen(at: DiscState) -> complex:
         moment = disc_unbalance(moment=model.moment, fill_ratio=at.fills())
-        return complex(vibration(rotor=scene.rotor, moment=moment))
+        return complex(scene.rotor.vibration(moment))
 
     assert abs(seen(state)) < 1e-12
     rates, short = vibration_rates(scene, model), 1e-5
@@ -76,7 +76,7 @@ def test_the_balanced_fills_of_many_chambers_keep_the_residual_fill(scene: Scene
     fills = balanced_fills(eight, model)
     assert np.min(fills) == pytest.approx(residual_fill_ratio(eight, law=model.flow))
     moment = disc_unbalance(moment=model.moment, fill_ratio=(*fills, *(0.5 - fills)))
-    assert abs(complex(vibration(rotor=scene.rotor, moment=moment))) < 1e-9
+    assert abs(complex(scene.rotor.vibration(moment))) < 1e-9
 
 
 def test_the_rate_at_level_chambers_is_kappa_lambda_rho_s_u(scene: Scene, model: BalancerModel) -> None:

@@ -82,7 +82,12 @@ def test_an_integrator_excludes_terms(scene: Scene, model: BalancerModel) -> Non
 def test_a_run_states_a_bound_on_what_it_neglects_and_the_status_of_its_models(scene: Scene) -> None:
     calibrated = calibrate(scene).model
     short = replace(scene, run=replace(scene.run, time_limit=0.5 * scene.controller.period))
-    assert simulation_document(simulate(short, calibrated))["neglected"]["bound"] == 0
+    nothing = simulation_document(simulate(short, calibrated))["neglected"]
+    assert nothing["bound"] == 0
+    assert nothing["text"].startswith(
+        "no term of an injection that the scene gives numbers for is neglected; "
+    )
+    assert "0 %" not in nothing["text"]
     document = simulation_document(simulate(short, calibrated, modelled=["tube inertia"]))
     held = {row["term"]: row["estimated_contribution"] for row in document["models_used"]}
     neglected = document["neglected"]

@@ -14,9 +14,9 @@ import pytest
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.strategy.settings import strategy_settings
-from ringbalance.controller.eccentric_mass.uncertainty import drawn_plant
+from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.tuning.cli import _show
 from ringbalance.controller.tuning.eccentric import FIRST_RUNS, eccentric_settling, tune_eccentric
 from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.controller.tuning.margins import loop_margins
@@ -27,7 +27,8 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.models import InputUncertainty, Scene
-from ringbalance.scene.uncertain import half_widths, shifted
+from ringbalance.scene.platform.terminal import results_console
+from ringbalance.scene.uncertain import eccentric_drawn, half_widths, shifted
 
 MEMBERS = 300
 
@@ -216,6 +217,15 @@ def test_the_command_prints_one_document(capsys: pytest.CaptureFixture[str]) -> 
     assert "recommended gain" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("reachable", "warned"), [(True, False), (None, True), (False, True)])
+def test_a_line_whose_runs_settle_is_not_warned_of(
+    scene: Scene, reachable: bool | None, warned: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = replace(tune(scene, paper_model(scene), members=8), reachable=reachable)
+    _show(found, results_console())
+    assert ("no run is sure to reach the limit" in " ".join(capsys.readouterr().out.split())) is warned
+
+
 def test_bad_input_is_exit_code_two(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     broken = tmp_path / "broken.toml"
     broken.write_text('[disc]\nouter_radius = "4 s"\n')
@@ -267,7 +277,9 @@ def test_settling_times_of_eccentric_masses_are_those_of_whole_runs() -> None:
     for number in range(6):
         seed = scene.run.seed + number
         random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(0,)))
-        run = simulate_eccentric(drawn_plant(scene, random), seed=seed, settings=strategy_settings(scene))
+        run = simulate_eccentric(
+            eccentric_drawn(scene, random), seed=seed, settings=StrategySettings.of(scene)
+        )
         times.append(math.inf if run.settling_time is None else run.settling_time)
     assert found.times.quantiles["p50"] == sorted(times)[2]
     assert found.times.quantiles["p95"] == sorted(times)[5]
@@ -289,7 +301,7 @@ def test_drawn_plants_have_the_stated_half_widths() -> None:
     scene = washing_machine()
     widths = {each.quantity: each for each in scene.uncertainty}
     random = np.random.default_rng(3)
-    drawn = [drawn_plant(scene, random) for _ in range(2000)]
+    drawn = [eccentric_drawn(scene, random) for _ in range(2000)]
     stiffness = np.log([each.rotor.stiffness / scene.rotor.stiffness for each in drawn])
     arms = np.array([each.masses.friction_arm for each in drawn]) / scene.masses.friction_arm
     for logs, path in ((stiffness, "rotor.stiffness"), (np.log(arms[:, 0]), "masses.friction_arm")):

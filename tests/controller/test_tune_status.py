@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
-from ringbalance.controller.ensemble.monte_carlo import binomial_share
+from ringbalance.controller.ensemble.monte_carlo import Probability
 from ringbalance.controller.liquid_ring.reach import least_driven_fill
 from ringbalance.controller.tuning.loop_factor import loop_factor, usable_fill, with_driving_gas
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
@@ -38,6 +38,19 @@ def largest_amplitude(scene: Scene) -> float:
     """By hand: 1218.6 g mm of one pair, less the residual fill, times 0.0108 um/(g mm)."""
     residual = residual_fill_ratio(scene, law=paper_model(scene).flow)
     return 1218.6 * (1 - residual / 0.25) * 0.0108e-6
+
+
+@pytest.mark.parametrize(("count", "runs"), [(200, 200), (199, 200), (1999, 2000), (19, 20)])
+def test_a_fraction_of_the_runs_is_printed_no_finer_than_their_number(count: int, runs: int) -> None:
+    times = SettlingTimes(
+        runs=runs,
+        settled=Probability.counted(count=count, of=runs),
+        quantiles={"p50": 1.0, "p95": None},
+    )
+    assert times.rows(60.0) == {
+        "settling time": "50 % of runs within 1 s, 95 % of runs not reached",
+        "settled": f"{count} of {runs} runs within 60 s",
+    }
 
 
 def test_runs_that_need_more_moment_than_the_disc_has_are_counted_and_named(scene: Scene) -> None:
@@ -80,7 +93,7 @@ def test_gas_that_stalls_a_chamber_is_raised(scene: Scene) -> None:
 def test_what_keeps_most_of_the_runs_from_settling_is_named(
     scene: Scene, cause: dict[str, float], words: str
 ) -> None:
-    half = binomial_share(count=10, of=20)
+    half = Probability.counted(count=10, of=20)
     settling = SettlingTimes(runs=20, settled=half, quantiles={"p50": None, "p95": None}, **cause)
     best = Candidate(scene=scene, change="", dead=())
     found = Search(best=best, settles=False, needs=None, limit=1e-6, valve=3.0, tried=())
@@ -114,7 +127,7 @@ def test_what_settles_a_few_runs_is_recommended(
     def tried(asked: Scene, *_: object, **__: object) -> SettlingTimes:
         settings = asked.controller
         half = 0.0 if settings.proportional <= 1e5 else 0.5
-        share = binomial_share(count=8 if settles(settings) else int(8 * half), of=8)
+        share = Probability.counted(count=8 if settles(settings) else int(8 * half), of=8)
         return SettlingTimes(runs=8, settled=share, quantiles={"p50": 1.0, "p95": 1.0})
 
     monkeypatch.setattr("ringbalance.controller.tuning.search.tried", tried)
@@ -137,7 +150,7 @@ def test_ways_out_are_named_only_where_many_runs_settle(
         done = settings.limit > 0.09e-6 or (gas.conductance or 0.0) > 2.5e-8
         done = done or settings.minimum_gas_time < 0.03
         quantiles = {"p50": 1.0, "p95": 2.0 if done else None}
-        share = binomial_share(count=200 if done else 150, of=200)
+        share = Probability.counted(count=200 if done else 150, of=200)
         return SettlingTimes(runs=200, settled=share, quantiles=quantiles)
 
     monkeypatch.setattr("ringbalance.controller.tuning.search.many_runs", many)

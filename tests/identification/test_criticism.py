@@ -11,14 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.identification.criticism.law_comparison import (
-    NEEDED,
-    LawComparison,
-    compare_laws,
-    summaries,
-)
+from ringbalance.identification.criticism.law_comparison import NEEDED, LawComparison, summaries
 from ringbalance.identification.criticism.linear_fit import LinearFit
-from ringbalance.identification.criticism.patterns import LEVEL, Criticism, criticise, runs_probability
+from ringbalance.identification.criticism.patterns import LEVEL, Criticism, runs_probability
 from ringbalance.scene.arrays import FloatArray
 
 ROWS = 60
@@ -51,7 +46,7 @@ def linear_fit(measured: FloatArray, design: FloatArray, *, known: bool) -> Line
 
 
 def judged(measured: FloatArray, design: FloatArray, *, known: bool = True) -> Criticism:
-    return criticise(linear_fit(measured, design, known=known), COVARIATES)
+    return Criticism.of(linear_fit(measured, design, known=known), COVARIATES)
 
 
 DESIGN = np.column_stack([np.sqrt(PRESSURES), FILLS])
@@ -102,7 +97,7 @@ def test_a_stated_noise_that_is_too_small_is_rejected() -> None:
 def test_what_parameters_can_describe_is_no_pattern(change: tuple[float, float]) -> None:
     fit = linear_fit(np.random.default_rng(5).standard_normal(ROWS), DESIGN, known=True)
     moved = replace(fit, residuals=fit.residuals + fit.derivatives @ change)
-    plain, other = (criticise(each, {"pressure": COVARIATES["pressure"]}) for each in (fit, moved))
+    plain, other = (Criticism.of(each, {"pressure": COVARIATES["pressure"]}) for each in (fit, moved))
     same = {(f.block, f.text.split(",")[0]): f.p_value for f in plain.findings if f.test == "pattern"}
     for found in (f for f in other.findings if f.test == "pattern"):
         assert found.p_value == pytest.approx(same[found.block, found.text.split(",")[0]], rel=1e-6)
@@ -124,7 +119,7 @@ def test_few_rows_are_not_judged() -> None:
         data=np.ones(3, dtype=np.bool_),
         known_noise=np.ones(3, dtype=np.bool_),
     )
-    found = criticise(few, {"order": np.arange(3.0)})
+    found = Criticism.of(few, {"order": np.arange(3.0)})
     assert found.describes
     assert found.text.startswith("too few")
 
@@ -149,7 +144,8 @@ def test_overlapping_patterns_count_once() -> None:
     once = {"pressure": COVARIATES["pressure"]}
     twice = once | {"gas": COVARIATES["pressure"]}
     first, second = (
-        next(f for f in criticise(fit, these).findings if f.against == "pressure") for these in (once, twice)
+        next(f for f in Criticism.of(fit, these).findings if f.against == "pressure")
+        for these in (once, twice)
     )
     assert second.p_value == first.p_value
     assert second.corrected == pytest.approx(first.corrected, abs=0.03)
@@ -168,7 +164,7 @@ def _comparison(true: FloatArray, noise: float) -> Any:
         data=np.ones(24, dtype=np.bool_),
         known_noise=np.ones(24, dtype=np.bool_),
     )
-    return compare_laws(fit, other="laminar flow", residuals=(measured - factor * other) / noise)
+    return LawComparison.of(fit, other="laminar flow", residuals=(measured - factor * other) / noise)
 
 
 def test_laws_are_told_apart_where_data_allow() -> None:

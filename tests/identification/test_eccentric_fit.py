@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from ringbalance.cli import main
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.identification.criticism.review import review
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.identification.balancers import fitted_names
+from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.eccentric_parameters import fitted_names
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
@@ -83,7 +83,7 @@ def test_a_run_up_gives_back_bearing_and_imbalance(scene: EccentricScene) -> Non
         assert low < truth[each.name] < high
         assert each.verdict is Verdict.IDENTIFIED
         assert each.path == each.name
-    assert review(result).criticism.describes
+    assert Review.of(result).criticism.describes
 
 
 def test_only_the_product_of_mass_and_radius_is_identified(scene: EccentricScene) -> None:
@@ -166,17 +166,17 @@ def test_data_of_a_rotor_without_damping(scene: EccentricScene) -> None:
     """Off the critical speed: the damping of the scene, held, is told from none, and none is preferred."""
     none = eccentric_with(scene, 1e-9, name="rotor.damping")
     for true, outcome in ((scene, "fitted"), (none, "other")):
-        (law,) = review(fit(scene, data=[run_up(true, 7)], parameters=["imbalance.mass"])).laws
+        (law,) = Review.of(fit(scene, data=[run_up(true, 7)], parameters=["imbalance.mass"])).laws
         assert law.other == "a rotor without damping"
         assert law.outcome == outcome
     free = fit(scene, data=[run_up(scene, 7)], parameters=["imbalance.mass", "rotor.damping"])
-    assert review(free).laws == ()
+    assert Review.of(free).laws == ()
 
 
 def test_a_mass_reaches_the_speed_at_which_motor_and_friction_balance(scene: EccentricScene) -> None:
     """B V = C phi' + mu_f b (W + phi')^2, solved by hand; whirl moves it by less than two per cent."""
     stiff = eccentric_with(scene, 1e6, name="rotor.stiffness")
-    plant, volts, speed = plant_parameters(stiff), 9.0, 10.5
+    plant, volts, speed = PlantParameters.of(stiff), 9.0, 10.5
     times = np.array([4.0, 4.0 + 2 * math.pi / 5])
     columns = {
         "time": times,

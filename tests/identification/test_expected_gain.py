@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from ringbalance.identification.expected_gain import Candidate, Gain, expected_gains
+from ringbalance.identification.next_measurement import Candidate, Gain, expected_gains
 from ringbalance.scene.arrays import FloatArray
 
 DURATIONS = np.array([0.05, 0.1, 0.2, 0.3])

@@ -11,13 +11,12 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student_t
 from synthetic_rigs import covered, fitted, measured, observations, rig
 
-from ringbalance.controller.rotor import influence
+from ringbalance.identification.balancers import model_errors, with_model_error
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit, problem_of
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.model_errors import model_errors, with_model_error
 from ringbalance.identification.parameters import FitError
-from ringbalance.identification.predict.device import Models, models_of
+from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -43,9 +42,7 @@ def stated(scene: Scene, **half_widths: float) -> Scene:
 def weighed(scene: Scene, *, seed: int = 1) -> tuple[Observations, ComplexArray]:
     """Trial weights on a rotor that is 4 % softer than the scene says, and the vibrations."""
     random = np.random.default_rng(seed)
-    k = 1.04 * influence(
-        coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle + 0.02
-    )
+    k = 1.04 * replace(scene.rotor, lag_angle=scene.rotor.lag_angle + 0.02).influence
     noise = NOISE * (random.standard_normal(UNBALANCE.size) + 1j * random.standard_normal(UNBALANCE.size))
     seen = START + k * UNBALANCE * np.exp(1j * ANGLE) + noise
     return by_vibration(seen), seen
@@ -125,8 +122,8 @@ def test_held_inputs_widen_the_interval(paper_scene: Scene) -> None:
 
 def injected(scene: Scene, *, sd: float) -> Observations:
     """Injections with a reading of its own before and after each, and its noise stated."""
-    plan = measured("injection", scene, models_of(scene), np.random.default_rng(11))
-    found = PREDICTED["injection"].predict(scene, plan, models_of(scene))
+    plan = measured("injection", scene, Models.of(scene), np.random.default_rng(11))
+    found = PREDICTED["injection"].predict(scene, plan, Models.of(scene))
     rows, random = len(plan), np.random.default_rng(12)
     noise = sd * (random.standard_normal((2, rows)) + 1j * random.standard_normal((2, rows)))
     before, after = START + noise[0], START + found[:rows] + 1j * found[rows:] + noise[1]
@@ -150,7 +147,7 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
     The errors of the models are in the covariance.  The grid is sheared along the ridge, which keeps the area
     of its cells.
     """
-    kind, models = PREDICTED["injection"], models_of(scene)
+    kind, models = PREDICTED["injection"], Models.of(scene)
     covariance = sd**2 * np.eye(2 * len(data))
     for name in model_errors(scene):
         low, high = (kind.predict(with_model_error(scene, name, n), data, models) for n in (-1, 1))
@@ -198,7 +195,7 @@ def test_a_held_input_that_the_data_pull_off_its_statement(paper_scene: Scene) -
     plan = observations(
         "pressure", {"radius": np.linspace(0.04, 0.0445, 6), "fill_ratio": 0.25, "pressure": 1.0}
     )
-    right = PREDICTED["pressure"].predict(scene, plan, models_of(scene))
+    right = PREDICTED["pressure"].predict(scene, plan, Models.of(scene))
     data = replace(
         plan,
         columns=dict(plan.columns) | {"pressure": 1.03 * right},
@@ -291,7 +288,7 @@ def test_outliers_count_less_with_a_robust_loss(paper_scene: Scene) -> None:
 def test_a_bound_ends_an_interval(paper_scene: Scene) -> None:
     """An extra loss of zero cannot be told from a little more, and never from less than nothing."""
     scene = stated(paper_scene)
-    data = measured("flow", scene, models_of(scene), np.random.default_rng(1))
+    data = measured("flow", scene, Models.of(scene), np.random.default_rng(1))
     found = fit(scene, data=[data], parameters=["extra_loss"]).parameter("extra_loss")
     assert found.interval[0] == pytest.approx(0.0, abs=1e-9)
     assert found.at_bound[0]
@@ -326,7 +323,7 @@ def test_the_work_of_a_fit_is_bounded(paper_scene: Scene) -> None:
     scene = stated(paper_scene, bore=5e-5, influence_coefficient=8e-4)
     random = np.random.default_rng(6)
     data = [
-        measured(kind, scene, models_of(scene), random)
+        measured(kind, scene, Models.of(scene), random)
         for kind in ("trial_weight", "flow", "transfer", "injection")
     ]
     names = ["influence_coefficient", "lag_angle", "bore", "extra_loss", "lambda_factor"]

@@ -97,7 +97,8 @@ def test_the_examples_together_give_back_the_truth(balancer: str, run: Run) -> N
 
 def test_injections_alone_do_not_blame_the_bore_for_a_loss(run: Run) -> None:
     """The extra loss, zero in the scene and 1.5 in truth, is fitted where no parameters are named."""
-    _, out, _ = run(PAPER, EXAMPLES["injection"], "--json")
+    code, out, err = run(PAPER, EXAMPLES["injection"], "--json")
+    assert code == 0, err
     found = {each["name"]: each for each in json.loads(out)["parameters"]}
     assert list(found) == ["lambda_factor", "bore", "extra_loss"]
     for name, each in found.items():
@@ -122,7 +123,7 @@ def test_another_law_that_the_data_prefer_is_a_failure(run: Run, monkeypatch: py
     words = (PAPER, EXAMPLES["trial_weight"])
     for laws, expected in (((), 0), ((better,), 1)):
         found = Review(criticism=Criticism(findings=()), laws=laws)
-        monkeypatch.setattr("ringbalance.identification.cli.review", lambda _, found=found: found)
+        monkeypatch.setattr(Review, "of", lambda _, found=found: found)
         code, out, _ = run(*words)
         assert code == expected
         assert ("prefer another law" in " ".join(out.split())) == bool(laws)
@@ -161,9 +162,10 @@ def has_key(document: Any, name: str) -> bool:
 
 
 def test_the_promised_keys_are_there(run: Run) -> None:
-    _, out, _ = run(
+    code, out, err = run(
         PAPER, EXAMPLES["injection"], "--parameters", "lambda_factor,influence_coefficient", "--json"
     )
+    assert code == 0, err
     document = json.loads(out)
     section = (ROOT / "docs/commands.md").read_text().split("## `fit --json`\n")[1].split("\n## ")[0]
     promised = [name for line in section.splitlines() for name in re.findall(r"`([a-z0-9_]+)`", line)]
@@ -199,7 +201,8 @@ def test_runs_without_trial_weight_alone_identify_nothing(run: Run, tmp_path: Pa
 def test_a_value_outside_what_the_scene_states_is_named(run: Run, tmp_path: Path) -> None:
     stated = Path(PAPER).read_text(encoding="utf-8").replace('lag_angle = "3 deg"', 'lag_angle = "0.5 deg"')
     (tmp_path / "sure.toml").write_text(stated, encoding="utf-8")
-    _, out, _ = run(tmp_path / "sure.toml", EXAMPLES["trial_weight"])
+    code, out, err = run(tmp_path / "sure.toml", EXAMPLES["trial_weight"])
+    assert code == 1, err
     assert "lag_angle: the fitted value lies outside" in " ".join(out.split())
 
 
@@ -284,9 +287,11 @@ def test_no_file_that_is_read_is_replaced(place: int, run: Run, tmp_path: Path) 
 
 def test_names_are_whole_in_a_narrow_terminal(run: Run) -> None:
     scene = bundled_scene(example_measurements.SCENES["eccentric_mass"])
-    _, out, _ = run(scene, EXAMPLES["positioning"])
+    code, out, err = run(scene, EXAMPLES["positioning"])
+    assert code == 0, err
     assert re.search(r"motor\.back_emf_constant .* (yes|hardly)", out)
-    _, out, _ = run(PAPER, EXAMPLES["trial_weight"])
+    code, out, err = run(PAPER, EXAMPLES["trial_weight"])
+    assert code == 0, err
     assert re.search(r"influence_coefficient +0\.01", out)
 
 
@@ -303,10 +308,12 @@ def test_a_wrong_convention_of_amplitudes_shows_in_lambda(run: Run, tmp_path: Pa
         doubled.append(",".join(cells))
     wrong.write_text(head + "series\n" + "\n".join(doubled) + "\n", encoding="utf-8")
     words = ("--parameters", "lambda_factor", "--save", target)
-    _, out, _ = run(PAPER, wrong, *words)
+    code, out, err = run(PAPER, wrong, *words)
+    assert code == 0, err
     assert "lambda_factor: lambda follows from the geometry" in " ".join(out.split())
     assert any(each.about == "value" for each in load_scene(target).measured.findings)
-    _, out, _ = run(PAPER, EXAMPLES["injection"], *words)
+    code, out, err = run(PAPER, EXAMPLES["injection"], *words)
+    assert code == 0, err
     assert "follows from the geometry" not in " ".join(out.split())
     exact = " ".join(out.split()).split("taken as exact: ")[1].split(".")[0]
     assert {"central_angle", "extra_loss"} <= set(exact.split(", "))
@@ -336,9 +343,9 @@ def test_a_fit_that_fails_says_so(run: Run, tmp_path: Path) -> None:
         cells[place] = f"{float(cells[place]) * float(cells[pressure]) ** 3:.4f}"
         lines[i] = ",".join(cells)
     wrong.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    code, out, _ = run(PAPER, wrong, "--json")
+    code, out, err = run(PAPER, wrong, "--json")
+    assert code == 1, err
     document = json.loads(out)
-    assert code == 1
     assert document["criticism"]["describes"] is False
     worst = document["criticism"]["findings"][0]
     assert worst["fails"]
@@ -347,7 +354,8 @@ def test_a_fit_that_fails_says_so(run: Run, tmp_path: Path) -> None:
 
 def test_a_disc_with_imported_chambers(run: Run) -> None:
     """Injections of the paper's disc; a mesh has no plates that could be uncertain."""
-    _, out, _ = run(bundled_scene("imported_chamber"), EXAMPLES["transfer"])
+    code, out, err = run(bundled_scene("imported_chamber"), EXAMPLES["transfer"])
+    assert code == 1, err
     exact = " ".join(out.split()).split("taken as exact: ")[1].split(".")[0].split(", ")
     assert "plate_thickness" not in exact
     assert "inner_radius" in exact
@@ -355,7 +363,8 @@ def test_a_disc_with_imported_chambers(run: Run) -> None:
 
 def test_data_that_tell_nothing_of_a_parameter(run: Run) -> None:
     """What an injection moves does not depend on lambda."""
-    _, out, _ = run(PAPER, EXAMPLES["transfer"], "--parameters", "lambda_factor", "--json")
+    code, out, err = run(PAPER, EXAMPLES["transfer"], "--parameters", "lambda_factor", "--json")
+    assert code == 1, err
     (found,) = json.loads(out)["parameters"]
     low, high = found["interval"]
     assert high > 100 * low

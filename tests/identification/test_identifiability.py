@@ -12,8 +12,8 @@ from synthetic_rigs import READINGS, observations
 
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.identifiability import Verdict, power_text, rank
-from ringbalance.identification.predict.device import models_of
+from ringbalance.identification.identifiability import DEPENDENT, Verdict, power_text
+from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
@@ -37,7 +37,7 @@ def noisy(
 ) -> Observations:
     """What a scene measures, to a thousandth."""
     plan = observations(kind, columns, chambers)
-    found = PREDICTED[kind].predict(scene, plan, models_of(scene))
+    found = PREDICTED[kind].predict(scene, plan, Models.of(scene))
     random = np.random.default_rng(1)
     seen = found + 1e-3 * np.sqrt(np.mean(found**2)) * random.standard_normal(found.size)
     if kind == "trial_weight":
@@ -54,6 +54,12 @@ def pressures(scene: Scene, *, speeds: npt.ArrayLike | None = None) -> Observati
 def weights(scene: Scene) -> Observations:
     columns: dict[str, npt.ArrayLike] = {"unbalance": [0, 1e-4, 1e-4, 2e-4, 2e-4], "angle": [0, 1, 3, 5, 2]}
     return noisy("trial_weight", scene, columns)
+
+
+def rank(slopes: FloatArray) -> int:
+    """Number of independent directions among the columns that are not zero, each of norm one."""
+    norms = np.linalg.norm(slopes, axis=0)
+    return int(np.linalg.matrix_rank(slopes[:, norms > 0] / norms[norms > 0], tol=DEPENDENT))
 
 
 def verdicts(result: FitResult) -> dict[str, Verdict]:
@@ -112,7 +118,7 @@ def injections(
     }
     chambers = [("ABCD" * rows)[i] for i in range(rows)]
     plan = observations("injection", columns, chambers)
-    found = PREDICTED["injection"].predict(scene, plan, models_of(scene))
+    found = PREDICTED["injection"].predict(scene, plan, Models.of(scene))
     error = noise * (random.standard_normal((2, rows)) + 1j * random.standard_normal((2, rows)))
     after, before = 1e-6 + found[:rows] + 1j * found[rows:] + error[0], 1e-6 + error[1]
     readings: tuple[FloatArray, ...] = (np.abs(before), np.angle(before), np.abs(after), np.angle(after))

@@ -10,13 +10,12 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
-from ringbalance.controller.liquid_ring.plant import LiquidRing, initial_state
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
-from ringbalance.controller.rotor import disc_unbalance, influence
+from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.predict import injections, trial_weights
-from ringbalance.identification.predict.device import Models, device_of, models_of
+from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
@@ -29,12 +28,12 @@ from ringbalance.scene.uncertain import with_value
 
 
 def predicted(scene: Scene, data: Observations) -> FloatArray:
-    return PREDICTED[data.kind].predict(scene, data, models_of(scene))
+    return PREDICTED[data.kind].predict(scene, data, Models.of(scene))
 
 
 def test_the_quick_law_is_the_calibrated_one(paper_scene: Scene) -> None:
     slow = calibrated_model(paper_scene)
-    quick = device_of(paper_scene, models_of(paper_scene)).law
+    quick = Device.of(paper_scene, Models.of(paper_scene)).law
     fills = np.linspace(0.02, 0.48, 60)
     for gas in (0.0, 0.6e6, 1.2e6):
         one, other = (
@@ -63,8 +62,8 @@ def test_injections_are_those_of_the_closed_loop(paper_scene: Scene) -> None:
         integrator=quadrature,
         dynamics=dynamics_of(scene=scene, model=model, modelled=[INERTIA, HELD]),
     )
-    state, before, expected = initial_state(disc=scene.disc), 0j, []
-    k = influence(coefficient=scene.rotor.influence_coefficient, lag_angle=scene.rotor.lag_angle)
+    state, before, expected = DiscState.initial(disc=scene.disc), 0j, []
+    k = scene.rotor.influence
     for chamber, time in ((0, 0.2), (2, 0.1), (3, 0.15)):
         state = plant.advance(state, gas_times={chamber: time}, duration=3.0, points=1).state
         after = complex(k * disc_unbalance(moment=model.moment, fill_ratio=np.array(state.fills())))
@@ -81,7 +80,7 @@ def test_injections_do_not_step_as_the_crest_moves(bends: int) -> None:
     """
     scene = liquid_ring_scene(load_scene(bundled_scene("six_chamber")))
     scene = replace(scene, tube=replace(scene.tube, bends=scene.tube.bends[:1] * bends))
-    assert _misses_a_line(scene, models_of(scene)) < 2e-3
+    assert _misses_a_line(scene, Models.of(scene)) < 2e-3
 
 
 def _misses_a_line(scene: Scene, models: Models) -> float:
@@ -167,11 +166,13 @@ def test_the_vibration_without_weight_is_free_in_each_series(paper_scene: Scene)
         observations("trial_weight", {"unbalance": [0, 1e-4, 0, 1e-4], "angle": [0, 1, 0, 1]}),
         series=np.array(["a", "a", "b", "b"]),
     )
-    free = trial_weights.free(data)
+    effect = PREDICTED["trial_weight"].free
+    assert effect is not None
+    free = effect(data)
     assert np.linalg.matrix_rank(free) == 4
     alike = np.array([1, 1, 3, 3, 2, 2, -5, -5.0])
     assert np.linalg.norm(alike - free @ np.linalg.lstsq(free, alike, rcond=None)[0]) < 1e-12
-    k = influence(coefficient=paper_scene.rotor.influence_coefficient, lag_angle=paper_scene.rotor.lag_angle)
+    k = paper_scene.rotor.influence
     found = predicted(paper_scene, data)
     assert found[1] + 1j * found[5] == pytest.approx(k * 1e-4 * np.exp(1j))
 
@@ -195,14 +196,13 @@ def chain(shared: bool) -> Observations:
 def test_errors_of_readings_that_serve_twice(shared: bool) -> None:
     """Against many draws of the readings' errors."""
     data = chain(shared)
-    assert bool(injections.shared_readings(data)) is shared
     random = np.random.default_rng(5)
     if shared:
         errors = random.standard_normal((200_000, 4))
         changes = errors[:, 1:] - errors[:, :-1]
     else:
         changes = np.diff(random.standard_normal((200_000, 3, 2)), axis=2)[:, :, 0]
-    np.testing.assert_allclose(injections.covariance(data)[:3, :3], np.cov(changes.T), atol=0.03)
+    np.testing.assert_allclose(PREDICTED["injection"].covariance(data)[:3, :3], np.cov(changes.T), atol=0.03)
 
 
 def test_a_stated_noise_of_amplitude_and_phase() -> None:

@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ringbalance.identification.criticism.other_laws import LAMINAR, UNBROKEN, power_of
-from ringbalance.identification.criticism.review import review
+from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, Review, power_of
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
-from ringbalance.identification.predict.device import Models, device_of, models_of
+from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
@@ -68,19 +67,19 @@ def true(paper_scene: Scene) -> Scene:
 
 @pytest.fixture(scope="module")
 def found(paper_scene: Scene, true: Scene) -> FitResult:
-    data = transfers(true, models_of(paper_scene), seed=0)
+    data = transfers(true, Models.of(paper_scene), seed=0)
     return fit(paper_scene, data=[data], parameters=["bore", "extra_loss"])
 
 
 def test_a_right_law_is_not_criticised(found: FitResult) -> None:
-    told = review(found)
+    told = Review.of(found)
     assert told.criticism.describes
     assert {f.against for f in told.criticism.findings} >= {"pressure", "fill ratio", "valve-open time"}
     assert told.sentences[0].startswith("no pattern")
 
 
 def test_other_laws_are_told_apart_by_these_data(found: FitResult) -> None:
-    verdicts = {each.other: each for each in review(found).laws}
+    verdicts = {each.other: each for each in Review.of(found).laws}
     assert verdicts[LAMINAR].text.startswith("the data prefer the fitted law to laminar flow")
     assert verdicts[UNBROKEN].text.startswith("the data prefer the fitted law to a column that never")
 
@@ -90,13 +89,13 @@ def test_a_disc_with_another_law_is_found_out(
     paper_scene: Scene, true: Scene, exponent: float, preferred: str
 ) -> None:
     """Data of a disc whose loss follows the velocity: the fit fails, and that law is the better one."""
-    models = models_of(paper_scene)
+    models = Models.of(paper_scene)
     velocity = float(
-        device_of(paper_scene, models).law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity
+        Device.of(paper_scene, models).law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity
     )
     other = replace(models, other=lambda law: power_of(law, velocity, exponent))
     data = transfers(true, other, seed=1, known=False)
-    told = review(fit(paper_scene, data=[data], parameters=["bore", "extra_loss"]))
+    told = Review.of(fit(paper_scene, data=[data], parameters=["bore", "extra_loss"]))
     assert not told.criticism.describes
     assert "residuals of transfer.csv" in told.criticism.text
     law = next(each for each in told.laws if each.other == preferred)
@@ -121,12 +120,12 @@ def test_the_expected_gain_is_that_of_fits_made_again(paper_scene: Scene, true: 
 
     Noise is given, so that an interval depends on the draw through curvature alone: within 5 %.
     """
-    data = some(transfers(true, models_of(paper_scene), seed=0, share=0.02), [0, 6, 13, 19])
+    data = some(transfers(true, Models.of(paper_scene), seed=0, share=0.02), [0, 6, 13, 19])
     first = fit(paper_scene, data=[data], parameters=["bore"])
     told = next_measurement(first, "bore")
     offered = offered_rows(first.scene, "transfer", data)
     chosen = next(g for g in told.gains if g.candidate == words_of(offered, row))
-    volume = PREDICTED["transfer"].predict(first.scene, offered, models_of(paper_scene))
+    volume = PREDICTED["transfer"].predict(first.scene, offered, Models.of(paper_scene))
     more = replace(some(offered, [row], volume=volume[[row]]), file="more.csv")
     again = fit(paper_scene, data=[data, more], parameters=["bore"])
     widths = [r.parameters[0].profile.high - r.parameters[0].profile.low for r in (first, again)]
@@ -146,7 +145,7 @@ def test_the_saved_scene_is_the_fitted_one(found: FitResult, tmp_path: Path) -> 
     data = [b.observations for b in found.optimum.residuals.problem.blocks]
     text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
     save_result(
-        target, text=text, result=found, data=data, folder=target.parent, said=review(found).sentences
+        target, text=text, result=found, data=data, folder=target.parent, said=Review.of(found).sentences
     )
     scene = liquid_ring_scene(load_scene(target))
     assert scene.tube.bore == pytest.approx(found.parameter("bore").value, rel=1e-8)

@@ -17,8 +17,8 @@ from ringbalance.identification.saving import fitted_scene, found_from, save_fit
 from ringbalance.scene import SceneError, bundled_scene, load_scene
 from ringbalance.scene.describe import scene_table
 from ringbalance.scene.loader import scene_from
-from ringbalance.scene.measured import MeasuredFile, MeasuredFinding
 from ringbalance.scene.narrowing import eccentric_scene, liquid_ring_scene
+from ringbalance.scene.origins import MeasuredFile, MeasuredFinding
 
 FILE = MeasuredFile(file="run.csv", kind="injection", rows=40, sha256="ab" * 32)
 SCENES = ("liquid_ring_paper", "perfluorinated_oil", "six_chamber", "eccentric_mass_paper", "washing_machine")

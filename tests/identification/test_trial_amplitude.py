@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ringbalance.identification.criticism.review import review
+from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
@@ -141,8 +141,8 @@ def test_a_washer_elsewhere_would_tell_most_of_the_phase(paper_scene: Scene) -> 
 
 def test_its_vibration_is_linear_in_the_unbalance(paper_scene: Scene) -> None:
     """No pattern beyond the stated uncertainties; a vibration that grew with the square would be told."""
-    assert review(by_vectors(paper_scene)).criticism.describes
+    assert Review.of(by_vectors(paper_scene)).criticism.describes
     linear = washers()
     grown = np.array(linear.columns["amplitude"]) * np.array([1.0, 1.0, 1.0, 1.25, 1.6])
     bent = replace(linear, columns=dict(linear.columns) | {"amplitude": grown})
-    assert not review(fit(rotor(paper_scene), data=[bent])).criticism.describes
+    assert not Review.of(fit(rotor(paper_scene), data=[bent])).criticism.describes

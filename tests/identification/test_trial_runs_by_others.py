@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 from synthetic_rigs import observations
 
-from ringbalance.identification.criticism.at_solution import ORDER
-from ringbalance.identification.criticism.review import review
+from ringbalance.identification.criticism.review import ORDER, Review
 from ringbalance.identification.data.observations import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
@@ -108,5 +107,5 @@ def test_a_generator_that_does_not_repeat_itself(paper_scene: Scene, condition: 
     assert 0.2 < noise / (repeated / 2) < 2
     low, high = result.parameter("influence_coefficient").interval
     assert low < 1e-6 * abs(k) < high
-    failed = {each.against for each in review(result).criticism.findings if each.fails}
+    failed = {each.against for each in Review.of(result).criticism.findings if each.fails}
     assert failed == ({ORDER} if condition in ("no load", "excited") else set())

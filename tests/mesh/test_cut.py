@@ -27,8 +27,7 @@ from ringbalance.mesh.geometry import (
     wall_square,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
-from ringbalance.scene.chamber_file.stretching import STRETCHED, stretched
+from ringbalance.scene.chamber_file.record import STRETCHED, CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc
 from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
 
@@ -208,7 +207,7 @@ def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantit
     geometry = disc_chamber(plain, (3, 16, 2), kind="hexahedron27")
     dimensions = {name: getattr(plain, name) for name in STRETCHED}
     value = 1.02 * dimensions[quantity]
-    moved = stretched(geometry, dimensions=dimensions, quantity=quantity, value=value)
+    moved = geometry.stretched(dimensions=dimensions, quantity=quantity, value=value)
     table, fresh = (
         chamber_table(moved),
         chamber_table(replace(moved, digest=f"fresh {quantity}", stretch=None)),
@@ -230,11 +229,8 @@ def test_a_stretched_chamber_beside_its_middle_keeps_its_moment_across(disc: Dis
     x, y, z = geometry.points.T
     points = np.column_stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z])
     dimensions = {name: getattr(plain, name) for name in STRETCHED}
-    moved = stretched(
-        replace(geometry, points=points, digest="turned"),
-        dimensions=dimensions,
-        quantity=quantity,
-        value=1.05 * dimensions[quantity],
+    moved = replace(geometry, points=points, digest="turned").stretched(
+        dimensions=dimensions, quantity=quantity, value=1.05 * dimensions[quantity]
     )
     columns = chamber_table(moved).columns[:, 0]
     angle = turn * (1.05 if quantity == "central_angle" else 1.0)
@@ -244,9 +240,9 @@ def test_a_stretched_chamber_beside_its_middle_keeps_its_moment_across(disc: Dis
 def test_a_chamber_stretched_twice_comes_from_its_own_mesh(disc: Disc) -> None:
     geometry = disc_chamber(disc, (2, 8, 1), kind="hexahedron27")
     dimensions = {name: getattr(disc, name) for name in STRETCHED}
-    once = stretched(geometry, dimensions=dimensions, quantity="outer_radius", value=45e-3)
-    twice = stretched(
-        once, dimensions=dimensions | {"outer_radius": 45e-3}, quantity="axial_width", value=31e-3
+    once = geometry.stretched(dimensions=dimensions, quantity="outer_radius", value=45e-3)
+    twice = once.stretched(
+        dimensions=dimensions | {"outer_radius": 45e-3}, quantity="axial_width", value=31e-3
     )
     assert twice.stretch is not None
     assert twice.stretch.base is geometry

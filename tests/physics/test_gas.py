@@ -10,8 +10,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.gas.column import compression_work, normal_volume, pressure_factor
-from ringbalance.physics.gas.supply import GasLine, gas_line
+from ringbalance.physics.gas import GasLine, compression_work, gas_line, normal_volume, pressure_factor
 from ringbalance.scene.models import Scene
 
 AMBIENT = 101325.0

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.convergence.grid import Verdict, gci
+from ringbalance.physics.convergence import Verdict, gci
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The mixing-length solve against its own closed slope, and against measurements the formula is held to."""
+"""The mixing-length flow against roots of its own stress, and against measurements the formula is held to."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
-from ringbalance.physics.results import StatusCode
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
 from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
 
@@ -22,41 +22,43 @@ def rows(name: str) -> list[dict[str, float]]:
     return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(lines)]
 
 
-def by_quadrature(radius: float, grain: float) -> float:
-    """f from bulk = int u' (R - y)^2 dy/R^2, with u' from the quadratic that the closure is."""
+def by_roots(radius: float, grain: float) -> float:
+    """f from bulk = int u' (R - y)^2 dy/R^2, with u' as a root of the stress, (1 + l^2 u') u' = tau."""
 
     def flux(y: float) -> float:
         squared = float(mixing_length(wall_distance=y, radius=radius, grain=grain)) ** 2
         tau = 1 - y / radius
-        return float(2 * tau / (1 + np.sqrt(1 + 4 * squared * tau)) * (radius - y) ** 2)
+        return float(brentq(lambda s: (1 + squared * s) * s - tau, 0.0, 1.0, xtol=1e-15)) * tau**2
 
-    cuts = [0.0, 3.0, 12.0, 60.0, 300.0, radius]
-    bulk = sum(quad(flux, a, b, epsrel=1e-12)[0] for a, b in itertools.pairwise(cuts)) / radius**2
+    cuts = [*(y for y in (0.0, 3.0, 12.0, 60.0, 300.0) if y < radius), radius]
+    bulk = sum(quad(flux, a, b, epsrel=1e-10)[0] for a, b in itertools.pairwise(cuts))
     return float(8 / bulk**2)
 
 
+@pytest.mark.parametrize("reynolds", [3e3, 1e5, 1e7])
 @pytest.mark.parametrize("roughness", [0.0, 2e-3, 3e-2])
-def test_finite_elements_converge_to_the_quadrature_at_fourth_order(roughness: float) -> None:
-    errors = []
-    for cells in (32, 64, 128):
-        flow = mixing_length_flow(reynolds=1e5, relative_roughness=roughness, cells=cells)
-        exact = by_quadrature(flow.friction_reynolds, 2 * roughness * flow.friction_reynolds)
-        errors.append(abs(flow.friction_factor / exact - 1))
-        assert flow.reynolds == pytest.approx(1e5, rel=1e-6)
-    assert errors[-1] < 1e-6
-    assert np.log2(errors[0] / errors[-1]) / 2 > 3.3
+def test_the_rule_agrees_with_adaptive_quadrature(reynolds: float, roughness: float) -> None:
+    flow = mixing_length_flow(reynolds=reynolds, relative_roughness=roughness)
+    radius = flow.friction_reynolds
+    assert flow.friction_factor == pytest.approx(by_roots(radius, 2 * roughness * radius), rel=1e-7)
+    assert radius == pytest.approx(reynolds * np.sqrt(flow.friction_factor / 32), rel=1e-9)
+
+
+def test_a_flow_too_slow_for_turbulence_is_the_laminar_one() -> None:
+    """The mixing length vanishes with R+, so that f = 64/Re."""
+    assert mixing_length_flow(reynolds=1.0).friction_factor == pytest.approx(64.0, rel=1e-5)
 
 
 def test_literature_smooth_measurements_and_the_formula() -> None:
     """A few per cent above Re = 1e5, worse below, and 10 to 30 % near the transition: as is."""
     high = [row for row in rows("mckeon2004_oregon_smooth.csv") if row["Re"] > 6500][::4]
     for row in high:
-        found = mixing_length_flow(reynolds=row["Re"], cells=32).friction_factor
+        found = mixing_length_flow(reynolds=row["Re"]).friction_factor
         assert found == pytest.approx(row["f_darcy"], rel=0.06)
         formula = float(friction_factor(reynolds=row["Re"], relative_roughness=0))
         bar = float(friction_uncertainty(reynolds=row["Re"], relative_roughness=0))
         assert abs(found - formula) < bar
-    low = mixing_length_flow(reynolds=3000.0, cells=32).friction_factor
+    low = mixing_length_flow(reynolds=3000.0).friction_factor
     assert 1.1 < low / float(friction_factor(reynolds=3000.0, relative_roughness=0)) < 1.3
 
 
@@ -70,7 +72,7 @@ def test_literature_the_dip_of_nikuradses_sand_is_the_wall_and_not_the_formulas_
             continue
         f = float(friction_factor(reynolds=row["Re"], relative_roughness=rough))
         half_width = float(friction_uncertainty(reynolds=row["Re"], relative_roughness=rough))
-        found = mixing_length_flow(reynolds=row["Re"], relative_roughness=rough, cells=32).friction_factor
+        found = mixing_length_flow(reynolds=row["Re"], relative_roughness=rough).friction_factor
         assert abs(f - found) < half_width
         formula.append(f / row["f_darcy"] - 1)
         sand.append(found / row["f_darcy"] - 1)
@@ -92,6 +94,6 @@ def test_what_cannot_be_solved_says_so() -> None:
         mixing_length_flow(reynolds=0.0)
     with pytest.raises(ValueError, match="roughness"):
         mixing_length_flow(reynolds=1e5, relative_roughness=-1e-3)
-    assert mixing_length_flow(reynolds=1e8).status.code is StatusCode.OK
+    assert mixing_length_flow(reynolds=1e8).friction_factor > 0
     undamped = mixing_length_flow(reynolds=1e5, closure=MixingLength(damping=None))
-    assert undamped.status.ok
+    assert undamped.friction_factor > mixing_length_flow(reynolds=1e5).friction_factor

@@ -24,16 +24,9 @@ from skfem import MeshHex, MeshTet
 
 from ringbalance.physics.results import StatusCode
 from ringbalance.verification.navier_stokes.meshes import patch_mesh, tensor_patch
-from ringbalance.verification.navier_stokes.newton import (
-    Coefficients,
-    Dirichlet,
-    FlowSolution,
-    FlowSystem,
-    NewtonSettings,
-    flow_system,
-    solve_flow,
-)
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.space import taylor_hood
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
 
 DATA = Path(__file__).parent / "data"
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from ringbalance.verification.navier_stokes.layers import factorize_layers, layers_of
-from ringbalance.verification.navier_stokes.linear import factorize
+from ringbalance.verification.navier_stokes.linear import factorize, factorize_layers, layers_of
 
 
 def _matrix(slabs: int, seed: int) -> tuple[sparse.csc_matrix, np.ndarray]:

@@ -14,7 +14,7 @@ from scipy.integrate import quad
 
 from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
-from ringbalance.physics.convergence.grid import Verdict
+from ringbalance.physics.convergence import Verdict
 from ringbalance.physics.pressure import linear as pressure_linear
 from ringbalance.physics.pressure.integrals import liquid_integrals
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities

@@ -24,7 +24,7 @@ from ringbalance.physics.tube.rotation_table import (
     slow_first,
 )
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow
-from ringbalance.verification.navier_stokes.newton import FlowSolution, FlowSystem, NewtonSettings
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings
 from ringbalance.verification.navier_stokes.rotating_section import (
     POISEUILLE_GRADIENT,
     DuctMesh,
@@ -35,6 +35,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section,
     solve_section_without_inertia,
 )
+from ringbalance.verification.navier_stokes.system import FlowSystem
 
 
 @cache

@@ -20,18 +20,13 @@ from ringbalance.physics.tube.development import (
 )
 from ringbalance.physics.tube.ends import ROTATING_PROFILE_UNCERTAINTY, kinetic_factor
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
-from ringbalance.verification.navier_stokes.newton import (
-    Coefficients,
-    FlowSolution,
-    FlowSystem,
-    NewtonSettings,
-    solve_flow,
-)
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     developed_section,
     solve_section_without_inertia,
 )
+from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 from ringbalance.verification.reference import bent_tube
 from ringbalance.verification.reference.entry_length import slowest_decay
 

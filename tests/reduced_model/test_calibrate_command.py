@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,22 @@ def test_tables_show_what_matters(name: str, capsys: pytest.CaptureFixture[str])
     ):
         assert word in shown
     assert "nan" not in shown
+
+
+def test_no_interval_is_finer_than_inputs_that_nobody_stated(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    stated = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
+    parts = re.split(r"(?m)^(?=\[(?:uncertainty|run)\])", stated)
+    unstated = tmp_path / "unstated.toml"
+    unstated.write_text(parts[0] + parts[2], encoding="utf-8")
+    assert calibrate(unstated) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "the scene states no uncertainty of its inputs" in shown
+    assert "chamber 67.69 ml lambda 73.36 mm per transferred mass (36.68 mm" in shown
+    assert re.search(r"k there \d\.\d+ ± 0\.\d+ at", shown), "what the models leave open stands"
+    for value, width in re.findall(r"([\d.]+) ± ([\d.e-]+)", shown):
+        assert float(width) > 5e-4 * float(value)
 
 
 def test_a_missing_scene_is_a_fault_not_a_traceback(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.gas.column import pressure_factor
+from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber

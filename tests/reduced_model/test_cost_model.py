@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ringbalance.verification.selection_studies.cost import CostModel, committed_costs, fitted_costs
+from ringbalance.verification.selection_studies.measure import CostModel, committed_costs, fitted_costs
 
 TRUE = CostModel(seconds={"solve": 2e-3, "unknown_2d": 3e-6}, fitted_on="test")
 

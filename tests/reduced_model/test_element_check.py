@@ -10,7 +10,7 @@ import pytest
 from ringbalance.physics.results import StatusCode
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.chamber.element_check import element_check
-from ringbalance.reduced_model.chamber.ring_values import ring_values
+from ringbalance.reduced_model.chamber.values import ring_values
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Scene
 

@@ -10,9 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ringbalance.reduced_model.contribution import Contribution
-from ringbalance.verification.selection_studies.choice import MARGIN, Values, choose
-from ringbalance.verification.selection_studies.cost import CostModel
-from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, relative_error
+from ringbalance.verification.selection_studies.choice import MARGIN, choose
+from ringbalance.verification.selection_studies.hierarchy import (
+    Fidelity,
+    ModelHierarchy,
+    Values,
+    relative_error,
+)
+from ringbalance.verification.selection_studies.measure import CostModel
 
 COSTS = CostModel(seconds={"step": 1.0}, fitted_on="test")
 
@@ -85,7 +90,7 @@ def test_without_the_check_a_wrong_estimate_is_believed() -> None:
     hierarchy = made_hierarchy(WORTHS, COSTLY, estimates=1e-3)
     chosen = choose(hierarchy, 1e-3, check=False, costs=COSTS)
     assert chosen.fidelity.name == "model 0"
-    assert Values(hierarchy).error(chosen.fidelity, hierarchy.top, (0, 1)) > 1e-3
+    assert Values(hierarchy).error(chosen.fidelity) > 1e-3
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1e-3, 1e-10, 2.0, 0.11, float("nan"), float("inf")])
@@ -135,13 +140,9 @@ def test_every_choice_keeps_its_tolerance_and_is_the_cheapest(
     values = Values(hierarchy)
     chosen = choose(hierarchy, wanted, costs=COSTS, values=values)
     # What is worth less than a thousandth by the estimate may be ten times that in fact, once for each term.
-    assert values.error(chosen.fidelity, hierarchy.top, (0, 1)) <= (MARGIN + 0.011 * len(sizes)) * wanted
-    enough = [
-        r
-        for r in hierarchy.fidelities
-        if values.error(r, hierarchy.top, (0, 1)) <= (1 - 0.011 * len(sizes)) * wanted
-    ]
-    assert chosen.cost <= 1.0001 * min(COSTS.of_fidelity(r, points=2) for r in enough)
+    assert values.error(chosen.fidelity) <= (MARGIN + 0.011 * len(sizes)) * wanted
+    enough = [r for r in hierarchy.fidelities if values.error(r) <= (1 - 0.011 * len(sizes)) * wanted]
+    assert chosen.cost <= 1.0001 * min(COSTS.cost(r.counted(2)) for r in enough)
 
 
 def test_relative_errors_by_hand() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
-from ringbalance.reduced_model.paper import formulas as paper
+from ringbalance.reduced_model import paper
 from ringbalance.scene.models import Scene
 
 ROUNDED_RADIUS = 34.9e-3

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
-from ringbalance.reduced_model.paper import formulas as paper
 from ringbalance.scene.models import Scene
 
 

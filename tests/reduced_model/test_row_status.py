@@ -11,8 +11,7 @@ from rich.console import Console
 import ringbalance as rb
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.chamber.row_status import REMEDIES, RowStatus, row_status
-from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.reduced_model.documents import REMEDIES, RowStatus, calibration_document, row_status
 from ringbalance.reduced_model.show import calibration_view
 from ringbalance.scene import Scene
 

@@ -33,19 +33,19 @@ from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene import loop_models
 from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.models import Scene
-from ringbalance.verification.selection_studies.chamber_elements import by_elements
-from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
+from ringbalance.verification.selection_studies.chambers import by_elements, chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import choose
-from ringbalance.verification.selection_studies.law_models import (
+from ringbalance.verification.selection_studies.laws import (
     CLOSED,
     QUADRATURE,
     REGIMES,
     SIPHON,
+    LawBook,
     LawModels,
-    base_law,
+    k_hierarchy,
+    velocity_hierarchy,
 )
 from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
-from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy, velocity_hierarchy
 
 
 def at_speed(scene: Scene, rpm: float) -> Scene:
@@ -165,14 +165,14 @@ def test_the_velocity_under_a_head(table_1_scene: Scene) -> None:
 def test_the_highest_law_against_the_calibrated_one_and_a_root_of_its_own(
     table_1_scene: Scene,
 ) -> None:
-    base = base_law(table_1_scene)
-    law = LawModels(level=QUADRATURE, loss=TABLES, regimes=REGIMES).law(table_1_scene, base=base)
+    book = LawBook(table_1_scene)
+    law = book.law(LawModels(level=QUADRATURE, loss=TABLES, regimes=REGIMES))
     fills = np.array([0.1, 0.25, 0.4])
     found = law.evaluate(fill_ratio=fills, gas_pressure=7e5)
     finest = calibrated_model(with_tolerance(table_1_scene, models="finest")).flow
     wanted = finest.evaluate(fill_ratio=fills, gas_pressure=7e5)
     assert found.velocity == pytest.approx(wanted.velocity, rel=1e-6)
-    siphon = LawModels(level=CLOSED, loss=CORRELATIONS, regimes=SIPHON).law(table_1_scene, base=base)
+    siphon = book.law(LawModels(level=CLOSED, loss=CORRELATIONS, regimes=SIPHON))
     head = (
         700.0
         + (
@@ -190,7 +190,7 @@ def test_the_highest_law_against_the_calibrated_one_and_a_root_of_its_own(
 
 
 def test_velocities_within_ten_and_one_per_cent(table_1_scene: Scene) -> None:
-    hierarchy = velocity_hierarchy(table_1_scene, book=LawBook(table_1_scene, base_law(table_1_scene)))
+    hierarchy = velocity_hierarchy(LawBook(table_1_scene))
     rough, fine = choose(hierarchy, 0.1), choose(hierarchy, 1e-3)
     assert rough.fidelity.models["loss of the tube"] != CONSTANT
     assert fine.fidelity.models["level of a chamber"] == CLOSED

@@ -74,13 +74,13 @@ def test_a_line_that_is_not_given_is_a_range_and_not_unknown(table_1_scene: Scen
     estimates = term_estimates(dataclasses.replace(table_1_scene, gas=gas))
     for term in (FILLING, LAG):
         found = estimates[term]
-        assert found.contribution is None
+        assert found.value is None
         assert found.default_range == (1.0, 1.0)
-        assert "100 % over a default range" in found.reason
+        assert "100 % over a default range" in found.reason(table_1_scene.tolerance)
     assert "5 to 10 ms" in estimates[LAG].formula
     own = dataclasses.replace(gas, conductance=1e-8, critical_ratio=0.3, valve_lag=1e-3)
     given = term_estimates(dataclasses.replace(table_1_scene, gas=own))
-    assert given[LAG].contribution == pytest.approx(0.25)
+    assert given[LAG].value == pytest.approx(0.25)
     assert given[LAG].default_range is None
 
 

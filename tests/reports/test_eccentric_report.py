@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,7 @@ from typing import Any
 import pytest
 from check_traces import traces, untrue
 
-from ringbalance.reports import eccentric_evidence
+from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports.eccentric_evidence import parameters
 from ringbalance.reports.figures.eccentric import sampled_poles
 from ringbalance.reports.pages.eccentric_scene import SECTIONS
@@ -23,12 +21,6 @@ from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import EccentricScene
 
 Record = dict[str, Any]
-
-
-@contextmanager
-def no_cases(*_: Any, **__: Any) -> Iterator[Iterator[Any]]:
-    """In place of the paper's claims, which have tests of their own."""
-    yield iter(())
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +39,8 @@ def scene() -> EccentricScene:
 def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(eccentric_evidence, "cases_under_way", no_cases)
+        # The claims of its paper have tests of their own.
+        patch.setattr(evidence_module, "load_cases", tuple)
         write_report(scene, out, scene_text='name = "small"\n')
     return out
 
@@ -103,6 +96,17 @@ def test_an_unmet_requirement_is_not_called_met(evidence: Record) -> None:
     page = render(changed)["report.html"]
     assert re.search(r"Patience</th>.*?not reached.*?not met", page)
     assert "0 of 1 requirements are met; not met: patience." in page
+
+
+def test_a_result_that_not_all_drawn_runs_come_to_reads_as_one_sentence(evidence: Record) -> None:
+    changed = json.loads(json.dumps(evidence))
+    row = {**changed["requirements"][0], "quantity": "settling time", "unit": "s", "achieved": 2.32}
+    row.update(verdict="cannot be told", reached=0.38, lost=["masses.friction_arm"], achieved_interval=None)
+    changed["requirements"] = [row, {**row, "quantity": "patience", "reached": 1.0}]
+    page = re.sub(r"<[^>]*>", "", render(changed)["report.html"])
+    assert "2.32\u202fs with the scene’s values" in page
+    assert "none: of the runs with drawn inputs 38\u202f% get there, the others never do" in page
+    assert "none: with an input at the end of its own interval the run never gets there" in page
 
 
 def test_what_a_requirement_depends_on_is_named_with_what_to_do(evidence: Record) -> None:

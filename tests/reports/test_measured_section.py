@@ -12,8 +12,8 @@ from ringbalance.reports.evidence import scene_record
 from ringbalance.reports.pages import eccentric_scene
 from ringbalance.reports.pages.measured import SECTION
 from ringbalance.reports.render import render
-from ringbalance.scene.measured import Measured, MeasuredFile, MeasuredFinding, MeasuredQuantity
 from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import Measured, MeasuredFile, MeasuredFinding, MeasuredQuantity
 
 MEASURED = Measured(
     files=(MeasuredFile(file="run_7.csv", kind="trial_weight", rows=31, sha256="ab" * 32),),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ringbalance.reports.figures.operation import (
+    _clearest,
     operating_map,
     reachable,
     requirement_bars,
@@ -139,6 +140,16 @@ def test_the_residual_ends_within_its_circle() -> None:
     drawing = residual_polar(run, reach)
     assert {"whole run", "near the limit"} <= set(texts(drawing))
     assert "from 10\u202fµm (ring) to 0.020\u202fµm (dot)" in drawing.caption
+
+
+def test_the_label_of_a_ring_keeps_away_from_what_is_dashed_and_from_the_run() -> None:
+    run = np.array([0.5j, 0j])
+    assert _clearest(1.0, run, np.zeros(0)) == pytest.approx(-1j)
+    # The lower side of a square passes where the label would stand, the sides to its right and left do not.
+    corners = np.array([-1.5 + 3j, -1.5 - 1j, 1.5 - 1j, 1.5 + 3j])
+    label = _clearest(1.0, run, corners)
+    assert label.imag > -0.75
+    assert abs(label) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("pairs", "corners"), [(1, 2), (2, 4), (3, 6)])

@@ -17,30 +17,38 @@ from keep_evidence import kept_document
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
+from ringbalance.reports import saved as saved_module
 from ringbalance.reports.page import case_views, page_content
 from ringbalance.reports.pages import consequences as consequences_module
 from ringbalance.reports.pages.document import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.render import render
 from ringbalance.reports.report import Report, write_report
-from ringbalance.reports.saved import heavy_cases, saved_cases
+from ringbalance.reports.saved import heavy_cases, keep_cases, kept_cases, saved_cases
 from ringbalance.reports.sections import section_views
 from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.scene import Scene, SceneError, bundled_scene
 from ringbalance.scene.platform.processes import Workers
-from ringbalance.verification.runner import cases_under_way
+from ringbalance.verification.case import CaseDefinition
+from ringbalance.verification.catalogue import load_case
 
 Record = dict[str, Any]
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
 QUICK = ("gci_celik2008", "claim_01_volume", "coverage")
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder in which reports keep what looks at no scene."""
+    return tmp_path_factory.mktemp("kept")
+
+
 @pytest.fixture(scope="module", autouse=True)
-def few_cases() -> Iterator[None]:
+def few_cases(kept: Path) -> Iterator[None]:
     """Three cases instead of all, one check, one claim, one heavy; and consequences found once."""
 
-    def run(**settings: Any) -> Any:
-        return cases_under_way(QUICK, **{**settings, "workers": 1})
+    def cases() -> list[CaseDefinition]:
+        return [load_case(name) for name in QUICK]
 
     def consequences(*arguments: Any, **_: Any) -> Any:
         if not found:
@@ -49,7 +57,8 @@ def few_cases() -> Iterator[None]:
 
     found: list[Any] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evidence_module, "cases_under_way", run)
+        patch.setattr(evidence_module, "load_cases", cases)
+        patch.setattr(saved_module, "code_folder", lambda: kept)
         patch.setattr(consequences_module, "find_consequences", consequences)
         yield
 
@@ -135,6 +144,62 @@ def test_a_second_run_differs_in_times_alone(first: Report, second: Report) -> N
     )
     assert json.dumps(repeated) == json.dumps(run)
     assert len(run) == len(QUICK) - 1
+
+
+def test_what_looks_at_no_scene_is_run_once(first: Report, second: Report) -> None:
+    assert first.evidence["times"]["kept_cases"] == {}
+    today = first.evidence["times"]["date"]
+    # The check of the grid convergence index takes the report's own scene; the other is heavy.
+    assert second.evidence["times"]["kept_cases"] == {"claim_01_volume": today}
+    page = (second.page.parent / "report.html").read_text()
+    assert f"1 that look at no scene, run by the same program on {today}" in page
+
+
+@pytest.mark.parametrize("damage", [b"", b"{}", b"\xff" * 99], ids=["empty", "no checksum", "garbage"])
+def test_damaged_results_are_not_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes
+) -> None:
+    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
+    assert kept_cases() == {}
+    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
+    assert list(kept_cases()) == ["claim_01_volume"]
+    (damaged,) = tmp_path.iterdir()
+    content = bytearray(damaged.read_bytes())
+    content[len(content) // 2] ^= 1
+    for wrong in (damage, bytes(content)):
+        damaged.write_bytes(wrong)
+        assert kept_cases() == {}
+        assert not damaged.exists()
+
+
+def test_results_of_another_program_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
+    monkeypatch.setattr(saved_module, "_program", lambda: "old")
+    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
+    monkeypatch.setattr(saved_module, "_program", lambda: "new")
+    assert kept_cases() == {}
+    keep_cases({})
+    assert [path.name for path in tmp_path.iterdir()] == ["cases-new.kept"]
+
+
+def test_another_file_of_the_program_or_package_counts_as_another_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(saved_module, "files", lambda _: tmp_path)
+    found = set()
+    for content in ("one", "other"):
+        (tmp_path / "module.py").write_text(content)
+        found.add(saved_module._program.__wrapped__())
+    monkeypatch.setattr(saved_module, "versions", lambda: {"numpy": "9.9"})
+    found.add(saved_module._program.__wrapped__())
+    assert len(found) == 3
+
+
+def test_results_that_cannot_be_kept_cost_time_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path / "file")
+    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
+    assert kept_cases() == {}
 
 
 def test_a_real_document_has_the_shape_of_the_sample(first: Report, whole: Record) -> None:

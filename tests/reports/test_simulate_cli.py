@@ -35,7 +35,9 @@ def changed(scene_file: Path, tmp_path: Path, old: str, new: str) -> Path:
 
 def document(path: Path, capsys: pytest.CaptureFixture[str], **options: Any) -> tuple[int, dict[str, Any]]:
     code = simulate(path, json=True, **options)
-    return code, json.loads(capsys.readouterr().out)
+    printed = capsys.readouterr()
+    assert code in (0, 1), printed.err
+    return code, json.loads(printed.out)
 
 
 def test_the_calibrated_law_is_the_default(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:

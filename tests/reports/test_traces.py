@@ -88,9 +88,8 @@ def test_the_report_of_changed_evidence_is_traced_too(evidence: Record) -> None:
 
 
 def test_a_number_is_not_finer_than_inputs_of_which_nothing_is_said(evidence: Record) -> None:
-    row = {"origin": "given", "uncertainty": "1 %"}
-    stated = {**evidence, "scene": {**evidence["scene"], "table": [row]}, "length_m": 0.123456}
-    bare = {**stated, "scene": {**evidence["scene"], "table": [{**row, "uncertainty": ""}]}}
+    stated = {**evidence, "length_m": 0.123456}
+    bare = {**stated, "scene": {**evidence["scene"], "states_uncertainty": False}}
     assert untraced(read(stated, "length_m", "m", width=1e-5)) == "(123.456\u00a0±\u00a00.010)\u202fmm"
     assert untraced(read(bare, "length_m", "m", width=1e-5)) == "123.5\u202fmm"
     wide = (untraced(read(each, "length_m", "m", width=1e-3)) for each in (bare, stated))

@@ -10,7 +10,6 @@ import pytest
 import scene_reference
 
 from ringbalance.scene import Fault, bundled_scene, liquid_ring_scene, load_scene, scene_table
-from ringbalance.scene.keys.completion import completed, missing_faults
 from ringbalance.scene.keys.declaration import (
     UNCERTAIN,
     derived,
@@ -55,8 +54,8 @@ SCHEMA = Schema(
 
 def _read(**plate: Any) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document({"plate": plate}, file="plate.toml", schema=SCHEMA)
-    reading = completed(reading)
-    return reading, (*faults, *missing_faults(reading))
+    reading = reading.completed()
+    return reading, (*faults, *reading.missing_faults())
 
 
 def _plate(reading: Reading) -> Mapping[str, Any]:

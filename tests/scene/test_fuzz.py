@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, scene_from
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.keys.schema import LIQUID_RING
+from ringbalance.scene.units import DIMENSIONS
 
 TABLES = tuple(LIQUID_RING.tables)
 PATHS = [(table, key) for table in TABLES for key in (*LIQUID_RING.tables[table].keys, "colour")]

@@ -11,9 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ringbalance.scene import known_liquids, liquid_at
-from ringbalance.scene.liquids import find_liquid
 from ringbalance.scene.units import FieldError
-from ringbalance.scene.water import water_properties
 
 
 def _rows() -> list[dict[str, str]]:
@@ -45,16 +43,16 @@ def test_table_is_consistent(row: dict[str, str]) -> None:
 )
 def test_water_literature(celsius: float, density: float, viscosity: float, vapour_pressure: float) -> None:
     """Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002) 387; Huber et al., ibid. 38 (2009) 101."""
-    rho, nu, saturation = water_properties(temperature=celsius + 273.15)
-    assert rho == pytest.approx(density, rel=2e-6)
-    assert rho * nu == pytest.approx(viscosity, rel=2e-4)
-    assert saturation == pytest.approx(vapour_pressure, rel=1e-4)
+    water = liquid_at(name="water", temperature=celsius + 273.15)
+    assert water.density == pytest.approx(density, rel=2e-6)
+    assert water.density * water.kinematic_viscosity == pytest.approx(viscosity, rel=2e-4)
+    assert water.vapour_pressure == pytest.approx(vapour_pressure, rel=1e-4)
 
 
 @pytest.mark.parametrize("temperature", [273.0, 373.2, math.nan])
 def test_water_is_liquid(temperature: float) -> None:
-    with pytest.raises(ValueError, match="temperature must lie within"):
-        water_properties(temperature=temperature)
+    with pytest.raises(FieldError, match="there are no data for water"):
+        liquid_at(name="water", temperature=temperature)
 
 
 def test_interpolation_of_viscosity() -> None:
@@ -95,9 +93,8 @@ def test_gallium_literature(temperature: float) -> None:
     ],
 )
 def test_names(name: str, found: str) -> None:
-    liquid = find_liquid(name=name)
-    assert liquid is not None
-    assert liquid.name == found
+    known = {each.name: each for each in known_liquids()}
+    assert liquid_at(name=name, temperature=known[found].temperatures[0]).name == found
 
 
 def test_no_name_means_two_liquids() -> None:

@@ -48,7 +48,8 @@ def test_a_block_leaves_the_collector_as_it_was() -> None:
 
 
 def test_the_time_since_the_start_holds_the_interpreter_s() -> None:
-    code = "import time; a = time.perf_counter(); from ringbalance.scene.platform.clock import since_start; "
+    code = "import time; a = time.perf_counter(); "
+    code += "from ringbalance.scene.platform.terminal import since_start; "
     code += "time.sleep(0.3); print(since_start(), time.perf_counter() - a)"
     start = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

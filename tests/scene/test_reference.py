@@ -16,7 +16,7 @@ from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
-from ringbalance.scene.measured import Measured
+from ringbalance.scene.origins import Measured
 from ringbalance.scene.rules import eccentric, shape, working
 from ringbalance.scene.rules.check import Check
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES

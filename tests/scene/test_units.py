@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ringbalance.scene.dimensions import DIMENSIONS
-from ringbalance.scene.units import FieldError, format_quantity, parse_quantity
+from ringbalance.scene.units import DIMENSIONS, FieldError, format_quantity, parse_quantity
 
 EVERY_UNIT = [(dimension, unit) for dimension, kind in DIMENSIONS.items() for unit in kind.units]
 

@@ -120,7 +120,8 @@ def test_a_file_of_measurements_is_predicted_and_judged(
     assert document["points"][1]["predicted"] == pytest.approx(
         isothermal * (1 + 1 / 1.4) / 2 / 1000, rel=1e-3
     )
-    _, out, _ = _judged(path, rows.replace(",51,", ",80,"), capsys)
+    code, out, err = _judged(path, rows.replace(",51,", ",80,"), capsys)
+    assert code == 0, err
     assert json.loads(out)["verdict"] == "refuted"
     assert verify(data=path) == 0
     assert "refuted (rig 4)" in " ".join(capsys.readouterr().out.split())

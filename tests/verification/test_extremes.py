@@ -24,8 +24,7 @@ from ringbalance.verification.extremes import design as extremes_design
 from ringbalance.verification.extremes import point as extremes_point
 from ringbalance.verification.extremes.axes import AXES, axis_of, fitted, varied
 from ringbalance.verification.extremes.design import CHUNK, Base, Point, design
-from ringbalance.verification.extremes.maps import Sweep
-from ringbalance.verification.extremes.numerics import at_aspect, at_step
+from ringbalance.verification.extremes.maps import Sweep, at_aspect, at_step
 from ringbalance.verification.extremes.point import Defect, Ending, Judgement, judge_point
 from ringbalance.verification.extremes.study import Size, find_extremes
 from ringbalance.verification.reference.exact_chamber import exact_moment

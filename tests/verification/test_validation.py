@@ -12,17 +12,22 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from ringbalance.identification.data.measurements import MeasurementsError, parse_measurements
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
 from ringbalance.verification.catalogue import case_code, load_case
+from ringbalance.verification.navier_stokes.rotating_section import (
+    DuctMesh,
+    friction_ratio,
+    solve_section_without_inertia,
+)
 from ringbalance.verification.validation import tube_at_rest
-from ringbalance.verification.validation.comparison import KINDS, compare
+from ringbalance.verification.validation.comparison import KINDS, compare, friction
 from ringbalance.verification.validation.kinds import measurements
 from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
-from ringbalance.verification.validation.tube_friction import friction_points
+from ringbalance.verification.validation.tube_friction import laminar_ratio
 from ringbalance.verification.validation.wave_frequency import tank_frequency
 
 _DATA = files("ringbalance.verification.validation") / "data"
@@ -95,14 +100,24 @@ def test_the_interval_of_the_bias_covers_when_rigs_differ() -> None:
 
 
 def test_points_come_in_ascending_order_with_their_walls() -> None:
-    points = friction_points("nikuradse_1933", "mckeon_2004")
-    assert np.all(np.diff(points.reynolds) >= 0)
-    smooth = points.relative_roughness == 0
-    assert smooth.sum() == len(measurements("mckeon_2004"))
-    rough = points.predicted()
-    plain = replace(points, relative_roughness=np.zeros_like(points.reynolds)).predicted()
-    assert np.array_equal(rough[smooth], plain[smooth])
-    assert np.all(rough[~smooth] > plain[~smooth])
+    rough = measurements("nikuradse_1933")
+    smooth = replace(rough, columns={**rough.columns, "relative_roughness": np.zeros(len(rough))})
+    points, plain = friction(rough), friction(smooth)
+    assert np.all(np.diff(points.columns["reynolds"]) >= 0)
+    assert np.all(points.predicted > plain.predicted)
+    both = friction(rough, measurements("mckeon_2004"))
+    assert np.all(np.diff(both.columns["reynolds"]) >= 0)
+    of_rough = np.isin(both.series, rough.series)
+    assert np.array_equal(both.predicted[of_rough], points.predicted)
+    assert set(both.columns) == {"friction_factor", "reynolds"}
+
+
+def test_laminar_friction_of_ducts_against_finite_elements() -> None:
+    for aspect in (1.0, 2.9, 8.0):
+        system = DuctMesh(aspect_ratio=aspect).system()
+        found = friction_ratio(solve_section_without_inertia(system=system, rotation_reynolds=0.0))
+        assert float(laminar_ratio(np.array([aspect]))[0]) == pytest.approx(found, rel=1e-4)
+    assert laminar_ratio(np.array([0.0, 1e4])) == pytest.approx([1.0, 1.5], rel=1e-3)
 
 
 def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scene: Scene) -> None:
@@ -117,13 +132,13 @@ def test_the_budget_of_k_holds_bias_and_scatter_of_turbulent_friction(paper_scen
 def test_measured_friction_drifts_from_the_correlation_as_its_error_is_taken_to() -> None:
     """`with_errors` has a slope of U/1.96 per e-fold of Re: that of series of smooth tubes, turbulent and
     over at least a factor of two, is within a factor of two of it (root mean square)."""
-    points = friction_points("mckeon_2004", "stanton_pannell_1914", "senecal_1951")
-    points = points.where((points.reynolds > 6000) & (points.reynolds < 1e5))
-    apart = points.friction / points.predicted() - 1
-    stated = points.stated() / points.predicted() / NORMAL_95
+    points = friction(*map(measurements, ("mckeon_2004", "stanton_pannell_1914", "senecal_1951")))
+    points = points.where((points.columns["reynolds"] > 6000) & (points.columns["reynolds"] < 1e5))
+    apart = points.measured / points.predicted - 1
+    stated = points.stated / points.predicted / NORMAL_95
     slopes = []
     for series in np.unique(points.series):
-        log_re = np.log(points.reynolds[mine := points.series == series])
+        log_re = np.log(points.columns["reynolds"][mine := points.series == series])
         if np.count_nonzero(mine) >= 6 and np.ptp(log_re) > math.log(2):
             slopes.append(np.polyfit(log_re, apart[mine], 1)[0] / np.mean(stated[mine]))
     assert len(slopes) >= 6
@@ -135,7 +150,7 @@ _HEAD = '# kind = "friction"\n# source = "me"\n# uncertainty = 0.02\n'
 
 def test_units_of_a_file_become_si() -> None:
     head = _HEAD.replace("friction", "vessel")
-    data = parse_measurements(head + "time [ms],pressure [bar],series\n250,2,a\n500,3,b\n", file="x.csv")
+    data = Measurements.parsed(head + "time [ms],pressure [bar],series\n250,2,a\n500,3,b\n", file="x.csv")
     assert data.columns["time"] == pytest.approx([0.25, 0.5])
     assert data.columns["pressure"] == pytest.approx([2e5, 3e5])
     assert list(data.series) == ["a", "b"]
@@ -145,12 +160,12 @@ def test_units_of_a_file_become_si() -> None:
 def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> None:
     text = '# kind = 3\n# sorce = "me"\n# uncertainty = 2\nreynolds,friction factor,x [furlong]\n1,2,3\n'
     with pytest.raises(MeasurementsError) as error:
-        parse_measurements(text, file="bad.csv")
+        Measurements.parsed(text, file="bad.csv")
     lines = str(error.value).splitlines()
     assert all(line.startswith("bad.csv: ") for line in lines)
     assert len(lines) == 6
     with pytest.raises(MeasurementsError) as error:
-        parse_measurements(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
+        Measurements.parsed(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
     assert [line.split(": ")[1] for line in str(error.value).splitlines()] == [
         'line 5, column "friction_factor" = "nan"',
         "line 7",
@@ -175,14 +190,14 @@ def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> Non
 )
 def test_what_cannot_be_predicted_is_refused_by_name(text: str, named: str) -> None:
     with pytest.raises(MeasurementsError, match=named):
-        compare(parse_measurements(text, file="x.csv"))
+        compare(Measurements.parsed(text, file="x.csv"))
 
 
 def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others() -> None:
     data = measurements("stanton_pannell_1914")
     found = compare(data)
     rows = "".join(f"{r},{f}\n" for r, f in zip(data.columns["reynolds"], found.predicted, strict=True))
-    own = compare(parse_measurements(_HEAD + "reynolds,friction_factor\n" + rows, file="own.csv"))
+    own = compare(Measurements.parsed(_HEAD + "reynolds,friction_factor\n" + rows, file="own.csv"))
     assert own.statistics.bias == pytest.approx(0, abs=1e-12)
     assert (found.verdict, own.verdict) == ("confirmed", "confirmed")
     assert compare(data, mutation="ten_per_cent_high").verdict == "refuted"
@@ -230,7 +245,7 @@ def test_adiabatic_venting_of_a_choked_vessel_is_the_closed_form() -> None:
         "conductance [l/(s*bar)]"
     )
     text = _HEAD.replace("friction", "vessel") + f"{columns}\n1,4,10,1,293.15,1,1\n"
-    found = compare(parse_measurements(text, file="x.csv"))
+    found = compare(Measurements.parsed(text, file="x.csv"))
     adiabatic = 5 * (2.5 ** (1 / 7) - 1)
     assert found.predicted[0] == pytest.approx((adiabatic + math.log(2.5)) / 2, rel=1e-5)
     assert found.stated[0] ** 2 - (0.1 * found.predicted[0]) ** 2 == pytest.approx(
@@ -249,4 +264,4 @@ def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() 
     page = measurement_tables.PAGE.read_text(encoding="utf-8")
     assert measurement_tables.fresh(page, "kinds", measurement_tables.kind_table()) == page
     example = page.split("```")[1]
-    assert len(compare(parse_measurements(example, file="example")).measured) == 3
+    assert len(compare(Measurements.parsed(example, file="example")).measured) == 3

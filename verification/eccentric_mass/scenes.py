@@ -13,11 +13,10 @@ import numpy.typing as npt
 
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.dimensions import DIMENSIONS
 from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
 from ringbalance.scene.keys.declaration import Entries, Key, keys_of
 from ringbalance.scene.keys.fields import Reader
-from ringbalance.scene.units import FieldError
+from ringbalance.scene.units import DIMENSIONS, FieldError
 
 RPM: Final = 2 * math.pi / 60
 DRIVEN_SCENE: Final = "eccentric_mass_paper"

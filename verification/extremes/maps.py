@@ -1,4 +1,7 @@
-"""Stability maps: one axis, or two together, from end to end with everything else as the scene has it."""
+"""Stability maps: one axis, or two together, from end to end with everything else as the scene has it.
+
+The numerics have axes of their own: the cells' aspect ratio, and the step of Eq. 20's segments.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,22 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import chamber_volume, liquid_area
+from ringbalance.physics.pressure.ring import ring_quantities
+from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
 from ringbalance.verification.extremes.axes import AXES, Axis, axis_of
 from ringbalance.verification.extremes.design import Base, Point
-from ringbalance.verification.extremes.point import Ending, Judgement
+from ringbalance.verification.extremes.point import ROUND_OFF, Ending, Judgement
+from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
+from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
 
 Progress = Callable[[int, int], None]
 
-PAIRS: Final = (
+_PAIRS: Final = (
     ("speed", "fill"),
     ("viscosity", "bore"),
     ("angle", "plate"),
@@ -23,6 +34,10 @@ PAIRS: Final = (
     ("gain", "noise"),
     ("gain", "period"),
 )
+_ASPECT: Final = Axis("aspect", "aspect ratio of the cells", "1", 1.0, 1e12, usual=(1.0, 1e5))
+_STEP: Final = Axis("step", "step of the explicit segments", "s", 1e-7, 100.0, usual=(1e-4, 0.1))
+_SHORTEST: Final = 1e-3
+"""s, of the operation that steps are taken through; longer steps are the whole operation."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,12 +66,12 @@ class Sweep:
 
     def solved(self) -> tuple[float, float] | None:
         """First and last value that got an answer, with or without a reservation; None for none."""
-        good = [v for v, j in zip(self.values, self.judgements, strict=True) if answered(j)]
+        good = [v for v, j in zip(self.values, self.judgements, strict=True) if _answered(j)]
         return (float(good[0]), float(good[-1])) if good else None
 
     def beyond(self) -> tuple[str, ...]:
         """What the program says past either end of that, each message once."""
-        told = (j.text for j in self.judgements if not answered(j))
+        told = (j.text for j in self.judgements if not _answered(j))
         return tuple(dict.fromkeys(told))
 
     def changes(self) -> tuple[int, ...]:
@@ -103,7 +118,7 @@ class StabilityMap:
         return self.judgements[row * self.x_values.size + column]
 
 
-def answered(judgement: Judgement) -> bool:
+def _answered(judgement: Judgement) -> bool:
     """Whether a point got an answer, with or without a reservation."""
     return judgement.ending not in (Ending.REFUSED, Ending.BROKEN)
 
@@ -111,16 +126,16 @@ def answered(judgement: Judgement) -> bool:
 def sweeps(
     base: Base, *, count: int, fineness: float, workers: int = 1, progress: Progress | None = None
 ) -> tuple[Sweep, ...]:
-    """Every axis alone, from end to end, as `swept`."""
+    """Every axis alone, from end to end, as `_swept`."""
 
     def judge_all(places: Sequence[tuple[Axis, float]]) -> Sequence[Judgement]:
         points = [{axis.name: value} for axis, value in places]
         return base.judged(points, workers=workers, progress=progress)
 
-    return swept(AXES, judge_all, count=count, fineness=fineness)
+    return _swept(AXES, judge_all, count=count, fineness=fineness)
 
 
-def swept(
+def _swept(
     axes: Sequence[Axis],
     judge_all: Callable[[Sequence[tuple[Axis, float]]], Sequence[Judgement]],
     *,
@@ -180,7 +195,7 @@ def stability_maps(
     grid = np.linspace(0, 1, count)
     points: list[Point] = [
         {x: float(vx), y: float(vy)}
-        for x, y in PAIRS
+        for x, y in _PAIRS
         for vy in axis_of(y).at(grid)
         for vx in axis_of(x).at(grid)
     ]
@@ -194,5 +209,74 @@ def stability_maps(
             y_values=axis_of(y).at(grid),
             judgements=found[k * size : (k + 1) * size],
         )
-        for k, (x, y) in enumerate(PAIRS)
+        for k, (x, y) in enumerate(_PAIRS)
+    )
+
+
+def numerical_sweeps(scene: Scene, *, count: int, fineness: float) -> tuple[Sweep, ...]:
+    """The numerics' own axes, `_ASPECT` and `_STEP`, as `_swept`."""
+    judges = {_ASPECT.name: at_aspect, _STEP.name: at_step}
+
+    def judge_all(places: Sequence[tuple[Axis, float]]) -> list[Judgement]:
+        return [judges[axis.name](scene, value) for axis, value in places]
+
+    return _swept((_ASPECT, _STEP), judge_all, count=count, fineness=fineness)
+
+
+def at_aspect(scene: Scene, aspect: float) -> Judgement:
+    """Wall pressure of a ring so thin that the default mesh's cells have that length over depth.
+
+    Returns: Judgement; a ring too thin for any mesh is refused with the program's own message.
+    """
+    disc = scene.disc
+    radial, angular = default_cells(disc=disc)
+    depth = disc.outer_radius * disc.central_angle / angular / aspect * radial
+    a = max(disc.outer_radius - depth, disc.inner_radius)
+    fill = float(liquid_area(disc=disc, surface_radius=a)) * disc.axial_width / chamber_volume(disc=disc)
+    density, omega = scene.liquid.density, abs(scene.rotor.speed)
+    try:
+        ring = ring_quantities(disc=disc, fill_ratio=fill, density=density, angular_velocity=omega)
+    except ValueError as refused:
+        return Judgement(ending=Ending.REFUSED, text=str(refused))
+    exact = float(exact_wall_pressure(disc=disc, fill_ratio=fill, density=density, angular_velocity=omega))
+    error = abs(float(ring.wall_pressure.value[0]) - exact)
+    ratio = error / (float(ring.wall_pressure.uncertainty[0]) + ROUND_OFF * exact)
+    faults = (f"an error is {ratio:.3g} times its half-width",) if ratio > 1 else ()
+    return Judgement(
+        ending=Ending.BROKEN if faults else Ending.SOLVED,
+        text="",
+        violations=faults,
+        residual=ring.statistics.relative_residual,
+        unknowns=float(ring.statistics.unknowns),
+        worst_ratio=ratio,
+    )
+
+
+def at_step(scene: Scene, step: float) -> Judgement:
+    """An injection under the paper's law in explicit segments of one length, against the closed form.
+
+    The error of a segment is at most half its length times the change of the rate over it; `worst_ratio` is
+    the error over that bound.
+    """
+    law = paper_law(scene)
+    fill = scene.disc.initial_fill
+    drive = paper_drive(law, gas_pressure=scene.gas.pressure, fill=fill, total=2 * fill)
+    duration = max(step, _SHORTEST)
+    instants = np.array([duration])
+    exact = closed_form(drive, instants)
+    found = explicit_segments(max(1, round(duration / step)))(drive, instants)
+    start = abs(float(drive.flow(drive.fill, primed=False).velocity))
+    bound = drive.exchange_rate * start * step + ROUND_OFF
+    error = abs(float(found.fill[-1]) - float(exact.fill[-1]))
+    faults = []
+    if not (drive.lowest <= found.fill[-1] <= drive.highest):
+        faults.append("a fill ratio leaves its bounds")
+    if error > bound:
+        faults.append(f"an error of {error:.3g} is above its bound of {bound:.3g}")
+    coarse = error > scene.tolerance * drive.fill
+    return Judgement(
+        ending=Ending.BROKEN if faults else Ending.STATUS if coarse else Ending.SOLVED,
+        text="the segments' error is above the tolerance: take shorter ones" if coarse else "",
+        violations=tuple(faults),
+        worst_ratio=error / bound,
     )

@@ -24,16 +24,9 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.meshes import patch_mesh, tensor_patch, with_midpoints
-from ringbalance.verification.navier_stokes.newton import (
-    Coefficients,
-    Dirichlet,
-    FlowSolution,
-    FlowSystem,
-    NewtonSettings,
-    flow_system,
-    solve_flow,
-)
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.space import taylor_hood
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
 
 End = Literal["entrance", "exit"]
 

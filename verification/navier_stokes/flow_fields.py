@@ -18,19 +18,14 @@ from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.verification.navier_stokes.continuation import flow_at
 from ringbalance.verification.navier_stokes.end_losses import End, EndMesh, solve_end
-from ringbalance.verification.navier_stokes.newton import (
-    Dirichlet,
-    FlowSolution,
-    FlowSystem,
-    NewtonSettings,
-    flow_system,
-)
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     developed_section,
     friction_ratio,
 )
 from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
+from ringbalance.verification.navier_stokes.system import Dirichlet, FlowSystem, flow_system
 
 LARGEST_KL: Final = 1e6
 """R Re up to which the section is drawn; near it further steady flows appear."""

@@ -14,22 +14,7 @@ import numpy as np
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.linear import Factors, factorize
-from ringbalance.verification.navier_stokes.system import (
-    Coefficients,
-    Dirichlet,
-    FlowSystem,
-    flow_system,
-)
-
-__all__ = [
-    "Coefficients",
-    "Dirichlet",
-    "FlowSolution",
-    "FlowSystem",
-    "NewtonSettings",
-    "flow_system",
-    "solve_flow",
-]
+from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 
 
 @dataclass(frozen=True, kw_only=True)

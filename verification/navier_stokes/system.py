@@ -18,10 +18,8 @@ import numpy.typing as npt
 from scipy import sparse
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.verification.navier_stokes.layers import layers_of
-from ringbalance.verification.navier_stokes.space import (
-    FlowSpace,
-)
+from ringbalance.verification.navier_stokes.linear import layers_of
+from ringbalance.verification.navier_stokes.space import FlowSpace
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,16 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.liquid_ring.closed_form import boundary_event
-from ringbalance.controller.liquid_ring.transfer import (
-    Drive,
-    Event,
-    Integrator,
-    Transfer,
-    checked_instants,
-    finished,
-    still,
-)
+from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer, checked_instants
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
 
@@ -42,9 +33,9 @@ def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
     u0, regime = float(before.velocity), Regime(int(before.regime))
     end = drive.lowest if u0 > 0 else drive.highest
     if u0 == 0:
-        return still(drive, t, flow=before)
+        return drive.still(t, flow=before)
     if t[-1] == 0 or drive.fill == end:
-        event = boundary_event(drive, end) if drive.fill == end else Event.NONE
+        event = drive.boundary_event(end) if drive.fill == end else Event.NONE
         return _unmoved(drive, t, regime, event)
 
     primed = drive.primed or bool(before.primed)
@@ -56,8 +47,7 @@ def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
     event = _event(drive, end, [bool(times.size) for times in solved.t_events], finished_=solved.status >= 0)
     if event in {Event.EMPTY, Event.FULL}:
         fill = np.where(t >= last, end, fill)
-    return finished(
-        drive,
+    return drive.finished(
         t,
         fill,
         regime_start=regime,
@@ -109,8 +99,7 @@ def _march(drive: Drive, u0: float, end: float, duration: float, tolerance: floa
 
 
 def _unmoved(drive: Drive, t: FloatArray, regime: Regime, event: Event) -> Transfer:
-    return finished(
-        drive,
+    return drive.finished(
         t,
         np.full(t.shape, drive.fill),
         regime_start=regime,
@@ -123,5 +112,5 @@ def _event(drive: Drive, end: float, hit: list[bool], *, finished_: bool) -> Eve
     if not finished_:
         return Event.UNFINISHED
     if hit[0]:
-        return boundary_event(drive, end)
+        return drive.boundary_event(end)
     return Event.STALLED if hit[1] else Event.NONE

@@ -30,20 +30,10 @@ from ringbalance.physics.tube.bends import MOMENTUM_FACTOR
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow
-from ringbalance.verification.navier_stokes.newton import (
-    Coefficients,
-    Dirichlet,
-    FlowSolution,
-    FlowSystem,
-    NewtonSettings,
-    flow_system,
-    solve_flow,
-)
-from ringbalance.verification.navier_stokes.rotating_section import (
-    SectionMesh,
-    developed_section,
-)
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
+from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, developed_section
 from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
 
 Progress = Callable[[str], None]
 _NEWTON = NewtonSettings(tolerance=1e-7, max_iterations=10)

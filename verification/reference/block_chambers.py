@@ -11,8 +11,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import half_angle
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.chamber_file.elements import CORNERS, NODES, between, reference_nodes
-from ringbalance.scene.chamber_file.facets import boundary_facets
+from ringbalance.scene.chamber_file.elements import CORNERS, NODES, between, boundary_facets, reference_nodes
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc
 

@@ -25,14 +25,13 @@ from ringbalance.physics.tube.development import developing_length
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.verification.navier_stokes.linear import factorize
-from ringbalance.verification.navier_stokes.newton import Coefficients, FlowSolution, FlowSystem
+from ringbalance.verification.navier_stokes.newton import FlowSolution
 from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.space import (
-    FlowSpace,
-)
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 
 _SHIFTS = (1.0, 0.35, 0.12)
 """Of the expected rate, about which modes are looked for."""

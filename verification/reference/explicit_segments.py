@@ -4,16 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.closed_form import boundary_event
-from ringbalance.controller.liquid_ring.transfer import (
-    Drive,
-    Event,
-    Integrator,
-    Transfer,
-    checked_instants,
-    finished,
-    still,
-)
+from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer, checked_instants
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
@@ -52,7 +43,7 @@ def _march(drive: Drive, t: FloatArray, segments: int) -> Transfer:
     before = drive.flow(drive.fill, primed=drive.primed)
     velocity, regime = float(before.velocity), Regime(int(before.regime))
     if velocity == 0:
-        return still(drive, t, flow=before)
+        return drive.still(t, flow=before)
     edges = np.linspace(0.0, t[-1], segments + 1)
     x = np.full(segments + 1, drive.fill)
     event, event_time = Event.NONE, None
@@ -64,16 +55,9 @@ def _march(drive: Drive, t: FloatArray, segments: int) -> Transfer:
         if event is not Event.NONE:
             event_time = float(edges[i + 1])
             break
-    return finished(
-        drive,
-        t,
-        np.interp(t, edges, x),
-        regime_start=regime,
-        event=event,
-        event_time=event_time,
-    )
+    return drive.finished(t, np.interp(t, edges, x), regime_start=regime, event=event, event_time=event_time)
 
 
 def _event(drive: Drive, fill: float, velocity: float) -> Event:
     end = drive.lowest if velocity > 0 else drive.highest
-    return boundary_event(drive, end) if fill == end else Event.NONE
+    return drive.boundary_event(end) if fill == end else Event.NONE

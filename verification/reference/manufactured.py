@@ -21,13 +21,7 @@ from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Convergence, Evidence, Level, as_found
-from ringbalance.verification.orders import (
-    OrderStudy,
-    field_error,
-    order_figure,
-    order_study,
-    refined_cells,
-)
+from ringbalance.verification.orders import OrderStudy, field_error, order_figure, order_study, refined_cells
 
 _SCALE: Final = 1e5
 """P, Pa."""

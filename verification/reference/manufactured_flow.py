@@ -19,15 +19,10 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.evidence import Evidence
-from ringbalance.verification.navier_stokes.newton import (
-    Coefficients,
-    Dirichlet,
-    FlowSolution,
-    flow_system,
-    solve_flow,
-)
+from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import CORIOLIS, SectionMesh
 from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, flow_system
 from ringbalance.verification.orders import order_figure, order_study, orders_found
 
 _TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)

@@ -8,8 +8,6 @@ at the free surface, where centrifugal gravity is a, F s (s^2 - 4) = - a (s F' +
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import iv, ivp, jv, jvp, kv, kvp, yv, yvp
@@ -21,16 +19,22 @@ _TRIVIAL = 0.01
 """Distance from |s| = 2 within which the condition is met by no flow at all."""
 
 
-def _pair(m: int, q: float, r: float) -> FloatArray:
-    """Two solutions, and their slopes, shape (2, 2)."""
-    root = float(np.sqrt(abs(q)))
-    if root == 0.0:
-        return np.array([[r**m, r**-m], [m * r ** (m - 1), -m * r ** (-m - 1)]])
-    values, slopes = ((iv, kv), (ivp, kvp)) if q > 0 else ((jv, yv), (jvp, yvp))
-    return np.array([[f(m, root * r) for f in values], [root * f(m, root * r) for f in slopes]])
+def _pair(m: int, q: FloatArray, r: float) -> FloatArray:
+    """Two solutions, and their slopes, shape (2, 2, q's)."""
+    root = np.sqrt(np.abs(q))
+    found = np.empty((2, 2, q.size))
+    for chosen, values, slopes in ((q > 0, (iv, kv), (ivp, kvp)), (q < 0, (jv, yv), (jvp, yvp))):
+        k = root[chosen]
+        found[0][:, chosen] = [f(m, k * r) for f in values]
+        found[1][:, chosen] = [k * f(m, k * r) for f in slopes]
+    if np.any(q == 0):
+        powers = [[r**m, r**-m], [m * r ** (m - 1), -m * r ** (-m - 1)]]
+        found[:, :, q == 0] = np.array(powers)[:, :, None]
+    return found
 
 
-def _condition(s: float, m: int, k: float, a: float) -> float:
+def _conditions(s: FloatArray, m: int, k: float, a: float) -> FloatArray:
+    """Zero at the frequencies of the ring's waves."""
     q = k**2 * (1 - 4 / s**2)
     wall, surface = _pair(m, q, 1.0), _pair(m, q, a)
     rows = np.array(
@@ -39,7 +43,12 @@ def _condition(s: float, m: int, k: float, a: float) -> float:
             surface[0] * s * (s**2 - 4) + a * (s * surface[1] + 2 * m * surface[0] / a),
         ]
     )
-    return float(np.linalg.det(rows / np.abs(rows).max(axis=1, keepdims=True)))
+    rows /= np.abs(rows).max(axis=1, keepdims=True)
+    return np.asarray(rows[0, 0] * rows[1, 1] - rows[0, 1] * rows[1, 0])
+
+
+def _condition(s: float, m: int, k: float, a: float) -> float:
+    return float(_conditions(np.array([s]), m, k, a)[0])
 
 
 def ring_frequencies(*, surface_radius: float, width: float, around: int, along: int) -> tuple[float, ...]:
@@ -51,10 +60,11 @@ def ring_frequencies(*, surface_radius: float, width: float, around: int, along:
     arguments = (around, along * np.pi / width, surface_radius)
     found = []
     for sign in (1.0, -1.0):
+        values = _conditions(sign * _SEARCH, *arguments)
         # From the fastest on, and no further than the first change of sign.
-        values = ((s, _condition(sign * s, *arguments)) for s in _SEARCH)
-        for (high, first), (low, second) in pairwise(values):
-            if first * second < 0 and not low - _TRIVIAL < 2 < high + _TRIVIAL:
+        for place in np.flatnonzero(values[:-1] * values[1:] < 0):
+            high, low = _SEARCH[place], _SEARCH[place + 1]
+            if not low - _TRIVIAL < 2 < high + _TRIVIAL:
                 found.append(abs(float(brentq(_condition, sign * high, sign * low, args=arguments))))
                 break
     return tuple(found)

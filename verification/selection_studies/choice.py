@@ -8,19 +8,17 @@ expensive one than first chosen when the estimate was too small, a cheaper one w
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from ringbalance.reduced_model.contribution import NEGLIGIBLE, Contribution
-from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.selection_studies.cost import CostModel, committed_costs
-from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, relative_error
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Values
+from ringbalance.verification.selection_studies.measure import CostModel, committed_costs
 
-TOLERANCES: Final = (1e-6, 0.1)
-"""Smallest and largest tolerance that a choice is made for."""
-RULED_OUT: Final = 100.0
+TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+"""At which choices are shown and judged; none is made outside of their range."""
+_RULED_OUT: Final = 100.0
 """Times the tolerance: a model that leaves out a single thing worth more is not tried."""
 MARGIN: Final = 1.001
 """A model within this factor of the tolerance is kept at the check: its reference is known no better, and the
@@ -31,14 +29,13 @@ next one may cost many times as much."""
 class Choice:
     """The model chosen for one quantity at one tolerance, and how."""
 
-    quantity: str
     tolerance: float
     first: Fidelity
     """Chosen by the estimates alone."""
     fidelity: Fidelity
     """Kept after the check."""
     reference: Fidelity | None
-    """The model it was checked against; None where nothing left out is worth a check."""
+    """The model it was checked against; None where nothing left out needs a check."""
     measured: float | None
     """Largest relative difference from the reference at the check points."""
     cost: float
@@ -51,52 +48,7 @@ class Choice:
     @property
     def climbed(self) -> bool:
         """Whether the check sent the choice up."""
-        return (
-            self.fidelity.name != self.first.name
-            and len(self.fidelity.leaves_out - self.first.leaves_out) == 0
-        )
-
-
-class Values:
-    """Values of a hierarchy's models at its points, each computed once."""
-
-    def __init__(self, hierarchy: ModelHierarchy) -> None:
-        """Start with nothing computed."""
-        self.hierarchy = hierarchy
-        self._found: dict[tuple[str, int], FloatArray] = {}
-
-    def at(self, fidelity: Fidelity, points: tuple[int, ...]) -> FloatArray:
-        """Values of a model at points given by their numbers, shape (points, m)."""
-        for point in points:
-            if (fidelity.name, point) not in self._found:
-                self._found[fidelity.name, point] = fidelity.solve(point)
-        return np.array([self._found[fidelity.name, point] for point in points])
-
-    def error(self, fidelity: Fidelity, reference: Fidelity, points: tuple[int, ...]) -> float:
-        """Largest relative error of a model against another at points."""
-        return relative_error(
-            found=self.at(fidelity, points),
-            reference=self.at(reference, points),
-            relative_to=self.hierarchy.relative_to,
-        )
-
-
-def _check(hierarchy: ModelHierarchy, tolerance: float) -> None:
-    low, high = TOLERANCES
-    if not (low * (1 - 1e-12) <= tolerance <= high * (1 + 1e-12)):
-        raise ValueError(
-            f"a tolerance must lie within {low:g} and {high:g} (10 %), not {tolerance:g}: models "
-            "are chosen for that range alone"
-        )
-    if not hierarchy.points:
-        raise ValueError(f"{hierarchy.quantity}: {hierarchy.status.text}")
-
-
-def _predicted_error(fidelity: Fidelity, hierarchy: ModelHierarchy) -> float:
-    """Relative, the sum of what a model leaves out and the finest one includes; infinite without a basis."""
-    left = sorted(fidelity.leaves_out - hierarchy.top.leaves_out)
-    values = [hierarchy.contributions[term].value for term in left]
-    return sum((math.inf if value is None else value for value in values), 0.0)
+        return self.fidelity.name != self.first.name and self.fidelity.leaves_out <= self.first.leaves_out
 
 
 def choose(
@@ -115,26 +67,62 @@ def choose(
     Source: the rule stands in this module's first lines.
     """
     _check(hierarchy, tolerance)
-    model, held = costs or committed_costs(), values or Values(hierarchy)
+    model, found, few = costs or committed_costs(), values or Values(hierarchy), hierarchy.check
     ranked = model.ranked(hierarchy)
     first = next((f for f in ranked if _predicted_error(f, hierarchy) <= tolerance), hierarchy.top)
     reference = _next_up(hierarchy, first, tolerance, ranked) if check else None
     kept, tried = first, list[Fidelity]()
     if reference is not None:
-        kept, tried = _tried(held, reference, tolerance, ranked)
-    measured = None if reference is None else held.error(kept, reference, hierarchy.check)
-    spent = [model.of_fidelity(fidelity, points=len(hierarchy.check)) for fidelity in tried]
+        kept, tried = _tried(found, reference, tolerance, ranked)
+    measured = None if reference is None else found.error(kept, reference, few)
     return Choice(
-        quantity=hierarchy.quantity,
         tolerance=tolerance,
         first=first,
         fidelity=kept,
         reference=reference,
         measured=measured,
-        cost=model.of_fidelity(kept, points=len(hierarchy.points)),
-        checking_cost=sum(spent, 0.0),
-        reasons=_reasons(hierarchy, tolerance, first, kept, reference, measured),
+        cost=model.cost(kept.counted(len(hierarchy.points))),
+        checking_cost=sum((model.cost(fidelity.counted(len(few))) for fidelity in tried), 0.0),
+        reasons=tuple(_reasons(hierarchy, tolerance, first, kept, reference, measured)),
     )
+
+
+def _check(hierarchy: ModelHierarchy, tolerance: float) -> None:
+    low, high = min(TOLERANCES), max(TOLERANCES)
+    if not (low * (1 - 1e-12) <= tolerance <= high * (1 + 1e-12)):
+        raise ValueError(
+            f"a tolerance must lie within {low:g} and {high:g} (10 %), not {tolerance:g}: models "
+            "are chosen for that range alone"
+        )
+    if not hierarchy.points:
+        raise ValueError(f"{hierarchy.quantity}: {hierarchy.status.text}")
+
+
+def _left_out(fidelity: Fidelity, hierarchy: ModelHierarchy) -> list[Contribution]:
+    """What a model leaves out and the finest one includes."""
+    return [hierarchy.contributions[t] for t in sorted(fidelity.leaves_out - hierarchy.top.leaves_out)]
+
+
+def _predicted_error(fidelity: Fidelity, hierarchy: ModelHierarchy) -> float:
+    """Relative, the sum of what is left out; infinite without a basis."""
+    return sum((math.inf if c.value is None else c.value for c in _left_out(fidelity, hierarchy)), 0.0)
+
+
+def _undecided(hierarchy: ModelHierarchy, fidelity: Fidelity, tolerance: float) -> bool:
+    """Whether a model leaves out anything that may be worth a thousandth of the tolerance."""
+    left = _left_out(fidelity, hierarchy)
+    return any(c.value is None or c.value >= NEGLIGIBLE * tolerance for c in left)
+
+
+def _next_up(
+    hierarchy: ModelHierarchy, fidelity: Fidelity, tolerance: float, ranked: list[Fidelity]
+) -> Fidelity | None:
+    """The cheapest model that leaves nothing undecided, maybe this one; None where that is the cheapest."""
+    if _undecided(hierarchy, fidelity, tolerance):
+        # What is negligible may be missing from both: a more expensive solution without it shows nothing.
+        return next((f for f in ranked if not _undecided(hierarchy, f, tolerance)), hierarchy.top)
+    # Estimates that are far too large would not be noticed without a look at what lies below.
+    return fidelity if ranked[0].name != fidelity.name else None
 
 
 def _tried(
@@ -145,7 +133,8 @@ def _tried(
     for fidelity in ranked:
         if fidelity.name == reference.name:
             break
-        if _ruled_out(hierarchy, fidelity, tolerance):
+        worth = [0.0 if c.rough else c.value or 0.0 for c in _left_out(fidelity, hierarchy)]
+        if max(worth, default=0.0) > _RULED_OUT * tolerance:
             continue
         tried.append(fidelity)
         if values.error(fidelity, reference, hierarchy.check) <= MARGIN * tolerance:
@@ -153,36 +142,8 @@ def _tried(
     return reference, tried
 
 
-def _undecided(hierarchy: ModelHierarchy, fidelity: Fidelity, tolerance: float) -> frozenset[str]:
-    """What a model leaves out and a thousandth of the tolerance does not cover."""
-
-    def matters(term: str) -> bool:
-        value = hierarchy.contributions[term].value
-        return value is None or value >= NEGLIGIBLE * tolerance
-
-    return frozenset(term for term in fidelity.leaves_out - hierarchy.top.leaves_out if matters(term))
-
-
-def _ruled_out(hierarchy: ModelHierarchy, fidelity: Fidelity, tolerance: float) -> bool:
-    left = [hierarchy.contributions[term] for term in fidelity.leaves_out - hierarchy.top.leaves_out]
-    worth = [0.0 if c.rough else c.value or 0.0 for c in left]
-    return max(worth, default=0.0) > RULED_OUT * tolerance
-
-
-def _next_up(
-    hierarchy: ModelHierarchy, fidelity: Fidelity, tolerance: float, ranked: list[Fidelity]
-) -> Fidelity | None:
-    """The cheapest model that holds all of that, and leaves out nothing that the first one holds."""
-    undecided = _undecided(hierarchy, fidelity, tolerance)
-    if not undecided:
-        # Estimates that are far too large would not be noticed without a look at what lies below.
-        return fidelity if ranked[0].name != fidelity.name else None
-    for other in ranked:
-        # What is negligible may be missing from both: a more expensive solution without it shows nothing.
-        new = _undecided(hierarchy, other, tolerance)
-        if not new:
-            return other
-    return hierarchy.top
+def _number(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.1e}" if value else "0"
 
 
 def _reasons(
@@ -192,54 +153,33 @@ def _reasons(
     kept: Fidelity,
     reference: Fidelity | None,
     measured: float | None,
-) -> tuple[str, ...]:
-    told = [_worth(hierarchy.contributions[term], term in kept.leaves_out) for term in _terms(hierarchy)]
+) -> Iterator[str]:
+    for term, c in hierarchy.contributions.items():
+        # What the models differ in by more than their meshes.
+        if any(term in fidelity.leaves_out for fidelity in hierarchy.fidelities):
+            state = "left out" if term in kept.leaves_out else "in"
+            yield f"{term}: {state}; estimated contribution {_number(c.value)} by {c.formula} ({c.source})"
+    off = _number(measured or 0.0)
     if reference is None:
-        told.append("nothing that is left out is worth a check")
+        yield "nothing that is left out needs a check"
+    elif kept.name == first.name == reference.name:
+        yield "it leaves out nothing that a finer model would have to check"
     elif kept.name == first.name:
-        told.append(
-            f"checked: {_measured(measured)} from “{reference.name}” at {len(hierarchy.check)} points"
-        )
+        yield f"checked: {off} from “{reference.name}” at {len(hierarchy.check)} points"
     elif kept.leaves_out < first.leaves_out or kept.name == reference.name:
-        told.append(
+        yield (
             f"refined: the estimates allowed “{first.name}”, the check against “{reference.name}” did not; "
-            f"“{kept.name}” is {_measured(measured)} from it"
+            f"“{kept.name}” is {off} from it"
         )
     else:
-        told.append(
+        yield (
             f"the estimates asked for “{first.name}”; checked against “{reference.name}”, “{kept.name}” "
-            f"does as well: {_measured(measured)}"
+            f"does as well: {off}"
         )
     if tolerance < hierarchy.top_uncertainty:
-        told.append(_below_uncertainty(hierarchy, tolerance))
-    return tuple(told)
-
-
-def _terms(hierarchy: ModelHierarchy) -> list[str]:
-    """What the models differ in by more than their meshes."""
-    return [
-        term
-        for term in hierarchy.contributions
-        if any(term in fidelity.leaves_out for fidelity in hierarchy.fidelities)
-    ]
-
-
-def _worth(contribution: Contribution, left_out: bool) -> str:
-    value = "unknown" if contribution.value is None else f"{contribution.value:.1e}"
-    return (
-        f"{contribution.term}: {'left out' if left_out else 'in'}; worth {value} by {contribution.formula} "
-        f"({contribution.source})"
-    )
-
-
-def _measured(measured: float | None) -> str:
-    return "0" if measured is None else f"{measured:.1e}"
-
-
-def _below_uncertainty(hierarchy: ModelHierarchy, tolerance: float) -> str:
-    """The sentence for a tolerance that the finest model itself cannot keep."""
-    return (
-        f"a tolerance of {tolerance:.0e} is below what “{hierarchy.top.name}”, the finest model, is known to "
-        f"({hierarchy.top_uncertainty:.1e}: {hierarchy.top_uncertainty_from}): the choice keeps to that "
-        "model within the tolerance, not to nature"
-    )
+        top, width = hierarchy.top.name, hierarchy.top_uncertainty
+        yield (
+            f"a tolerance of {tolerance:.0e} is below what “{top}”, the finest model, is known to "
+            f"({width:.1e}: {hierarchy.top_uncertainty_from}): the choice keeps to that model within the "
+            "tolerance, not to nature"
+        )

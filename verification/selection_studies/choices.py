@@ -4,26 +4,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.models import Bend, Disc, Scene
 from ringbalance.verification.evidence import Evidence, Level, Table, as_found
-from ringbalance.verification.selection_studies.chamber_models import chamber_hierarchies
-from ringbalance.verification.selection_studies.choice import Values, choose
-from ringbalance.verification.selection_studies.cost import committed_costs
-from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
-from ringbalance.verification.selection_studies.law_models import base_law
-from ringbalance.verification.selection_studies.operation import mass_hierarchy, settling_hierarchy
-from ringbalance.verification.selection_studies.tube_models import LawBook, k_hierarchy, velocity_hierarchy
+from ringbalance.verification.selection_studies.choice import TOLERANCES, choose
+from ringbalance.verification.selection_studies.hierarchy import Values
+from ringbalance.verification.selection_studies.measure import committed_costs
+from ringbalance.verification.selection_studies.study import hierarchies_of
 
-CHAMBER: Final = ("wall_pressure", "moment")
-TOLERANCES: Final = (0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 _FEW: Final = 12
 """Scenes on which a mutation shows."""
 _DEFECTS: Final = {"estimate_off": 1e-3, "estimate_large": 1e3}
@@ -40,10 +34,8 @@ _ANGLES: Final = (45.0, 60.0, 90.0)
 class _Judged:
     """One choice, judged."""
 
-    scene: str
     quantity: str
     tolerance: float
-    fidelity: str
     error: float
     """Against the finest model over all points of the hierarchy."""
     cost_ratio: float
@@ -56,26 +48,6 @@ class _Judged:
     def held(self) -> bool:
         """Whether the tolerance is kept."""
         return self.error <= self.tolerance
-
-
-def hierarchies_for(scene: Scene, quantities: Sequence[str]) -> Iterator[ModelHierarchy]:
-    """Model hierarchies of some quantities, made one after the other.
-
-    Args: `quantities`: "wall_pressure", "moment", "k", "velocity", "transferred_mass", "settling_time".
-    """
-    chamber = chamber_hierarchies(scene) if set(quantities) & set(CHAMBER) else ()
-    makers = {
-        "velocity": velocity_hierarchy,
-        "transferred_mass": mass_hierarchy,
-        "settling_time": settling_hierarchy,
-    }
-    flow = [quantity for quantity in quantities if quantity in makers]
-    yield from (hierarchy for hierarchy in chamber if hierarchy.quantity in quantities)
-    if "k" in quantities:
-        yield k_hierarchy(scene)
-    if flow:
-        book = LawBook(scene, base_law(scene))
-        yield from (makers[quantity](scene, book=book) for quantity in flow)
 
 
 def judge(
@@ -92,42 +64,30 @@ def judge(
         every contribution; anything but 1 is a deliberate error.
     """
     found = []
-    for hierarchy in hierarchies_for(scene, quantities):
-        if not hierarchy.points:
-            continue
-        spoiled = replace(hierarchy, contributions=_spoiled(hierarchy.contributions, worth))
-        values = Values(spoiled)
-        found += [_judged(scene, spoiled, values, tolerance, check=check) for tolerance in tolerances]
+    for hierarchy in hierarchies_of(scene, quantities):
+        contributions = {
+            term: replace(c, value=None if c.value is None else c.value * worth)
+            for term, c in hierarchy.contributions.items()
+        }
+        values = Values(replace(hierarchy, contributions=contributions))
+        found += [_judged(values, tolerance, check=check) for tolerance in tolerances if hierarchy.points]
     return found
 
 
-def _spoiled(contributions: Mapping[str, Contribution], worth: float) -> Mapping[str, Contribution]:
-    return {
-        term: replace(c, value=None if c.value is None else c.value * worth)
-        for term, c in contributions.items()
-    }
-
-
-def _judged(
-    scene: Scene, hierarchy: ModelHierarchy, values: Values, tolerance: float, *, check: bool
-) -> _Judged:
-    costs, points = committed_costs(), tuple(range(len(hierarchy.points)))
+def _judged(values: Values, tolerance: float, *, check: bool) -> _Judged:
+    hierarchy, costs = values.hierarchy, committed_costs()
     choice = choose(hierarchy, tolerance, check=check, costs=costs, values=values)
-    cheapest = choice.cost
-    for fidelity in costs.ranked(hierarchy):
-        cost = costs.of_fidelity(fidelity, points=len(points))
-        if cost >= choice.cost:
-            break
-        if values.error(fidelity, hierarchy.top, points) <= tolerance:
-            cheapest = cost
-            break
+    enough = (
+        cost
+        for fidelity in costs.ranked(hierarchy)
+        if (cost := costs.cost(fidelity.counted(len(hierarchy.points)))) >= choice.cost
+        or values.error(fidelity) <= tolerance
+    )
     return _Judged(
-        scene=scene.name,
         quantity=hierarchy.quantity,
         tolerance=tolerance,
-        fidelity=choice.fidelity.name,
-        error=values.error(choice.fidelity, hierarchy.top, points),
-        cost_ratio=choice.cost / cheapest,
+        error=values.error(choice.fidelity),
+        cost_ratio=choice.cost / next(enough),
         climbed=choice.climbed,
         said=tolerance >= hierarchy.top_uncertainty
         or any("is below what" in text for text in choice.reasons),

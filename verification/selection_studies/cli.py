@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as json_format
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -16,17 +16,16 @@ from ringbalance.scene import load_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.progress import activity
-from ringbalance.scene.platform.terminal import messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.selection_studies.choice import Choice
+from ringbalance.verification.selection_studies.hierarchy import ModelHierarchy
 from ringbalance.verification.selection_studies.measure import Measured, Trade
 from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
 from ringbalance.verification.selection_studies.study import TradeStudy, tolerance_text, trade_study
 
-DONE: Final = 0
-FILE: Final = "trade.json"
-_MICRO, _MILLI = 1e-6, 1e-3
+_DONE: Final = 0
+_FILE: Final = "trade.json"
 
 
 def trade(
@@ -61,7 +60,7 @@ def trade(
     if save_costs is not None:
         check_file(save_costs)
     if out is not None:
-        check_file(out / FILE)
+        check_file(out / _FILE)
     with activity("trade", "model hierarchies ...") as shown:
         study = trade_study(told, level=level, progress=lambda title: shown.show(f"{title} ..."))
     text = json_format.dumps(study.document(), allow_nan=False)
@@ -70,11 +69,11 @@ def trade(
     else:
         results_console().print(_view(study))
     if out is not None:
-        write_whole(out / FILE, text + "\n")
-        messages_console().print(f"written to {out / FILE}", highlight=False)
+        write_whole(out / _FILE, text + "\n")
+        messages_console().print(f"written to {out / _FILE}", highlight=False)
     if save_costs is not None:
         write_whole(save_costs, _costs_text(study))
-    return DONE
+    return _DONE
 
 
 def _costs_text(study: TradeStudy) -> str:
@@ -101,13 +100,22 @@ def _view(study: TradeStudy) -> RenderableType:
     return Group(*parts)
 
 
-def _numbers(study: TradeStudy) -> Table:
-    table = Table(box=None, header_style="dim", padding=(0, 1))
-    for header in ("number", "value", "formula", "tells"):
-        table.add_column(header, justify="right" if header == "value" else "left")
-    for n in scene_numbers(study.scene):
-        table.add_row(n.name, "none" if n.value is None else f"{n.value:.3g}", Text(n.formula), n.tells)
+def _table(heads: str, rows: Iterable[Sequence[str | Text]], *, indent: int = 2) -> Table:
+    """Columns as named, apart by "|"; those with ">" before their name stand to the right."""
+    table = Table(box=None, header_style="dim", padding=(0, 1, 0, indent))
+    for head in heads.split("|"):
+        table.add_column(head.lstrip(">"), justify="right" if head.startswith(">") else "left")
+    for row in rows:
+        table.add_row(*row)
     return table
+
+
+def _numbers(study: TradeStudy) -> Table:
+    rows = (
+        (n.name, "none" if n.value is None else f"{n.value:.3g}", Text(n.formula), n.tells)
+        for n in scene_numbers(study.scene)
+    )
+    return _table("number|>value|formula|tells", rows, indent=1)
 
 
 def _trade(trade: Trade, choices: Sequence[Choice], asked: float) -> Iterator[RenderableType]:
@@ -117,36 +125,22 @@ def _trade(trade: Trade, choices: Sequence[Choice], asked: float) -> Iterator[Re
         yield Padding(Text(hierarchy.status.text, style="yellow"), (0, 0, 0, 2))
     if not hierarchy.points:
         return
-    yield _fidelities(trade)
+    ranked = sorted(trade.fidelities, key=lambda m: m.cost)
+    yield _table("model|>error|>cost|>time|>memory", (_row(found, hierarchy) for found in ranked))
     yield Padding(Text(f"trade-off point: {trade.knee}"), (0, 0, 0, 2))
-    yield _chosen(choices)
+    if rows := list(map(_chosen, choices[:-1])):
+        yield _table(">tolerance|models|>cost|check", rows)
     own = tolerance_text(asked, lambda tolerance: f"{tolerance:.0e}")
     yield Padding(Text(f"at {own}:", style="dim"), (0, 0, 0, 2))
     for reason in choices[-1].reasons:
         yield Padding(Text(reason), (0, 0, 0, 4))
 
 
-def _fidelities(trade: Trade) -> Table:
-    table = Table(box=None, header_style="dim", padding=(0, 1, 0, 2))
-    table.add_column("model")
-    for header in ("error", "cost", "time", "memory"):
-        table.add_column(header, justify="right")
-    for found in sorted(trade.fidelities, key=lambda m: m.cost):
-        table.add_row(
-            *_row(
-                found,
-                top=found.fidelity.name == trade.hierarchy.top.name,
-                width=trade.hierarchy.top_uncertainty,
-            )
-        )
-    return table
-
-
-def _row(found: Measured, *, top: bool, width: float) -> tuple[Text | str, ...]:
-    mark = "* " if found.on_front else "  "
+def _row(found: Measured, hierarchy: ModelHierarchy) -> tuple[Text | str, ...]:
+    top = found.fidelity.name == hierarchy.top.name
     return (
-        Text(mark + found.fidelity.name, style="" if found.on_front else "dim"),
-        f"known to {width:.0e}" if top else f"{found.error:.1e}",
+        Text(("* " if found.on_front else "  ") + found.fidelity.name, style="" if found.on_front else "dim"),
+        f"known to {hierarchy.top_uncertainty:.0e}" if top else f"{found.error:.1e}",
         _seconds(found.cost),
         "" if found.seconds is None else _seconds(found.seconds),
         "" if found.memory is None else f"{found.memory / 1e6:.2g} MB",
@@ -154,26 +148,15 @@ def _row(found: Measured, *, top: bool, width: float) -> tuple[Text | str, ...]:
 
 
 def _seconds(value: float) -> str:
-    if value < _MILLI:
-        return f"{value / _MICRO:.0f} µs"
-    return f"{value / _MILLI:.3g} ms" if value < 1 else f"{value:.3g} s"
+    if value < 1e-3:
+        return f"{value / 1e-6:.0f} µs"
+    return f"{value / 1e-3:.3g} ms" if value < 1 else f"{value:.3g} s"
 
 
-def _chosen(choices: Sequence[Choice]) -> Table:
-    table = Table(box=None, header_style="dim", padding=(0, 1, 0, 2))
-    table.add_column("tolerance", justify="right")
-    table.add_column("models")
-    table.add_column("cost", justify="right")
-    table.add_column("check")
-    for choice in choices[:-1]:
-        table.add_row(
-            f"{choice.tolerance:.0e}", Text(choice.fidelity.name), _seconds(choice.cost), _check(choice)
-        )
-    return table
-
-
-def _check(choice: Choice) -> str:
-    if choice.reference is None:
-        return "nothing to check"
-    word = "refined" if choice.climbed else "held"
-    return f"{word}, {choice.measured or 0.0:.0e} left out"
+def _chosen(choice: Choice) -> tuple[Text | str, ...]:
+    check = "nothing to check"
+    if choice.reference is not None and choice.reference.name == choice.fidelity.name:
+        check = "refined to the finest needed" if choice.climbed else "nothing finer needed"
+    elif choice.reference is not None:
+        check = f"{'refined' if choice.climbed else 'held'}, off by {choice.measured or 0.0:.0e}"
+    return f"{choice.tolerance:.0e}", Text(choice.fidelity.name), _seconds(choice.cost), check

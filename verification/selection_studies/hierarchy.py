@@ -2,7 +2,8 @@
 leaves out.
 
 A model hierarchy belongs to one quantity that users ask for.  Its models are sets of models; each says by
-name what it leaves out and how much work it counts, so that a tolerance can pick the cheapest that will do.
+name which physical terms of the registry it leaves out and how much work it counts, so that a tolerance can
+pick the cheapest that will do.
 """
 
 from __future__ import annotations
@@ -42,6 +43,11 @@ class Fidelity:
     prepare: Callable[[], object] | None = None
     """The fixed work repeated; for timing."""
 
+    def counted(self, points: int) -> Work:
+        """Work over a number of points, that before them included."""
+        each, once = self.work, self.fixed_work
+        return {kind: points * each.get(kind, 0.0) + once.get(kind, 0.0) for kind in {**each, **once}}
+
 
 @dataclass(frozen=True, kw_only=True)
 class ModelHierarchy:
@@ -73,6 +79,33 @@ class ModelHierarchy:
         return self.fidelities[-1]
 
 
+class Values:
+    """Values of a hierarchy's models at its points, each computed once."""
+
+    def __init__(self, hierarchy: ModelHierarchy) -> None:
+        """Start with nothing computed."""
+        self.hierarchy = hierarchy
+        self._found: dict[tuple[str, int], FloatArray] = {}
+
+    def at(self, fidelity: Fidelity, points: tuple[int, ...]) -> FloatArray:
+        """Values of a model at points given by their numbers, shape (points, m)."""
+        for point in points:
+            if (fidelity.name, point) not in self._found:
+                self._found[fidelity.name, point] = fidelity.solve(point)
+        return np.array([self._found[fidelity.name, point] for point in points])
+
+    def error(
+        self, fidelity: Fidelity, reference: Fidelity | None = None, points: tuple[int, ...] | None = None
+    ) -> float:
+        """Largest relative error of a model against another at points; default: the finest, at all."""
+        places = tuple(range(len(self.hierarchy.points))) if points is None else points
+        return relative_error(
+            found=self.at(fidelity, places),
+            reference=self.at(reference or self.hierarchy.top, places),
+            relative_to=self.hierarchy.relative_to,
+        )
+
+
 def relative_error(
     *, found: FloatArray, reference: FloatArray, relative_to: Literal["each", "largest"]
 ) -> float:
@@ -85,7 +118,5 @@ def relative_error(
     if relative_to == "largest":
         size = np.broadcast_to(size.max(axis=0, keepdims=True), reference.shape)
     difference = np.abs(found - reference)
-    share = np.where(
-        difference == 0, 0.0, difference / np.where(size > 0, size, np.where(difference > 0, difference, 1))
-    )
+    share = difference / np.where(size > 0, size, np.where(difference > 0, difference, 1.0))
     return float(np.max(share, initial=0.0))

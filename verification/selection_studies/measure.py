@@ -1,26 +1,94 @@
-"""Every model of a hierarchy measured: its error against the finest, its counted cost, its time and
-memory."""
+"""Every model of a hierarchy measured: its error against the finest, its counted cost, time and memory.
+
+Counted cost is work times committed seconds per unit, so that a choice never hangs on a clock.
+"""
 
 from __future__ import annotations
 
+import json
 import time
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
+from importlib.resources import files
 from statistics import median
 from typing import Final
 
 import numpy as np
 
-from ringbalance.verification.selection_studies.choice import Values
-from ringbalance.verification.selection_studies.cost import CostModel
-from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
+from ringbalance.physics import deferred
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Values, Work
 
-QUICK: Final = 0.1
+_QUICK: Final = 0.1
 """s, below which a run is repeated."""
 FLOOR: Final = 3e-8
 """Relative error below which grid convergence, tables and rounding rule: smaller ones count as equal."""
+_RESOURCE: Final = "cost_model.json"
+_PULL: Final = 0.3
+"""Root of the weight of one pull towards a prior."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostModel:
+    """Seconds per unit of counted work on the machine that it was fitted on."""
+
+    seconds: Mapping[str, float]
+    """By kind of work."""
+    fitted_on: str
+    """How the numbers came about."""
+
+    def cost(self, work: Work) -> float:
+        """Cost of some work, s. Raises: ValueError: a kind of work that this model does not know."""
+        unknown = sorted(set(work) - set(self.seconds))
+        if unknown:
+            raise ValueError(f"the cost model knows no work of kind {unknown[0]!r}: fit it again")
+        return float(sum(self.seconds[kind] * count for kind, count in work.items()))
+
+    def ranked(self, hierarchy: ModelHierarchy) -> list[Fidelity]:
+        """Models of a hierarchy, cheapest over all its points first; equal ones as they stand."""
+        points = len(hierarchy.points)
+        return sorted(hierarchy.fidelities, key=lambda fidelity: self.cost(fidelity.counted(points)))
+
+
+@lru_cache(maxsize=1)
+def committed_costs() -> CostModel:
+    """The cost model that choices rest on, the same on every machine.
+
+    Source: least squares over measured runs of every model, by `ringbalance trade SCENE --save-costs FILE`.
+    """
+    path = files("ringbalance.verification.selection_studies") / "data" / _RESOURCE
+    record = json.loads(path.read_text(encoding="utf-8"))
+    return CostModel(seconds=dict(record["seconds"]), fitted_on=record["fitted_on"])
+
+
+def fitted_costs(
+    *, works: Sequence[Work], seconds: Sequence[float], fitted_on: str, prior: CostModel | None = None
+) -> CostModel:
+    """Fit seconds per unit of work to measured times, each run weighted by its own time.
+
+    Minimises sum (cost/seconds - 1)^2 with no negative coefficient.
+    Args: `works`: counts of each run. `seconds`: measured, s, above zero, one per run. `fitted_on`: how the
+        times came about. `prior`: pulls each coefficient towards its own with the weight of a tenth of a run,
+        so that a kind of work that always comes with others is not lost; kinds without a run keep theirs.
+    Raises: ValueError: as many times as runs are needed, at least one, all above zero.
+    Source: Lawson and Hanson (1974), non-negative least squares.
+    """
+    if not works or len(works) != len(seconds) or min(seconds) <= 0:
+        raise ValueError("one time above zero is needed for each run, and at least one run")
+    known = {} if prior is None else {kind: value for kind, value in prior.seconds.items() if value > 0}
+    kinds = sorted({kind for work in works for kind in work} | set(known))
+    rows = np.array([[work.get(kind, 0.0) for kind in kinds] for work in works])
+    scaled = rows / np.asarray(seconds)[:, None]
+    pulls = np.diag([_PULL / known[kind] if kind in known else 0.0 for kind in kinds])
+    wanted = [*np.ones(len(works)), *(_PULL if kind in known else 0.0 for kind in kinds)]
+    scaled = np.vstack([scaled, pulls])
+    sizes = np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
+    found, _ = deferred.nnls(scaled / sizes, np.array(wanted))
+    return CostModel(
+        seconds={kind: float(value) for kind, value in zip(kinds, found / sizes, strict=True)},
+        fitted_on=fitted_on,
+    )
 
 
 @dataclass(kw_only=True)
@@ -33,7 +101,7 @@ class Clock:
     """Whether memory is traced, too."""
     _known: dict[frozenset[tuple[str, float]], float] = field(default_factory=dict)
 
-    def seconds_of(self, fidelity: Fidelity, points: Sequence[int]) -> float:
+    def seconds_of(self, fidelity: Fidelity, points: int) -> float:
         """Processor time of a model over points, with the tables it needs first, s.
 
         Each part is the median of several runs, or of the points' single runs where these take long.
@@ -44,7 +112,7 @@ class Clock:
         if fidelity.fresh is None or self.repeats > 1:
             return before + self._over(fidelity, points)
         # Such a model answers two quantities at once: a light study times it with the first of them.
-        counted = {**fidelity.work, "points": float(len(points))}
+        counted = {**fidelity.work, "points": float(points)}
         return before + self._remembered(counted, partial(self._over, fidelity, points))
 
     def _remembered(self, counted: Work, taken: Callable[[], float]) -> float:
@@ -53,18 +121,18 @@ class Clock:
             self._known[key] = taken()
         return self._known[key]
 
-    def _over(self, fidelity: Fidelity, points: Sequence[int]) -> float:
-        work = fidelity.fresh or fidelity.solve
-        each = [_once(partial(work, points[0]))]
-        if self.repeats > 1 or each[0] < QUICK:
-            each += [_once(partial(work, point)) for point in points[1:]]
-        if max(each) < QUICK:
-            each += [_once(partial(work, point)) for _ in range(self.repeats - 1) for point in points]
-        return median(each) * len(points)
+    def _over(self, fidelity: Fidelity, points: int) -> float:
+        runs = [partial(fidelity.fresh or fidelity.solve, point) for point in range(points)]
+        each = [_once(runs[0])]
+        if self.repeats > 1 or each[0] < _QUICK:
+            each += map(_once, runs[1:])
+        if max(each) < _QUICK:
+            each += map(_once, runs * (self.repeats - 1))
+        return median(each) * points
 
     def _median(self, work: Callable[[], object]) -> float:
         times = [_once(work)]
-        while len(times) < self.repeats and times[0] < QUICK:
+        while len(times) < self.repeats and times[0] < _QUICK:
             times.append(_once(work))
         return median(times)
 
@@ -72,10 +140,9 @@ class Clock:
         """Peak of memory that Python and NumPy allocate at one point, bytes; None where it is not traced."""
         if not self.memory:
             return None
-        work = fidelity.fresh or fidelity.solve
         tracemalloc.start()
         try:
-            work(0)
+            (fidelity.fresh or fidelity.solve)(0)
             return float(tracemalloc.get_traced_memory()[1])
         finally:
             tracemalloc.stop()
@@ -94,8 +161,10 @@ class Measured:
     fidelity: Fidelity
     error: float
     """Largest relative error against the finest model over the hierarchy's points."""
+    counted: Work
+    """Over all points."""
     cost: float
-    """Counted work over all points by the committed cost model, s of its machine."""
+    """Of that by the committed cost model, s of its machine."""
     on_front: bool
     """Whether no other model is both cheaper and nearer."""
     seconds: float | None
@@ -113,11 +182,6 @@ class Trade:
     knee: str | None
     """Name of the model at the front's trade-off point; None for a model hierarchy without points."""
 
-    @property
-    def front(self) -> tuple[Measured, ...]:
-        """Models on the Pareto front, cheapest first."""
-        return tuple(sorted((m for m in self.fidelities if m.on_front), key=lambda m: m.cost))
-
 
 def measure(hierarchy: ModelHierarchy, *, values: Values, costs: CostModel, clock: Clock | None) -> Trade:
     """Measure a model hierarchy; one without points has no models to measure, without a clock no times.
@@ -126,29 +190,27 @@ def measure(hierarchy: ModelHierarchy, *, values: Values, costs: CostModel, cloc
         between the front's ends, both axes logarithmic, errors below the finest model's own uncertainty
         counted as that.
     """
-    if not hierarchy.points:
+    points = len(hierarchy.points)
+    if not points:
         return Trade(hierarchy=hierarchy, fidelities=(), knee=None)
-    points = tuple(range(len(hierarchy.points)))
-    errors = [values.error(fidelity, hierarchy.top, points) for fidelity in hierarchy.fidelities]
-    spent = [costs.of_fidelity(fidelity, points=len(points)) for fidelity in hierarchy.fidelities]
+    errors = [values.error(fidelity) for fidelity in hierarchy.fidelities]
+    counted = [fidelity.counted(points) for fidelity in hierarchy.fidelities]
+    spent = [costs.cost(work) for work in counted]
     front = pareto_front(spent, [max(error, FLOOR) for error in errors])
     held = [max(error, hierarchy.top_uncertainty, FLOOR) for error in errors]
-    known = pareto_front(spent, held)
-    return Trade(
-        hierarchy=hierarchy,
-        fidelities=tuple(
-            Measured(
-                fidelity=fidelity,
-                error=error,
-                cost=cost,
-                on_front=i in front,
-                seconds=clock.seconds_of(fidelity, points) if clock else None,
-                memory=clock.memory_of(fidelity) if clock else None,
-            )
-            for i, (fidelity, error, cost) in enumerate(zip(hierarchy.fidelities, errors, spent, strict=True))
-        ),
-        knee=hierarchy.fidelities[knee([spent[i] for i in known], [held[i] for i in known], known)].name,
+    found = tuple(
+        Measured(
+            fidelity=fidelity,
+            error=errors[i],
+            counted=counted[i],
+            cost=spent[i],
+            on_front=i in front,
+            seconds=clock.seconds_of(fidelity, points) if clock else None,
+            memory=clock.memory_of(fidelity) if clock else None,
+        )
+        for i, fidelity in enumerate(hierarchy.fidelities)
     )
+    return Trade(hierarchy=hierarchy, fidelities=found, knee=found[knee(spent, held)].fidelity.name)
 
 
 def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
@@ -161,33 +223,14 @@ def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
     return found
 
 
-def knee(costs: Sequence[float], errors: Sequence[float], places: Sequence[int]) -> int:
-    """The one of `places` on a front that lies farthest below the chord between its ends, logarithmically.
+def knee(costs: Sequence[float], errors: Sequence[float]) -> int:
+    """Place of the entry of the front that lies farthest below the chord between its ends, logarithmically.
 
     Of a front of one or two it is the last.
     """
-    if len(places) < 3:
-        return places[-1]
-    x, y = (np.log(np.maximum(np.asarray(v, dtype=np.float64), 1e-300)) for v in (costs, errors))
+    front = pareto_front(costs, errors)
+    if len(front) < 3:
+        return front[-1]
+    x, y = (np.log(np.maximum(np.asarray(v, dtype=np.float64)[front], 1e-300)) for v in (costs, errors))
     x, y = (x - x[0]) / (x[-1] - x[0]), (y - y[-1]) / (y[0] - y[-1])
-    return places[int(np.argmax(1 - x - y))]
-
-
-def works_and_seconds(trades: Sequence[Trade]) -> tuple[list[Work], list[float]]:
-    """Counted work over all points, and s, of all timed models, to fit a cost model to."""
-    works: list[Work] = []
-    seconds: list[float] = []
-    for trade in trades:
-        count = len(trade.hierarchy.points)
-        for found in trade.fidelities:
-            if found.seconds is not None:
-                kinds = {*found.fidelity.work, *found.fidelity.fixed_work}
-                works.append(
-                    {
-                        kind: count * found.fidelity.work.get(kind, 0.0)
-                        + found.fidelity.fixed_work.get(kind, 0.0)
-                        for kind in kinds
-                    }
-                )
-                seconds.append(found.seconds)
-    return works, seconds
+    return front[int(np.argmax(1 - x - y))]

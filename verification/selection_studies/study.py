@@ -3,9 +3,9 @@ asks for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
@@ -13,29 +13,53 @@ from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.selection.estimates import term_estimates
 from ringbalance.reduced_model.selection.registry import models_used
 from ringbalance.scene.models import Scene
-from ringbalance.verification.selection_studies.choice import Choice, Values, choose
-from ringbalance.verification.selection_studies.choices import TOLERANCES, hierarchies_for
-from ringbalance.verification.selection_studies.cost import CostModel, committed_costs, fitted_costs
-from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy
-from ringbalance.verification.selection_studies.law_models import QUADRATURE
+from ringbalance.verification.evidence import Level
+from ringbalance.verification.selection_studies.chambers import chamber_hierarchies
+from ringbalance.verification.selection_studies.choice import TOLERANCES, Choice, choose
+from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Values, Work
+from ringbalance.verification.selection_studies.laws import (
+    QUADRATURE,
+    LawBook,
+    k_hierarchy,
+    velocity_hierarchy,
+)
 from ringbalance.verification.selection_studies.measure import (
     Clock,
+    CostModel,
     Measured,
     Trade,
+    committed_costs,
+    fitted_costs,
     measure,
-    works_and_seconds,
 )
-from ringbalance.verification.selection_studies.operation import EXPLICIT, MANY
+from ringbalance.verification.selection_studies.operation import EXPLICIT, mass_hierarchy, settling_hierarchy
 from ringbalance.verification.selection_studies.scene_numbers import scene_numbers
 
 Record = dict[str, Any]
-Level = Literal["light", "heavy"]
 
-_QUICK: Final = ("wall_pressure", "moment", "k", "velocity", "transferred_mass")
-"""Quantities of a light trade; the settling time takes whole runs of the loop."""
-_OWN_ALONE: Final = (("light", "transferred_mass"),)
-"""Where models are chosen for the scene's own tolerance alone."""
-_LAWS: Final = ("velocity", "transferred_mass")
+_CHAMBER: Final = ("wall_pressure", "moment")
+_BY_LAW: Final = {
+    "velocity": velocity_hierarchy,
+    "transferred_mass": mass_hierarchy,
+    "settling_time": settling_hierarchy,
+}
+_LOOP: Final = "settling_time"
+"""Takes whole runs of the loop, so that a light trade leaves it out."""
+
+
+def hierarchies_of(scene: Scene, quantities: Sequence[str]) -> Iterator[ModelHierarchy]:
+    """Model hierarchies of some quantities, made one after the other.
+
+    Args: `quantities`: "wall_pressure", "moment", "k", "velocity", "transferred_mass", "settling_time".
+    """
+    if set(quantities) & set(_CHAMBER):
+        yield from (h for h in chamber_hierarchies(scene) if h.quantity in quantities)
+    if "k" in quantities:
+        yield k_hierarchy(scene)
+    flow = [_BY_LAW[quantity] for quantity in quantities if quantity in _BY_LAW]
+    if flow:
+        book = LawBook(scene)
+        yield from (hierarchy(book) for hierarchy in flow)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,15 +89,6 @@ class TradeStudy:
         }
 
 
-def hierarchies_of(scene: Scene, *, level: Level = "heavy") -> tuple[ModelHierarchy, ...]:
-    """The model hierarchies of a scene; "light" leaves the settling time out.
-
-    Raises: SceneError: a rotor too slow for the liquid to form a ring.
-    """
-    check_ring(scene)
-    return tuple(hierarchies_for(scene, _QUICK if level == "light" else (*_QUICK, "settling_time")))
-
-
 def trade_study(
     scene: Scene,
     *,
@@ -84,21 +99,27 @@ def trade_study(
 ) -> TradeStudy:
     """Measure every model hierarchy of a scene and choose its models; all but times repeats on every machine.
 
-    Args: `timed`: whether times and memory are taken as well. `progress`: called with each quantity's name.
+    Args: `level`: "light" leaves out the settling time and models close to others, takes times once and
+        chooses models for the mass for the scene's own tolerance alone. `timed`: whether times and memory are
+        taken as well. `progress`: called with each quantity's name.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     """
-    costs = committed_costs()
+    check_ring(scene)
+    light, costs = level == "light", committed_costs()
     trades, chosen = [], {}
-    every = Clock(repeats=3) if level == "heavy" else Clock(repeats=1, memory=False)
-    clock = every if timed else None
-    for hierarchy in hierarchies_of(scene, level=level):
+    clock = Clock(repeats=1, memory=False) if light else Clock()
+    quantities = [q for q in (*_CHAMBER, "k", *_BY_LAW) if q != _LOOP or not light]
+    for hierarchy in hierarchies_of(scene, quantities):
         if progress is not None:
             progress(hierarchy.title)
-        values = Values(hierarchy)
-        shown = thinned(hierarchy) if level == "light" else hierarchy
-        trades.append(measure(shown, values=values, costs=costs, clock=_no_longer(clock, hierarchy)))
-        wanted = () if (level, hierarchy.quantity) in _OWN_ALONE else tolerances
-        chosen[hierarchy.quantity] = tuple(
+        values, quantity = Values(hierarchy), hierarchy.quantity
+        # Runs of the whole loop are timed once each, and not traced; a light study times no laws.
+        timer = Clock(repeats=1, memory=False) if quantity == _LOOP else clock
+        counts = timed and not (light and quantity in _BY_LAW)
+        shown = thinned(hierarchy) if light else hierarchy
+        trades.append(measure(shown, values=values, costs=costs, clock=timer if counts else None))
+        wanted = () if light and quantity == "transferred_mass" else tolerances
+        chosen[quantity] = tuple(
             choose(hierarchy, tolerance, costs=costs, values=values)
             for tolerance in (*wanted, held_tolerance(scene.tolerance))
             if hierarchy.points
@@ -111,26 +132,22 @@ def thinned(hierarchy: ModelHierarchy) -> ModelHierarchy:
     """A model hierarchy without the models that lie close to others; choices are made on the whole one."""
 
     def kept(fidelity: Fidelity) -> bool:
-        close = fidelity.models.get("level of a chamber") == QUADRATURE
-        return fidelity is hierarchy.top or not (
-            close or fidelity.models.get("operation in time") == EXPLICIT[MANY]
-        )
+        close = {QUADRATURE, EXPLICIT[-1]} & set(fidelity.models.values())
+        return fidelity is hierarchy.top or "level of a chamber" not in fidelity.models or not close
 
     return replace(hierarchy, fidelities=tuple(filter(kept, hierarchy.fidelities)))
 
 
-def _no_longer(clock: Clock | None, hierarchy: ModelHierarchy) -> Clock | None:
-    """Runs of the whole loop are timed once each, and not traced; a light study times no laws."""
-    if clock is None or (clock.repeats == 1 and hierarchy.quantity in _LAWS):
-        return None
-    return Clock(repeats=1, memory=False) if hierarchy.quantity == "settling_time" else clock
+def _timed(trades: Sequence[Trade]) -> list[tuple[Work, float]]:
+    """Counted work over all points, and s, of all timed models."""
+    return [(m.counted, m.seconds) for trade in trades for m in trade.fidelities if m.seconds is not None]
 
 
 def _refitted(trades: Sequence[Trade], *, costs: CostModel) -> CostModel | None:
     """Fit the cost model again to measured times; kinds of work without a time keep to `costs`."""
-    works, seconds = works_and_seconds(trades)
-    if not seconds:
+    if not (timed := _timed(trades)):
         return None
+    works, seconds = zip(*timed, strict=True)
     told = f"processor times of {len(seconds)} models"
     return fitted_costs(works=works, seconds=seconds, fitted_on=told, prior=costs)
 
@@ -149,8 +166,13 @@ def tolerance_text(tolerance: float, say: Callable[[float], str]) -> str:
 def terms_document(scene: Scene) -> list[Record]:
     """Estimated contribution of every physical term of a scene, as plain numbers and texts."""
     return [
-        {"term": e.term, "estimated_contribution": e.contribution, "above": e.above, "why": e.reason}
-        for e in term_estimates(scene).values()
+        {
+            "term": c.term,
+            "estimated_contribution": c.value,
+            "above": c.above(scene.tolerance),
+            "why": c.reason(scene.tolerance),
+        }
+        for c in term_estimates(scene).values()
     ]
 
 
@@ -207,8 +229,8 @@ def _choice_document(choice: Choice) -> Record:
 def _times(study: TradeStudy) -> Record | None:
     if study.refit is None:
         return None
-    works, seconds = works_and_seconds(study.trades)
-    ratios = np.array([study.costs.cost(w) for w in works]) / np.array(seconds)
+    ratios = np.array([study.costs.cost(work) / seconds for work, seconds in _timed(study.trades)])
+    low, middle, high = (float(np.quantile(ratios, q)) for q in (0.1, 0.5, 0.9))
     return {
         "rungs": {
             trade.hierarchy.quantity: [
@@ -218,9 +240,5 @@ def _times(study: TradeStudy) -> Record | None:
             for trade in study.trades
         },
         "refit_seconds": dict(study.refit.seconds),
-        "counted_over_measured": {
-            "median": float(np.median(ratios)),
-            "low": float(np.quantile(ratios, 0.1)),
-            "high": float(np.quantile(ratios, 0.9)),
-        },
+        "counted_over_measured": {"median": middle, "low": low, "high": high},
     }

@@ -12,12 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.data.measurements import (
-    Measurements,
-    MeasurementsError,
-    read_measurements,
-)
-from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
+from ringbalance.identification.data.measurements import Measurements, MeasurementsError
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
 from ringbalance.verification.validation.kinds import Kind, measurements
@@ -61,10 +57,13 @@ class Comparison:
     uncertainty: FloatArray
     """U_D, relative."""
     series: StringArray
+    columns: Mapping[str, FloatArray]
+    """What the predictions need, and what else all data sets have."""
 
-    def where(self, chosen: BoolArray) -> Comparison:
-        """Some of the points."""
-        return Comparison(**{name: column[chosen] for name, column in vars(self).items()})
+    def where(self, chosen: BoolArray | IntArray | slice) -> Comparison:
+        """Some of the points, or all in another order."""
+        own = {name: column[chosen] for name, column in vars(self).items() if name != "columns"}
+        return Comparison(**own, columns={name: column[chosen] for name, column in self.columns.items()})
 
     @property
     def statistics(self) -> ModelStatistics:
@@ -87,6 +86,16 @@ class Comparison:
             found=Found(value=self.statistics.share_within),
             reference=None,
         ).verdict
+
+    def over_reynolds(self, of: str) -> Series:
+        """Predicted friction factors with their stated uncertainty, and the measured ones."""
+        return figure(
+            f"friction factor of {of}, measured and predicted",
+            ("Reynolds number", "1", self.columns["reynolds"]),
+            Curve("predicted", "1", self.predicted, uncertainty=self.stated),
+            Curve("measured", "1", self.measured, style="points"),
+            log=True,
+        )
 
     def scatter(self, name: str, unit: str) -> Series:
         """Predicted over measured values. Args: `name`: of the quantity. `unit`: its SI unit."""
@@ -111,13 +120,21 @@ def compare(*sets: Measurements, mutation: str | None = None) -> Comparison:
     for each in sets:
         _check(each, kind)
     predictions = [kind.predict(each) for each in sets]
+    shared = set.intersection(*(set(each.columns) for each in sets))
     return Comparison(
         measured=np.concatenate([each.columns[kind.measured] for each in sets]),
         predicted=MUTATIONS[mutation] * np.concatenate([one.value for one in predictions]),
         stated=np.concatenate([one.stated for one in predictions]),
         uncertainty=np.concatenate([each.uncertainty for each in sets]),
         series=np.concatenate([each.series for each in sets]),
+        columns={name: np.concatenate([each.columns[name] for each in sets]) for name in sorted(shared)},
     )
+
+
+def friction(*sets: Measurements, mutation: str | None = None) -> Comparison:
+    """`compare` friction factors, in ascending order of the Reynolds number."""
+    found = compare(*sets, mutation=mutation)
+    return found.where(np.argsort(found.columns["reynolds"], kind="stable"))
 
 
 def kind_of(data: Measurements) -> Kind:
@@ -194,7 +211,7 @@ def data_document(path: Path) -> dict[str, Any]:
 
     Raises: MeasurementsError: not such a file, or too few points; with the file's name in every line.
     """
-    data = read_measurements(path)
+    data = Measurements.read(path)
     try:
         kind, comparison = kind_of(data), compare(data)
         if len(data) < _FEWEST:

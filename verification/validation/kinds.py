@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 
-from ringbalance.identification.data.measurements import Measurements, parse_measurements
+from ringbalance.identification.data.measurements import Measurements
 from ringbalance.scene.arrays import FloatArray
 
 
@@ -36,4 +36,4 @@ class Kind:
 def measurements(name: str) -> Measurements:
     """The data set of a file in `data/`, by its name without ".csv"."""
     path = files("ringbalance.verification.validation") / "data" / f"{name}.csv"
-    return parse_measurements(path.read_text(encoding="utf-8"), file=f"{name}.csv")
+    return Measurements.parsed(path.read_text(encoding="utf-8"), file=f"{name}.csv")

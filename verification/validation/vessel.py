@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.identification.data.measurements import Measurements, MeasurementsError
-from ringbalance.physics.gas.supply import HEAT_CAPACITY_RATIO, GasLine
+from ringbalance.physics.gas import HEAT_CAPACITY_RATIO, GasLine
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.validation.kinds import Kind, Prediction
 

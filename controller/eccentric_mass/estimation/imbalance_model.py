@@ -35,6 +35,20 @@ class WhirlModel(NamedTuple):
     stiffness: float
     """K_B, N/m."""
 
+    def euler_step_limit(self, *, angular_velocity: npt.ArrayLike) -> FloatArray:
+        """Longest step at which the explicit Euler transition of the paper does not grow.
+
+        Each eigenvalue p of the whirl in the rotor's frame must keep |1 + p dt| at most 1, so
+        dt = min(-2 Re p / |p|^2), with p = s - j W and s the roots of M s^2 + C_B s + K_B.
+        Returns: Longest step, s, of that shape; zero without damping.
+        Source: follows from Eq. 14 of the paper on eccentric masses.
+        """
+        w = np.asarray(angular_velocity, dtype=np.float64)
+        half = self.damping / (2 * self.mass)
+        root = cmath.sqrt(half**2 - self.stiffness / self.mass)
+        limits = [-2 * s.real / np.abs(s - 1j * w) ** 2 for s in (-half + root, -half - root)]
+        return np.asarray(np.minimum(*limits), dtype=np.float64)
+
 
 class ProcessNoise(NamedTuple):
     """White noise that drives the state, as power per unit time."""
@@ -56,21 +70,6 @@ class FilterMatrices(NamedTuple):
     """Shape (6, 6): covariance that the process noise adds in one step."""
     observation: FloatArray
     """Shape (4, 6): what the sensor would show of a state."""
-
-
-def euler_step_limit(*, model: WhirlModel, angular_velocity: npt.ArrayLike) -> FloatArray:
-    """Longest step at which the explicit Euler transition of the paper does not grow.
-
-    Each eigenvalue p of the whirl in the rotor's frame must keep |1 + p dt| at most 1, so
-    dt = min(-2 Re p / |p|^2), with p = s - j W and s the roots of M s^2 + C_B s + K_B.
-    Returns: Longest step, s, of that shape; zero without damping.
-    Source: follows from Eq. 14 of the paper on eccentric masses.
-    """
-    w = np.asarray(angular_velocity, dtype=np.float64)
-    half = model.damping / (2 * model.mass)
-    root = cmath.sqrt(half**2 - model.stiffness / model.mass)
-    limits = [-2 * s.real / np.abs(s - 1j * w) ** 2 for s in (-half + root, -half - root)]
-    return np.asarray(np.minimum(*limits), dtype=np.float64)
 
 
 @compiled

@@ -11,9 +11,9 @@ import numpy as np
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import SIZE, rest_state, stuck_flags
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at
+from ringbalance.controller.eccentric_mass.plant.speed import speed_at
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -87,10 +87,10 @@ def run_plant(
     """
     check_substeps(scene)
     step = scene.sensor.step
-    count = round(scene.run.time_limit / step)
+    count = scene.samples - 1
     voltages = np.zeros((count, 2)) if commands is None else np.ascontiguousarray(commands, dtype=np.float64)
-    times, speeds = profile_arrays(scene.rotor)
-    parameters = plant_parameters(scene)
+    times, speeds = scene.rotor.profile
+    parameters = PlantParameters.of(scene)
     states, flags = np.empty((count + 1, SIZE)), np.empty((count + 1, 2), dtype=np.int64)
     states[0], flags[0] = rest_state(scene.masses.initial_angle), stuck_flags(LOCKED if locked else STUCK)
     for begin, end in stretches(count):

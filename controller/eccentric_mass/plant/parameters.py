@@ -1,8 +1,13 @@
-"""The plant's constants, gathered from a scene into plain numbers that compiled functions take."""
+"""The plant's constants, gathered from a scene into plain numbers that compiled functions take.
+
+With masses at rest on the track they give the steady whirl in closed form.
+"""
 
 from __future__ import annotations
 
+import cmath
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ringbalance.scene.eccentric_models import EccentricScene, Motor
@@ -44,34 +49,58 @@ class PlantParameters(NamedTuple):
     maximum_voltage: float
     """V; infinite for no limit."""
 
+    def influence(self, speed: float) -> complex:
+        """Steady vibration per unbalance.
 
-def plant_parameters(scene: EccentricScene) -> PlantParameters:
-    """Gather the plant's constants.
+        alpha = W^2 / (K_B - M W^2 + j C_B W).
+        Returns: m/(kg m), complex: the lag is minus its phase.
+        Raises: ValueError: no damping, at the critical speed.
+        """
+        stiffness = complex(self.stiffness - self.mass * speed**2, self.damping * speed)
+        if stiffness == 0:
+            raise ValueError("a rotor without damping has no steady whirl at its critical speed")
+        return speed**2 / stiffness
 
-    J_add = (J_1 + J_2 (N_1/N_2)^2) (N_3/N_1)^2, C_add = K_i K_m / R_m (N_3/N_1)^2, B_add = K_i / R_m N_3/N_1.
-    Source: Appendix A of the paper on eccentric masses, rederived; its Eq. (A9) with all signs.
-    """
-    masses, rotor, imbalance, motor = scene.masses, scene.rotor, scene.imbalance, scene.motor
-    ratio = motor.teeth[2] / motor.teeth[0]
-    moment = masses.mass * masses.guide_radius
-    return PlantParameters(
-        mass=rotor.mass + 2 * masses.mass,
-        damping=rotor.damping,
-        stiffness=rotor.stiffness,
-        unbalance=imbalance.mass * imbalance.radius,
-        phase=imbalance.phase,
-        moment=moment,
-        inertia=moment * masses.guide_radius,
-        drive_inertia=_reflected_inertia(motor),
-        drive_damping=motor.torque_constant * motor.back_emf_constant / motor.resistance * ratio**2,
-        drive_gain=motor.torque_constant / motor.resistance * ratio,
-        friction_arm_1=masses.friction_arm[0],
-        friction_arm_2=masses.friction_arm[1],
-        gear_ratio=ratio,
-        back_emf_constant=motor.back_emf_constant,
-        resistance=motor.resistance,
-        maximum_voltage=math.inf if motor.maximum_voltage is None else motor.maximum_voltage,
-    )
+    def steady_whirl(self, speed: float, angles: Sequence[float]) -> complex:
+        """Displacement x + j y in the rotor's frame at constant speed, masses at rest on the track.
+
+        alpha (U exp(j phi_m) + b sum exp(j phi_i)).
+        Returns: m, complex; its magnitude is the zero-to-peak vibration.
+        Raises: ValueError: no damping, at the critical speed.
+        """
+        masses = sum(cmath.exp(1j * angle) for angle in angles)
+        moment = self.unbalance * cmath.exp(1j * self.phase) + self.moment * masses
+        return self.influence(speed) * moment
+
+    @classmethod
+    def of(cls, scene: EccentricScene) -> PlantParameters:
+        """Gather the plant's constants.
+
+        J_add = (J_1 + J_2 (N_1/N_2)^2) (N_3/N_1)^2, C_add = K_i K_m / R_m (N_3/N_1)^2,
+        B_add = K_i / R_m N_3/N_1.
+        Source: Appendix A of the paper on eccentric masses, rederived; its Eq. (A9) with all signs.
+        """
+        masses, rotor, imbalance, motor = scene.masses, scene.rotor, scene.imbalance, scene.motor
+        ratio = motor.teeth[2] / motor.teeth[0]
+        moment = masses.mass * masses.guide_radius
+        return cls(
+            mass=rotor.mass + 2 * masses.mass,
+            damping=rotor.damping,
+            stiffness=rotor.stiffness,
+            unbalance=imbalance.mass * imbalance.radius,
+            phase=imbalance.phase,
+            moment=moment,
+            inertia=moment * masses.guide_radius,
+            drive_inertia=_reflected_inertia(motor),
+            drive_damping=motor.torque_constant * motor.back_emf_constant / motor.resistance * ratio**2,
+            drive_gain=motor.torque_constant / motor.resistance * ratio,
+            friction_arm_1=masses.friction_arm[0],
+            friction_arm_2=masses.friction_arm[1],
+            gear_ratio=ratio,
+            back_emf_constant=motor.back_emf_constant,
+            resistance=motor.resistance,
+            maximum_voltage=math.inf if motor.maximum_voltage is None else motor.maximum_voltage,
+        )
 
 
 def _reflected_inertia(motor: Motor) -> float:

@@ -2,26 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
-import numpy as np
-
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene
-
-
-def profile_arrays(rotor: EccentricRotor) -> tuple[FloatArray, FloatArray]:
-    """Times, s, and speeds, rad/s, of the corners of the speed profile."""
-    times = np.array([corner.time for corner in rotor.speed_profile])
-    return times, np.array([corner.speed for corner in rotor.speed_profile])
-
-
-def steady_until(scene: EccentricScene) -> float | None:
-    """Time at which the speed first changes, s; None: it keeps its first value to the end of the run."""
-    profile = scene.rotor.speed_profile
-    changes = [here.time for here, after in pairwise(profile) if here.speed != after.speed]
-    return changes[0] if changes and 0 < changes[0] < scene.run.time_limit else None
 
 
 @compiled

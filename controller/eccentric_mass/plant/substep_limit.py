@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.integrate import LONGEST, fastest_rate
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.units import format_quantity
@@ -50,9 +49,9 @@ def longest_run(scene: EccentricScene) -> float:
 
 
 def _substeps(scene: EccentricScene) -> float:
-    parameters, step = plant_parameters(scene), scene.sensor.step
-    times, speeds = profile_arrays(scene.rotor)
-    samples = round(scene.run.time_limit / step) + 1
+    parameters, step = PlantParameters.of(scene), scene.sensor.step
+    times, speeds = scene.rotor.profile
+    samples = scene.samples
     # Not at every sample: close enough for a limit, and cheap.
     at = np.linspace(0.0, scene.run.time_limit, min(samples, 10_000))
     rates = np.abs(np.interp(at, times, speeds)) + fastest_rate(parameters, 0.0)
@@ -61,7 +60,7 @@ def _substeps(scene: EccentricScene) -> float:
 
 def _fastest(scene: EccentricScene) -> tuple[tuple[str, str], str, str]:
     """Key, present value and limit of the largest of the rates that the steps follow from."""
-    plant, resistance = plant_parameters(scene), scene.motor.resistance
+    plant, resistance = PlantParameters.of(scene), scene.motor.resistance
     least = plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / plant.mass
     speed = max(abs(point.speed) for point in scene.rotor.speed_profile)
     whirl, damped = math.sqrt(plant.stiffness / plant.mass), plant.damping / plant.mass

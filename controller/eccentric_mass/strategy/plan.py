@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from enum import IntEnum
 from typing import Final, NamedTuple
 
-from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.strategy.fine_tuning import Tuning, tuning_start
+from ringbalance.controller.eccentric_mass.strategy.fine_tuning import Tuning
 
 Pair = tuple[float, float]
 
@@ -180,17 +178,3 @@ class Plan(NamedTuple):
     progress: Progress
     tuning: Tuning
     findings: Findings
-
-
-@compiled
-def first_plan(goal: Pair, time: float) -> Plan:
-    """The plan before the first sample. Returns: Plan, waiting."""
-    nothing = Findings(False, 0.0, math.inf, 0, 0)
-    tuning = tuning_start(goal[0], goal[1], math.inf, 1.0)
-    return Plan(0, time, 0, goal, MOVING, setting_out(time), tuning, nothing)
-
-
-@compiled
-def setting_out(time: float) -> Progress:
-    """Progress at the beginning of a move. Returns: Progress, with nothing arrived or averaged yet."""
-    return Progress(time, NOT_YET, NOT_YET, 0.0j, 0)

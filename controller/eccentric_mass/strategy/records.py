@@ -1,21 +1,13 @@
-"""Settings, state and sampled inputs of the strategy."""
+"""State and sampled inputs of the strategy."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
-    FrictionEstimate,
-    FrictionNoise,
-    TrackModel,
-)
+from ringbalance.controller.eccentric_mass.estimation.friction_filter import FrictionEstimate
 from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import ImbalanceEstimate
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
-    FilterMatrices,
-    ProcessNoise,
-    WhirlModel,
-)
-from ringbalance.controller.eccentric_mass.strategy.plan import Gates, Plan
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices
+from ringbalance.controller.eccentric_mass.strategy.plan import Plan
 from ringbalance.scene.arrays import FloatArray
 
 Pair = tuple[float, float]
@@ -39,27 +31,6 @@ class EccentricMeasurement(NamedTuple):
     """Of the masses, rad/s."""
 
 
-class DriveLaw(NamedTuple):
-    """What the law of the voltages knows of masses, drives and sensors."""
-
-    whirl: WhirlModel
-    track: TrackModel
-    mass_inertia: float
-    """J of one mass alone, kg m^2."""
-    torque_per_volt: float
-    """B_add, N m/V."""
-    maximum_voltage: float
-    """V; infinite for no limit."""
-    position_gain: float
-    rate_gain: float
-    breaks_away: bool
-    """Whether friction is compensated so that a mass at rest breaks away; else it is not compensated."""
-    slow: float
-    """Rate below which a mass counts as resting, rad/s."""
-    near: float
-    """Distance from its place within which a resting mass is left to friction, rad."""
-
-
 class Motion(NamedTuple):
     """What the law sees of rotor and masses, in the rotor's frame."""
 
@@ -73,63 +44,6 @@ class Motion(NamedTuple):
     """z', m/s."""
     angle: Pair
     rate: Pair
-
-
-class ImbalanceSettings(NamedTuple):
-    """Of the imbalance filter."""
-
-    noise: ProcessNoise
-    position_deviation: float
-    """Of the displacement sensors as assumed, m."""
-    velocity_deviation: float
-    """Of the velocity sensors as assumed, m/s."""
-    start_position: float
-    """Standard deviation before the first sample, m."""
-    start_velocity: float
-    start_imbalance: float
-    encoder_deviation: float
-    encoder_rate_deviation: float
-    euler: bool
-    """The paper's transition in place of the exact one."""
-    every: int
-    """Samples between two steps."""
-
-
-class FrictionSettings(NamedTuple):
-    """Of the friction filter and the drive meanwhile."""
-
-    start: FrictionEstimate
-    noise: FrictionNoise
-    track: TrackModel
-    """Whose inertia is less by b^2/M, as the rotor gives way."""
-    least_motion: float
-    """Smoothed rate below which a mass teaches the filter nothing."""
-    euler: bool
-    """The paper's transition in place of the exponential one."""
-    every: int
-    """Samples between two steps."""
-    drive_speed: float
-    speed_gain: float
-    """gamma, V s/rad."""
-    pair_gain: float
-    """V/rad; zero: the paper's law."""
-
-
-class StrategySettings(NamedTuple):
-    """All that does not change."""
-
-    step: float
-    """Between samples, s."""
-    laboratory: bool
-    """Whether the vibration is measured in the fixed frame."""
-    smoothing: float
-    """Share of a new sample in the smoothed angles, rates and vibration."""
-    voltage_every: int
-    """Samples for which a voltage is held."""
-    law: DriveLaw
-    gates: Gates
-    imbalance: ImbalanceSettings
-    friction: FrictionSettings
 
 
 class Smoothed(NamedTuple):

@@ -1,8 +1,9 @@
-"""From a scene to what the strategy is given."""
+"""What the strategy is given, and how it follows from a scene."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     FrictionEstimate,
@@ -10,14 +11,8 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     TrackModel,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise, WhirlModel
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.strategy.plan import Gates
-from ringbalance.controller.eccentric_mass.strategy.records import (
-    DriveLaw,
-    FrictionSettings,
-    ImbalanceSettings,
-    StrategySettings,
-)
 from ringbalance.scene.eccentric_control_models import Supervisor
 from ringbalance.scene.eccentric_models import EccentricScene
 
@@ -42,6 +37,119 @@ FRICTION_ERROR = 0.1
 """Share of the arrival angle that unknown friction may hold a mass off."""
 
 
+class DriveLaw(NamedTuple):
+    """What the law of the voltages knows of masses, drives and sensors."""
+
+    whirl: WhirlModel
+    track: TrackModel
+    mass_inertia: float
+    """J of one mass alone, kg m^2."""
+    torque_per_volt: float
+    """B_add, N m/V."""
+    maximum_voltage: float
+    """V; infinite for no limit."""
+    position_gain: float
+    rate_gain: float
+    breaks_away: bool
+    """Whether friction is compensated so that a mass at rest breaks away; else it is not compensated."""
+    slow: float
+    """Rate below which a mass counts as resting, rad/s."""
+    near: float
+    """Distance from its place within which a resting mass is left to friction, rad."""
+
+    @classmethod
+    def of(cls, scene: EccentricScene) -> DriveLaw:
+        """What the law of the voltages knows."""
+        plant, track = PlantParameters.of(scene), track_model(scene)
+        position_gain, rate_gain = lqr_gain(
+            track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight
+        )
+        return cls(
+            whirl=believed_whirl(scene),
+            track=track,
+            mass_inertia=plant.inertia,
+            torque_per_volt=plant.drive_gain,
+            maximum_voltage=plant.maximum_voltage,
+            position_gain=position_gain,
+            rate_gain=rate_gain,
+            breaks_away=scene.lqr.friction_compensation == "break_away",
+            slow=max(3 * scene.sensor.encoder_rate_noise, _SLOWEST_RATE),
+            near=_near(scene),
+        )
+
+
+class _ImbalanceSettings(NamedTuple):
+    """Of the imbalance filter."""
+
+    noise: ProcessNoise
+    position_deviation: float
+    """Of the displacement sensors as assumed, m."""
+    velocity_deviation: float
+    """Of the velocity sensors as assumed, m/s."""
+    start_position: float
+    """Standard deviation before the first sample, m."""
+    start_velocity: float
+    start_imbalance: float
+    encoder_deviation: float
+    encoder_rate_deviation: float
+    euler: bool
+    """The paper's transition in place of the exact one."""
+    every: int
+    """Samples between two steps."""
+
+
+class _FrictionSettings(NamedTuple):
+    """Of the friction filter and the drive meanwhile."""
+
+    start: FrictionEstimate
+    noise: FrictionNoise
+    track: TrackModel
+    """Whose inertia is less by b^2/M, as the rotor gives way."""
+    least_motion: float
+    """Smoothed rate below which a mass teaches the filter nothing."""
+    euler: bool
+    """The paper's transition in place of the exponential one."""
+    every: int
+    """Samples between two steps."""
+    drive_speed: float
+    speed_gain: float
+    """gamma, V s/rad."""
+    pair_gain: float
+    """V/rad; zero: the paper's law."""
+
+
+class StrategySettings(NamedTuple):
+    """All that does not change."""
+
+    step: float
+    """Between samples, s."""
+    laboratory: bool
+    """Whether the vibration is measured in the fixed frame."""
+    smoothing: float
+    """Share of a new sample in the smoothed angles, rates and vibration."""
+    voltage_every: int
+    """Samples for which a voltage is held."""
+    law: DriveLaw
+    gates: Gates
+    imbalance: _ImbalanceSettings
+    friction: _FrictionSettings
+
+    @classmethod
+    def of(cls, scene: EccentricScene) -> StrategySettings:
+        """Gather what the strategy needs."""
+        step = scene.sensor.step
+        return cls(
+            step=step,
+            laboratory=scene.sensor.frame == "laboratory",
+            smoothing=-math.expm1(-step / _SMOOTHING_TIME),
+            voltage_every=max(round(scene.lqr.step / step), 1),
+            law=DriveLaw.of(scene),
+            gates=_gates(scene),
+            imbalance=_imbalance(scene),
+            friction=_friction(scene),
+        )
+
+
 def believed_whirl(scene: EccentricScene) -> WhirlModel:
     """The rotor as configured in filter and controller; its mass includes the eccentric masses."""
     told = scene.imbalance_filter
@@ -50,28 +158,13 @@ def believed_whirl(scene: EccentricScene) -> WhirlModel:
 
 def track_model(scene: EccentricScene) -> TrackModel:
     """One eccentric mass with its drive."""
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     return TrackModel(plant.inertia + plant.drive_inertia, plant.drive_damping, plant.moment)
 
 
-def strategy_settings(scene: EccentricScene) -> StrategySettings:
-    """Gather what the strategy needs."""
-    step = scene.sensor.step
-    return StrategySettings(
-        step=step,
-        laboratory=scene.sensor.frame == "laboratory",
-        smoothing=-math.expm1(-step / _SMOOTHING_TIME),
-        voltage_every=max(round(scene.lqr.step / step), 1),
-        law=drive_law(scene),
-        gates=_gates(scene),
-        imbalance=_imbalance(scene),
-        friction=_friction(scene),
-    )
-
-
-def _imbalance(scene: EccentricScene) -> ImbalanceSettings:
+def _imbalance(scene: EccentricScene) -> _ImbalanceSettings:
     told, sensor = scene.imbalance_filter, scene.sensor
-    return ImbalanceSettings(
+    return _ImbalanceSettings(
         noise=ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2),
         position_deviation=told.position_noise,
         velocity_deviation=told.velocity_noise,
@@ -85,14 +178,14 @@ def _imbalance(scene: EccentricScene) -> ImbalanceSettings:
     )
 
 
-def _friction(scene: EccentricScene) -> FrictionSettings:
+def _friction(scene: EccentricScene) -> _FrictionSettings:
     told, track, sensor = scene.friction_filter, track_model(scene), scene.sensor
     given_way = track.moment**2 / believed_whirl(scene).mass
     inertia = track.inertia - given_way
     # The other mass's acceleration is a difference of two measured rates.
     noise = told.rate_noise**2 * (1 + 2 * (given_way / inertia) ** 2)
     smooth = sensor.encoder_rate_noise * math.sqrt(sensor.step / (2 * _SMOOTHING_TIME))
-    return FrictionSettings(
+    return _FrictionSettings(
         start=FrictionEstimate(0.0, 0.0, told.initial_rate**2, 0.0, told.initial_friction**2),
         noise=FrictionNoise(noise, told.rate_walk**2, told.friction_walk**2),
         track=track._replace(inertia=inertia),
@@ -119,26 +212,6 @@ def lqr_gain(track: TrackModel, *, state_weight: float, input_weight: float) -> 
     return position, more / (math.sqrt(track.damping**2 + more) + track.damping)
 
 
-def drive_law(scene: EccentricScene) -> DriveLaw:
-    """What the law of the voltages knows."""
-    plant, track = plant_parameters(scene), track_model(scene)
-    position_gain, rate_gain = lqr_gain(
-        track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight
-    )
-    return DriveLaw(
-        whirl=believed_whirl(scene),
-        track=track,
-        mass_inertia=plant.inertia,
-        torque_per_volt=plant.drive_gain,
-        maximum_voltage=plant.maximum_voltage,
-        position_gain=position_gain,
-        rate_gain=rate_gain,
-        breaks_away=scene.lqr.friction_compensation == "break_away",
-        slow=max(3 * scene.sensor.encoder_rate_noise, _SLOWEST_RATE),
-        near=_near(scene),
-    )
-
-
 def _near(scene: EccentricScene) -> float:
     """A quarter of the finest move asked for, but not finer than the smoothed encoder can tell."""
     finest = min(scene.fine_tuning.stop, scene.supervisor.arrival_angle)
@@ -155,7 +228,7 @@ def _least_estimate(scene: EccentricScene) -> float:
 
 def _gates(scene: EccentricScene) -> Gates:
     told, tuning = scene.supervisor, scene.fine_tuning
-    plant, law = plant_parameters(scene), drive_law(scene)
+    plant, law = PlantParameters.of(scene), DriveLaw.of(scene)
     averaged = max(tuning.average / scene.sensor.step, 1.0)
     return Gates(
         **{name: getattr(told, name) for name in _SUPERVISOR_KEYS},

@@ -35,24 +35,24 @@ from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
     share_of_friction,
     voltage_for,
 )
-from ringbalance.controller.eccentric_mass.strategy.plan import Facts, Plan, first_plan
+from ringbalance.controller.eccentric_mass.strategy.plan import Facts, Plan
 from ringbalance.controller.eccentric_mass.strategy.records import (
     Beliefs,
-    DriveLaw,
     EccentricMeasurement,
     Motion,
     Pair,
     Smoothed,
-    StrategySettings,
     StrategyState,
     Whirl,
 )
+from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw, StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.supervisor import (
     CHECK,
     FAILED,
     FRICTION,
     IMBALANCE,
     REST,
+    first_plan,
     supervise,
 )
 from ringbalance.scene.arrays import FloatArray

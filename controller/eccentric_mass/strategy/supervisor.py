@@ -27,7 +27,6 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
     Plan,
     Progress,
     Stage,
-    setting_out,
 )
 from ringbalance.controller.eccentric_mass.strategy.targets import assign, target_angles
 
@@ -41,6 +40,20 @@ _HOLDS_FOR_SURE: Final = 0.7
 """Share of the friction known to be there that the drives may be switched off on."""
 STALLED_SHARE: Final = 0.5
 """Of the friction stage, beyond which its failure is blamed on the drive."""
+
+
+@compiled
+def first_plan(goal: Pair, time: float) -> Plan:
+    """The plan before the first sample. Returns: Plan, waiting."""
+    nothing = Findings(False, 0.0, math.inf, 0, 0)
+    tuning = tuning_start(goal[0], goal[1], math.inf, 1.0)
+    return Plan(0, time, 0, goal, MOVING, _setting_out(time), tuning, nothing)
+
+
+@compiled
+def _setting_out(time: float) -> Progress:
+    """Progress at the beginning of a move. Returns: Progress, with nothing arrived or averaged yet."""
+    return Progress(time, NOT_YET, NOT_YET, 0.0j, 0)
 
 
 @compiled
@@ -254,7 +267,7 @@ def _judged(plan: Plan, objective: float) -> Plan:
 @compiled
 def _enter(plan: Plan, stage: int, time: float, cause: int, goal: Pair) -> Plan:
     """Begin a stage. Returns: The plan, with its tuning and findings."""
-    return Plan(stage, time, cause, goal, MOVING, setting_out(time), plan.tuning, plan.findings)
+    return Plan(stage, time, cause, goal, MOVING, _setting_out(time), plan.tuning, plan.findings)
 
 
 @compiled
@@ -284,7 +297,7 @@ def _with_hold(plan: Plan, hold: int) -> Plan:
 @compiled
 def _with_trial(plan: Plan, time: float, tuning: Tuning, goal: Pair) -> Plan:
     """The plan that sets out to a trial of fine tuning."""
-    return Plan(plan.stage, plan.entered, plan.cause, goal, MOVING, setting_out(time), tuning, plan.findings)
+    return Plan(plan.stage, plan.entered, plan.cause, goal, MOVING, _setting_out(time), tuning, plan.findings)
 
 
 @compiled

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.sampled_loops import recommended_gains
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.scene import EccentricScene, SceneError, bundled_scene, load_scene
 from ringbalance.verification.eccentric_mass.scenes import changed
@@ -49,15 +49,15 @@ def test_the_remedy_of_a_diverging_run_is_true(unlimited: EccentricScene) -> Non
     for key, value in simulate_eccentric(unlimited).remedies[0].changes:
         table, name = key.split(".")
         mended = changed(mended, table, **{name: value})
-    assert all(loop.stable for loop in recommended_gains(mended).loops)
+    assert all(loop.stable for loop in RecommendedGains.of(mended).loops)
     assert simulate_eccentric(mended).settled
 
 
 def test_sampled_poles_of_the_small_scene(unlimited: EccentricScene) -> None:
-    assert recommended_gains(unlimited).speed.radius == pytest.approx(1.34, abs=0.01)
-    gain = recommended_gains(unlimited).speed.recommended
+    assert RecommendedGains.of(unlimited).speed.radius == pytest.approx(1.34, abs=0.01)
+    gain = RecommendedGains.of(unlimited).speed.recommended
     half = replace(unlimited, friction_filter=replace(unlimited.friction_filter, speed_gain=2 * gain))
-    assert recommended_gains(half).speed.radius == pytest.approx(1.0)
+    assert RecommendedGains.of(half).speed.radius == pytest.approx(1.0)
 
 
 def test_a_plant_too_stiff_is_refused_with_key_and_limit(unlimited: EccentricScene) -> None:

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque
-from ringbalance.controller.eccentric_mass.strategy.settings import drive_law
+from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw
 from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.units import FieldError
@@ -65,8 +64,8 @@ def test_figure_six_grows_only_with_what_compensation_leaves(scene: EccentricSce
 
 def test_figure_seven_balances_both_imbalances(scene: EccentricScene) -> None:
     found = figure_seven(scene, time_limit=20.0)
-    plant = plant_parameters(scene)
-    expected = abs(steady_whirl(plant, 100 * RPM, (0.0, math.pi)))
+    plant = PlantParameters.of(scene)
+    expected = abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.before == pytest.approx((expected, expected))
     assert max(found.after) < 2e-3 * expected
     for run in found.runs:
@@ -75,9 +74,9 @@ def test_figure_seven_balances_both_imbalances(scene: EccentricScene) -> None:
 
 def test_figure_eight_is_mended_by_fine_tuning(scene: EccentricScene) -> None:
     found = figure_eight(scene, time_limit=200.0)
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     # Both masses 10 degrees on turn the correction by 10 degrees: 2 sin 5 deg of the imbalance is left.
-    expected = 2 * math.sin(math.radians(5)) * abs(steady_whirl(plant, 100 * RPM, (0.0, math.pi)))
+    expected = 2 * math.sin(math.radians(5)) * abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.positioned == pytest.approx((expected, expected), rel=0.02)
     assert max(found.after) < scene.supervisor.limit
     for run in found.runs:
@@ -91,11 +90,11 @@ def test_figure_nine_passes_the_models_own_critical_speed(scene: EccentricScene)
     assert critical == pytest.approx(130.43, abs=0.01)
     assert numbers["without"] == pytest.approx(135.05, abs=0.01)
     # A ramp of 1 rpm/s peaks behind the steady peak.
-    expected, at = fixed_frame_peak(plant_parameters(scene))
+    expected, at = fixed_frame_peak(PlantParameters.of(scene))
     amplitude, speed = numbers["locked"], numbers["peak_speed"] * RPM
     assert amplitude == pytest.approx(expected, rel=1e-6)
     assert speed == pytest.approx(at, abs=1e-3)
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     ratio = plant.damping / (2 * math.sqrt(plant.stiffness * plant.mass))
     steady = critical * RPM / math.sqrt(1 - 2 * ratio**2)
     assert steady < speed < steady + 4 * RPM
@@ -111,7 +110,7 @@ def fixed_frame_peak(plant: PlantParameters) -> tuple[float, float]:
         force = plant.unbalance * complex(speed**2, -RPM) * cmath.exp(1j * (turn + plant.phase))
         return [q[1], (force - plant.damping * q[1] - plant.stiffness * q[0]) / plant.mass]
 
-    whirl = steady_whirl(plant, first, (0.0, math.pi))
+    whirl = plant.steady_whirl(first, (0.0, math.pi))
     begin = [whirl, 1j * first * whirl]
     grid = np.linspace(28, 38, 20001)
     found = solve_ivp(slope, (0, 38), begin, t_eval=grid, rtol=1e-10, atol=1e-13, method="DOP853")
@@ -120,7 +119,7 @@ def fixed_frame_peak(plant: PlantParameters) -> tuple[float, float]:
 
 
 def test_the_bound_holds_is_sharp_at_resonance_and_is_not_the_printed_one(scene: EccentricScene) -> None:
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     natural = math.sqrt(plant.stiffness / plant.mass)
     still = motion_bound(plant._replace(moment=0.0), speed=natural, rate=0.0)
     whirl = plant.unbalance * natural**2 / (plant.damping * natural)
@@ -140,7 +139,7 @@ def test_the_bound_holds_is_sharp_at_resonance_and_is_not_the_printed_one(scene:
 @pytest.mark.parametrize("damping", [0.0, 1e4])
 def test_the_bound_wants_a_rotor_that_swings(scene: EccentricScene, damping: float) -> None:
     with pytest.raises(ValueError, match="damping"):
-        motion_bound(plant_parameters(scene)._replace(damping=damping), speed=1.0, rate=0.0)
+        motion_bound(PlantParameters.of(scene)._replace(damping=damping), speed=1.0, rate=0.0)
 
 
 @pytest.mark.parametrize("key", ["assumed_mass", "assumed_stiffness", "assumed_damping"])
@@ -168,7 +167,7 @@ def stiffness(scene: EccentricScene, speed: float) -> complex:
 
 @pytest.mark.parametrize("share", [0.5, 0.999, 1.001, 1.5])
 def test_saturation_leaves_what_is_beyond_both_masses(scene: EccentricScene, share: float) -> None:
-    plant, gap = plant_parameters(scene), 0.05 / 0.23
+    plant, gap = PlantParameters.of(scene), 0.05 / 0.23
     reach = 2 * plant.moment * math.cos(gap / 2)
     found = target_angles(share * reach, 0.0, plant.moment, gap).residual
     assert found == pytest.approx(max(share - 1, 0) * reach, abs=1e-12)
@@ -186,7 +185,7 @@ def test_noise_takes_time_and_then_the_gate(scene: EccentricScene, noise: float,
 
 
 def test_the_printed_compensation_takes_the_angle_for_the_rate(scene: EccentricScene) -> None:
-    law = drive_law(scene)
+    law = DriveLaw.of(scene)
     arm, speed, angle, rate = 0.01, 10.47, 2.0, -1.0
     friction = -arm * law.track.moment * (speed + rate) ** 2
     assert friction_torque(law, arm, 0.0, speed, rate, 0.0) == pytest.approx(friction)

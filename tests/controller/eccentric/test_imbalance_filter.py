@@ -27,7 +27,6 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
     ProcessNoise,
     WhirlModel,
     _process_covariance,
-    euler_step_limit,
     euler_transition,
     filter_matrices,
     whirl_transition,
@@ -123,7 +122,7 @@ def test_process_covariance_is_van_loans() -> None:
 def test_eulers_step_limit_is_where_its_eigenvalues_leave_the_unit_circle(
     model: WhirlModel, speed: float
 ) -> None:
-    limit = float(euler_step_limit(model=model, angular_velocity=speed))
+    limit = float(model.euler_step_limit(angular_velocity=speed))
     for share, grows in ((0.999, False), (1.001, True)):
         radius = max(abs(np.linalg.eigvals(euler_transition(model, speed, share * limit)[:4, :4])))
         assert (radius > 1) == grows
@@ -131,7 +130,7 @@ def test_eulers_step_limit_is_where_its_eigenvalues_leave_the_unit_circle(
 
 def test_euler_has_no_step_without_damping() -> None:
     free = MODEL._replace(damping=0.0)
-    assert np.all(euler_step_limit(model=free, angular_velocity=[1.0, 10.0]) == 0)
+    assert np.all(free.euler_step_limit(angular_velocity=[1.0, 10.0]) == 0)
 
 
 def test_covariance_history_is_the_information_filters() -> None:

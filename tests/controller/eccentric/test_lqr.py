@@ -9,9 +9,9 @@ import pytest
 from scipy.linalg import expm, solve_continuous_are
 
 from ringbalance.controller.eccentric_mass.estimation.friction_filter import TrackModel
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.remedies import found_beforehand
-from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, recommended_gains
+from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -50,7 +50,7 @@ def scene(request: pytest.FixtureRequest) -> EccentricScene:
 
 
 def test_a_bundled_scene_needs_no_mending(scene: EccentricScene) -> None:
-    assert all(loop.stable and loop.gain_margin >= GAIN_MARGIN for loop in recommended_gains(scene).loops)
+    assert all(loop.stable and loop.gain_margin >= GAIN_MARGIN for loop in RecommendedGains.of(scene).loops)
     assert found_beforehand(scene) == ()
 
 
@@ -59,7 +59,7 @@ def held(scene: EccentricScene, position: float, rate: float, *, helped: bool) -
 
     The drive law adds the load of the rotor under the accelerations it wants when `helped`.
     """
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     total, given = plant.inertia + plant.drive_inertia, plant.moment**2 / plant.mass
     mass = np.array([[total - given, given], [given, total - given]])
     whole = np.zeros((6, 6))
@@ -76,7 +76,7 @@ def held(scene: EccentricScene, position: float, rate: float, *, helped: bool) -
 
 
 def test_sampled_poles_are_those_of_both_masses_on_their_rotor(scene: EccentricScene) -> None:
-    gains, plant = recommended_gains(scene), plant_parameters(scene)
+    gains, plant = RecommendedGains.of(scene), PlantParameters.of(scene)
     track = TrackModel(plant.inertia + plant.drive_inertia, plant.drive_damping, plant.moment)
     position, rate = lqr_gain(track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight)
     both = held(scene, position, rate, helped=False)
@@ -90,24 +90,24 @@ def test_sampled_poles_are_those_of_both_masses_on_their_rotor(scene: EccentricS
 
 
 def test_recommended_gains_leave_their_margin(scene: EccentricScene) -> None:
-    gains = recommended_gains(scene)
+    gains = RecommendedGains.of(scene)
     speed = changed(scene, "friction_filter", speed_gain=GAIN_MARGIN * gains.speed.recommended)
-    assert recommended_gains(speed).speed.radius == pytest.approx(1.0, abs=1e-9)
+    assert RecommendedGains.of(speed).speed.radius == pytest.approx(1.0, abs=1e-9)
     advised = changed(scene, "lqr", state_weight=gains.regulator.recommended)
     advised = changed(
         advised, "friction_filter", speed_gain=gains.speed.recommended, pair_gain=gains.pair.recommended
     )
-    assert all(loop.stable for loop in recommended_gains(advised).loops)
+    assert all(loop.stable for loop in RecommendedGains.of(advised).loops)
     shorter = changed(scene, "lqr", step=gains.step)
-    assert all(loop.stable for loop in recommended_gains(shorter).loops)
+    assert all(loop.stable for loop in RecommendedGains.of(shorter).loops)
 
 
 def test_the_drive_speed_overcomes_friction_and_a_free_mass_needs_none(scene: EccentricScene) -> None:
-    gains, plant = recommended_gains(scene), plant_parameters(scene)
+    gains, plant = RecommendedGains.of(scene), PlantParameters.of(scene)
     gain = min(scene.friction_filter.speed_gain, gains.speed.recommended)
     speed = scene.rotor.speed_profile[0].speed
     friction = max(scene.masses.friction_arm) * plant.moment * speed**2
     assert plant.drive_gain * gain * gains.drive_speed > 1.49 * friction
     free = changed(scene, "masses", friction_arm=(0.0, 0.0))
-    assert recommended_gains(free).drive_speed == scene.friction_filter.drive_speed
+    assert RecommendedGains.of(free).drive_speed == scene.friction_filter.drive_speed
     assert math.isfinite(gains.drive_speed)

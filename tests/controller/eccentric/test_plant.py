@@ -14,15 +14,14 @@ from scipy.integrate import solve_ivp
 from ringbalance.controller.eccentric_mass.plant import integrate
 from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, SLIDING, STUCK
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant, run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import (
     drive_of,
     electrical_energy,
     rest_state,
     stuck_flags,
 )
-from ringbalance.controller.eccentric_mass.plant.speed import profile_arrays, speed_at, turned
-from ringbalance.controller.eccentric_mass.plant.whirl import influence, steady_whirl
+from ringbalance.controller.eccentric_mass.plant.speed import speed_at, turned
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.eccentric_models import SpeedPoint
@@ -38,7 +37,7 @@ def scene() -> EccentricScene:
 
 @pytest.fixture(scope="module")
 def parameters(scene: EccentricScene) -> PlantParameters:
-    return plant_parameters(scene)
+    return PlantParameters.of(scene)
 
 
 def without_friction(parameters: PlantParameters) -> PlantParameters:
@@ -169,7 +168,7 @@ def test_steady_whirl(rpm: float, parameters: PlantParameters) -> None:
         np.zeros((3000, 2)),
         1e-2,
     )
-    expected = steady_whirl(parameters, speed, ANGLES)
+    expected = parameters.steady_whirl(speed, ANGLES)
     found = complex(states[-1, 0], states[-1, 1])
     assert abs(found - expected) < 1e-9 * abs(expected)
 
@@ -178,11 +177,11 @@ def test_influence_is_the_textbook_response(parameters: PlantParameters) -> None
     """U W^2 / sqrt((K - M W^2)^2 + (C W)^2), in phase below the critical speed and opposite far above it."""
     for speed in (1.0, 10.0, 13.66, 30.0, 1e4):
         size = speed**2 / math.hypot(1000 - 5.36 * speed**2, 10 * speed)
-        assert abs(influence(parameters, speed)) == pytest.approx(size, rel=1e-12)
-    assert cmath.phase(influence(parameters, 0.1)) == pytest.approx(-0.001, abs=1e-5)
-    assert influence(parameters, 1e4) == pytest.approx(-1 / 5.36, rel=1e-3)
+        assert abs(parameters.influence(speed)) == pytest.approx(size, rel=1e-12)
+    assert cmath.phase(parameters.influence(0.1)) == pytest.approx(-0.001, abs=1e-5)
+    assert parameters.influence(1e4) == pytest.approx(-1 / 5.36, rel=1e-3)
     with pytest.raises(ValueError, match="no steady whirl"):
-        influence(parameters._replace(damping=0.0, mass=10.0, stiffness=1000.0), 10.0)
+        parameters._replace(damping=0.0, mass=10.0, stiffness=1000.0).influence(10.0)
 
 
 def test_locked_run_up(scene: EccentricScene, parameters: PlantParameters) -> None:
@@ -279,7 +278,7 @@ def test_motor_equations_by_shaft_and_gear(parameters: PlantParameters) -> None:
 
 
 def test_speed_profile(scene: EccentricScene) -> None:
-    times, speeds = profile_arrays(scene.rotor)
+    times, speeds = scene.rotor.profile
     low, high = 100 * RPM, 230 * RPM
     assert speed_at(times, speeds, 60.0) == pytest.approx((low, 0.0))
     assert speed_at(times, speeds, 120.0) == pytest.approx((low, RPM))

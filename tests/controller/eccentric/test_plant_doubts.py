@@ -11,8 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass.plant.open_loop import PlantRun, run_plant
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.eccentric_models import SpeedPoint
@@ -29,12 +28,12 @@ def scene() -> EccentricScene:
 
 @pytest.fixture(scope="module")
 def p(scene: EccentricScene) -> PlantParameters:
-    return plant_parameters(scene)
+    return PlantParameters.of(scene)
 
 
 def test_k32_as_printed_misses_a_torque_as_large_as_friction(p: PlantParameters) -> None:
     """The matrix K: Omega^2 sin phi in place of -Omega^2 cos phi; at 100 rpm before balancing, phi = 0."""
-    whirl = steady_whirl(p, SPEED, OPPOSITE)
+    whirl = p.steady_whirl(SPEED, OPPOSITE)
     right = p.moment * SPEED**2 * (0.0 * whirl.real - 1.0 * whirl.imag)
     printed = p.moment * SPEED**2 * (0.0 * whirl.real + 0.0 * whirl.imag)
     friction = p.friction_arm_1 * p.moment * SPEED**2
@@ -102,7 +101,7 @@ def test_the_imbalance_on_top_of_the_rotor(p: PlantParameters) -> None:
     """With m_im beside m_r the critical speed is 128.3 rpm, and the whirl at 100 rpm 4.7 % larger."""
     heavier = p._replace(mass=p.mass + 0.18)
     assert math.sqrt(p.stiffness / heavier.mass) / RPM == pytest.approx(128.3, abs=0.05)
-    ratio = abs(steady_whirl(heavier, SPEED, OPPOSITE)) / abs(steady_whirl(p, SPEED, OPPOSITE))
+    ratio = abs(heavier.steady_whirl(SPEED, OPPOSITE)) / abs(p.steady_whirl(SPEED, OPPOSITE))
     assert ratio == pytest.approx(1.047, abs=0.001)
 
 
@@ -118,7 +117,7 @@ def test_gravity_would_be_nine_times_the_friction(p: PlantParameters) -> None:
 
 def test_the_normal_force_leaves_the_hub_out(p: PlantParameters) -> None:
     """The hub's own acceleration W^2 |z| changes the normal force by |z| / r_b, 4.6 % before balancing."""
-    assert abs(steady_whirl(p, SPEED, OPPOSITE)) / 0.23 == pytest.approx(0.0464, abs=1e-4)
+    assert abs(p.steady_whirl(SPEED, OPPOSITE)) / 0.23 == pytest.approx(0.0464, abs=1e-4)
 
 
 def balanced_angles(p: PlantParameters, error: float) -> tuple[float, float]:
@@ -153,7 +152,7 @@ def test_friction_holds_a_balanced_rotor_through_its_critical_speed(
     assert np.ptp(loose.state[:, 4]) > 1.0
     assert loose.amplitude.max() > 3 * close.amplitude.max()
     before = (2.0, 5.0)
-    across = [abs((steady_whirl(p, rpm * RPM, before) * cmath.exp(-2j)).imag) for rpm in (60, 131, 1000)]
+    across = [abs((p.steady_whirl(rpm * RPM, before) * cmath.exp(-2j)).imag) for rpm in (60, 131, 1000)]
     margins = [p.friction_arm_1 - displacement for displacement in across]
     assert margins[0] > 0 > margins[1]
     assert margins[2] > 0
@@ -162,7 +161,7 @@ def test_friction_holds_a_balanced_rotor_through_its_critical_speed(
 def test_lyapunov_bound_needs_the_whole_force(p: PlantParameters) -> None:
     """Appendix B: |q'| ends below the force over C_B; the whirl's own velocity does, and by how much."""
     force = p.unbalance * SPEED**2
-    velocity = SPEED * abs(steady_whirl(p, SPEED, OPPOSITE))
+    velocity = SPEED * abs(p.steady_whirl(SPEED, OPPOSITE))
     assert velocity < force / p.damping
     assert force / p.damping / velocity == pytest.approx(4.06, abs=0.02)
-    assert cmath.phase(steady_whirl(p, SPEED, OPPOSITE)) < p.phase
+    assert cmath.phase(p.steady_whirl(SPEED, OPPOSITE)) < p.phase

@@ -24,10 +24,9 @@ from ringbalance.controller.eccentric_mass.plant.friction import (
     angular_accelerations,
     motions,
 )
-from ringbalance.controller.eccentric_mass.plant.held import held_step
-from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
+from ringbalance.controller.eccentric_mass.plant.integrate import held_step, plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import (
     Drive,
     drive_of,
@@ -35,7 +34,6 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     stuck_flags,
     write_derivative,
 )
-from ringbalance.controller.eccentric_mass.plant.whirl import steady_whirl
 from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
 
@@ -45,7 +43,7 @@ OFF = np.zeros(2)
 
 @pytest.fixture(scope="module")
 def parameters() -> PlantParameters:
-    return plant_parameters(eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper"))))
+    return PlantParameters.of(eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper"))))
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +54,7 @@ def fixed_rotor(parameters: PlantParameters) -> PlantParameters:
 
 def at_rest_on(parameters: PlantParameters, speed: float, angles: tuple[float, float]) -> FloatArray:
     """The state of a steady whirl."""
-    whirl = steady_whirl(parameters, speed, angles)
+    whirl = parameters.steady_whirl(speed, angles)
     state = rest_state(angles)
     state[:2] = whirl.real, whirl.imag
     return state
@@ -164,7 +162,7 @@ def test_a_mass_reverses_without_resting_when_the_drive_is_strong(fixed_rotor: P
 def test_self_holding_against_the_whirl(share: float, rpm: float, parameters: PlantParameters) -> None:
     """Drive off: friction holds exactly while its arm exceeds the displacement across the mass's radius."""
     speed, angles = rpm * RPM, (1.2, 4.0)
-    whirl = steady_whirl(parameters, speed, angles)
+    whirl = parameters.steady_whirl(speed, angles)
     across = [abs((whirl * cmath.exp(-1j * angle)).imag) for angle in angles]
     arms = parameters._replace(friction_arm_1=across[0] / share, friction_arm_2=10 * across[1])
     states, stuck = steps(arms, at_rest_on(arms, speed, angles), speed, np.zeros((200, 2)))
@@ -300,7 +298,7 @@ def test_masses_that_the_transient_could_break_loose_are_not_taken_as_held(
 ) -> None:
     """Friction that holds the steady whirl, and not the transient on top."""
     speed, angles = 150 * RPM, (1.2, 4.0)
-    whirl = steady_whirl(parameters, speed, angles)
+    whirl = parameters.steady_whirl(speed, angles)
     arm = 1.5 * max(abs((whirl * cmath.exp(-1j * angle)).imag) for angle in angles)
     rotor = parameters._replace(friction_arm_1=arm, friction_arm_2=arm)
     drive, step = drive_of(rotor, OFF, 0.0), 1e-3

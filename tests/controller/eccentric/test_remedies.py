@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import chi2
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps, longest_run
 from ringbalance.controller.eccentric_mass.remedies import (
     _more_time,
@@ -77,7 +77,7 @@ def creeping() -> list[EccentricScene]:
 def test_errors_of_the_imbalance_are_those_claimed_while_masses_creep(number: int) -> None:
     """The sum of the squares over the seeds is chi-square; its limits let one run in a million pass."""
     scene = creeping()[number]
-    plant = plant_parameters(scene)
+    plant = PlantParameters.of(scene)
     true = plant.unbalance * np.array([math.cos(plant.phase), math.sin(plant.phase)])
     total = 0.0
     for seed in SEEDS:

@@ -9,8 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.controller.eccentric_mass.study import EccentricStudy, Requirement, eccentric_study
-from ringbalance.controller.eccentric_mass.uncertainty import DRAWS, interval
+from ringbalance.controller.eccentric_mass.study import (
+    DRAWS,
+    EccentricStudy,
+    Requirement,
+    eccentric_study,
+    interval,
+)
 from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import InputUncertainty

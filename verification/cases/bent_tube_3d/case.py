@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.bent_tube import Segment
-from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.convergence import gci
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.physics.tube.numbers import rotation_reynolds_number
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.reduced_model.paper.formulas import surface_radius_paper
+from ringbalance.reduced_model.paper import surface_radius_paper
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 from ringbalance.verification.paper_numbers import (

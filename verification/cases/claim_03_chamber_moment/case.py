@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.paper.formulas import (
+from ringbalance.reduced_model.paper import (
     max_liquid_volume_paper,
     moment_paper,
     surface_radius_paper,
@@ -23,12 +23,7 @@ from ringbalance.verification.paper_numbers import (
     rounded_radius,
     with_plate,
 )
-from ringbalance.verification.rings import (
-    chamber_moment,
-    found_of,
-    mesh_table,
-    ring_of,
-)
+from ringbalance.verification.rings import chamber_moment, found_of, mesh_table, ring_of
 
 _FILLS: Final = (0.1, 0.2, 0.3, 0.4, 0.5)
 _WHOLE_ANGLE: Final = float(np.sqrt(2))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ringbalance.reduced_model.paper.formulas import capacity
+from ringbalance.reduced_model.paper import capacity
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.paper_numbers import CHAMBER_MOMENT, DENSITY, DISC_MOMENT, at_paper_density

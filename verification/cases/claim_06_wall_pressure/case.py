@@ -10,7 +10,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
-from ringbalance.reduced_model.paper.formulas import wall_pressure_paper
+from ringbalance.reduced_model.paper import wall_pressure_paper
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure

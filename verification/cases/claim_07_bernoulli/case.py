@@ -13,11 +13,7 @@ from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.reference.fig_7 import readings
-from ringbalance.verification.reference.tube_running import (
-    driving_head,
-    running_tube,
-    tube_curve,
-)
+from ringbalance.verification.reference.tube_running import driving_head, running_tube, tube_curve
 
 _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
 """In units of the scene's."""

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.paper.formulas import departure, flat_strip_area, stall_pressure
+from ringbalance.reduced_model.paper import departure, flat_strip_area, stall_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
-from ringbalance.reduced_model.paper.formulas import PAPER_DRAG_COEFFICIENT
+from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.scene import known_liquids, liquid_at
 from ringbalance.scene.models import Liquid, Scene
 from ringbalance.verification.comparison import from_half_width

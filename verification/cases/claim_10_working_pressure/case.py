@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
-from ringbalance.reduced_model.paper.formulas import (
+from ringbalance.reduced_model.paper import (
     PAPER_DRAG_COEFFICIENT,
     stall_pressure,
     velocity_from_pressures,

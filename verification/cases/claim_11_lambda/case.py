@@ -10,7 +10,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.pressure.ring import RingQuantities
-from ringbalance.reduced_model.paper.formulas import PAPER_LAMBDA
+from ringbalance.reduced_model.paper import PAPER_LAMBDA
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width, from_rounding
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ringbalance.reduced_model.paper.formulas import PAPER_LAMBDA, correction_mass, correction_moment
+from ringbalance.reduced_model.paper import PAPER_LAMBDA, correction_mass, correction_moment
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width, from_rounding
 from ringbalance.verification.evidence import Evidence, Found, Level, Table

@@ -11,8 +11,8 @@ from ringbalance.physics.tube.development import developing_length
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found
-from ringbalance.verification.navier_stokes.newton import FlowSystem
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
+from ringbalance.verification.navier_stokes.system import FlowSystem
 from ringbalance.verification.reference.entry_length import slowest_decay
 
 _CREEPING: Final = 2 * (4.46629832 + 1.46746761j)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.runs import figure_seven
 from ringbalance.verification.evidence import Evidence, Found, Level
@@ -22,7 +22,7 @@ _RATE = 1.0
 def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Forces and amplitudes against their bounds."""
     speed = scene.rotor.speed_profile[0].speed
-    parameters = plant_parameters(scene)
+    parameters = PlantParameters.of(scene)
     turning = motion_bound(parameters, speed=speed, rate=_RATE)
     judged = motion_bound(parameters, speed=0.0, rate=_RATE) if defect == "rotor_at_rest" else turning
     bound = turning.amplitude

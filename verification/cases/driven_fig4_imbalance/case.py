@@ -18,7 +18,7 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
     filter_matrices,
 )
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -141,7 +141,7 @@ def imbalance_record(scene: EccentricScene, *, duration: float) -> _ImbalanceRec
     random = np.random.default_rng(scene.run.seed)
     deviations = np.repeat([scene.sensor.position_noise, scene.sensor.velocity_noise], 2)
     clean = run.state[1:, :4]
-    parameters = plant_parameters(scene)
+    parameters = PlantParameters.of(scene)
     return _ImbalanceRecord(
         time=run.time[1:],
         samples=clean + deviations * random.standard_normal(clean.shape),
@@ -166,7 +166,7 @@ def estimate_imbalance(
     variance = scale**2 * np.repeat([told.position_noise**2, told.velocity_noise**2], 2)
     start = start_estimate(told.initial_position, told.initial_velocity, told.initial_unbalance)
     first, second = scene.masses.initial_angle
-    own = plant_parameters(scene).moment * (np.exp(1j * first) + np.exp(1j * second))
+    own = PlantParameters.of(scene).moment * (np.exp(1j * first) + np.exp(1j * second))
     return imbalance_history(
         start,
         matrices=_scene_matrices(scene, angular_velocity=record.speed),

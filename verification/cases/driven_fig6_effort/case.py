@@ -13,8 +13,7 @@ import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque, regulator_torque
-from ringbalance.controller.eccentric_mass.strategy.records import DriveLaw
-from ringbalance.controller.eccentric_mass.strategy.settings import drive_law
+from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_mass.scenes import changed
@@ -135,7 +134,7 @@ def _over_speed(
 ) -> list[float]:
     heavier = changed(scene, "masses", mass=mass_ratio * scene.rotor.mass)
     weighted = changed(heavier, "lqr", state_weight=weight_ratio * scene.lqr.input_weight)
-    law = drive_law(weighted)._replace(breaks_away=True, slow=0.0, near=0.0)
+    law = DriveLaw.of(weighted)._replace(breaks_away=True, slow=0.0, near=0.0)
     natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * mass_ratio)))
     arm = scene.masses.friction_arm[0]
     return [

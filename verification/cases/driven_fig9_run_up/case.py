@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.parameters import plant_parameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene.eccentric_models import EccentricScene
@@ -28,7 +28,7 @@ reference = {"critical": Reference(value=_PRINTED, uncertainty=from_rounding(1.0
 
 def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Peaks and critical speeds."""
-    parameters = plant_parameters(scene)
+    parameters = PlantParameters.of(scene)
     critical, without = (
         _RPM * math.sqrt(parameters.stiffness / mass) for mass in (parameters.mass, scene.rotor.mass)
     )

@@ -11,12 +11,7 @@ from ringbalance.scene.platform.files import cache_folder
 from ringbalance.verification.evidence import Evidence, Level, Table, as_found
 from ringbalance.verification.extremes.design import Base
 from ringbalance.verification.extremes.point import SOUND, Defect, Ending
-from ringbalance.verification.extremes.study import (
-    SIZES,
-    Size,
-    counted,
-    find_extremes,
-)
+from ringbalance.verification.extremes.study import SIZES, Size, counted, find_extremes
 
 _DEFECTS: Final = {
     None: SOUND,

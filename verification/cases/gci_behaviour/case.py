@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.convergence.grid import GridConvergence, Verdict, gci
+from ringbalance.physics.convergence import GridConvergence, Verdict, gci
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found

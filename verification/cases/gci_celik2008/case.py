@@ -9,7 +9,7 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Final
 
-from ringbalance.physics.convergence.grid import GridConvergence, Verdict, gci
+from ringbalance.physics.convergence import GridConvergence, Verdict, gci
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Table, as_found
 

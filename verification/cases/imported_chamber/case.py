@@ -11,7 +11,7 @@ import numpy as np
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
-from ringbalance.physics.convergence.grid import gci
+from ringbalance.physics.convergence import gci
 from ringbalance.physics.pressure.imported import solve_on, solved_ring
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms

@@ -12,7 +12,7 @@ from ringbalance.controller.liquid_ring.closed_form import closed_form
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
-from ringbalance.reduced_model.paper.formulas import stall_pressure
+from ringbalance.reduced_model.paper import stall_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.cases.integrator_orders.side_by_side import (

@@ -9,28 +9,35 @@ import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.validation.model_bias import MUTATIONS, ModelStatistics, statistics_numbers
-from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
+from ringbalance.verification.validation.comparison import friction
+from ringbalance.verification.validation.kinds import measurements
+from ringbalance.verification.validation.model_bias import MUTATIONS, statistics_numbers
 
 _LAMINAR: Final = 1800.0
 _TURBULENT: Final = 4000.0
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    points = friction_points("cornish_1928", "huebscher_1947_ducts")
-    factor = MUTATIONS.get(defect, 1.0)
+    sets = [measurements(name) for name in ("cornish_1928", "huebscher_1947_ducts")]
+    if defect == "circular_section":
+        sets = [
+            replace(each, columns={n: c for n, c in each.columns.items() if n != "aspect_ratio"})
+            for each in sets
+        ]
+    mutation = defect if defect in MUTATIONS else None
+    points = friction(*sets, mutation=mutation)
     wide = np.char.find(points.series, "8:1") >= 0
-    narrow = points.where(~wide)
-    cornish = narrow.where(np.char.find(narrow.series, "cornish") >= 0)
+    narrow, reynolds = points.where(~wide), points.columns["reynolds"][~wide]
     whole, laminar, turbulent, wide_duct = (
-        _statistics(part, factor, defect)
+        part.statistics
         for part in (
             narrow,
-            narrow.where(narrow.reynolds < _LAMINAR),
-            narrow.where(narrow.reynolds >= _TURBULENT),
+            narrow.where(reynolds < _LAMINAR),
+            narrow.where(reynolds >= _TURBULENT),
             points.where(wide),
         )
     )
+    cornish = friction(sets[0], mutation=mutation)
     return Evidence(
         found=as_found(share_within=whole.share_within, laminar=abs(laminar.bias)),
         numbers={
@@ -44,11 +51,5 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "wide_bias": wide_duct.bias,
             "wide_share": wide_duct.share_within,
         },
-        series=(cornish.figure("a rectangular duct (2.9 to 1)", factor * cornish.predicted()),),
+        series=(cornish.over_reynolds("a rectangular duct (2.9 to 1)"),),
     )
-
-
-def _statistics(points: FrictionPoints, factor: float, defect: str | None) -> ModelStatistics:
-    if defect == "circular_section":
-        points = replace(points, laminar_ratio=np.ones_like(points.reynolds))
-    return points.statistics(factor * points.predicted())

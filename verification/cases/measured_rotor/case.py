@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.rotor import vibration
 from ringbalance.identification.data.measurements import Measurements
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
@@ -30,7 +29,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     rotor = dataclasses.replace(
         rotor, influence_coefficient=MUTATIONS.get(defect, 1.0) * rotor.influence_coefficient
     )
-    predicted = np.abs(vibration(rotor=rotor, moment=_WASHER * np.arange(5)))
+    predicted = np.abs(rotor.vibration(_WASHER * np.arange(5)))
     spread = rotor.influence_coefficient * _WASHER_UNCERTAINTY / 2
     return Evidence(
         found={

@@ -2,49 +2,44 @@
 
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Level, Series, as_found
-from ringbalance.verification.validation.model_bias import MUTATIONS, statistics_numbers
-from ringbalance.verification.validation.tube_friction import FrictionPoints, friction_points
+from ringbalance.verification.evidence import Evidence, Level, as_found
+from ringbalance.verification.validation.comparison import Comparison, friction
+from ringbalance.verification.validation.kinds import measurements
+from ringbalance.verification.validation.model_bias import statistics_numbers
 
 _FULLY_ROUGH: Final = 70.0
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    points = friction_points("nikuradse_1933")
-    predicted = _predicted(points, defect)
-    statistics = points.statistics(predicted)
-    grain = points.reynolds * np.sqrt(points.friction / 8) * points.relative_roughness
-    deviation = predicted / points.friction - 1
-    rough = points.where(grain > _FULLY_ROUGH).statistics(predicted[grain > _FULLY_ROUGH])
+    points = _points(defect)
+    wall, statistics = points.columns["relative_roughness"], points.statistics
+    grain = points.columns["reynolds"] * np.sqrt(points.measured / 8) * wall
+    rough = points.where(grain > _FULLY_ROUGH).statistics
     return Evidence(
         found=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
         numbers={
             **statistics_numbers(statistics),
-            "worst": float(np.max(deviation)),
+            "worst": float(np.max(points.predicted / points.measured - 1)),
             "rough_points": float(rough.points),
             "rough_bias": rough.bias,
             "rough_standard_deviation": rough.standard_deviation,
         },
         series=tuple(
-            _figure(points, predicted, wall) for wall in np.unique(points.relative_roughness)[[0, -1]]
+            points.where(wall == one).over_reynolds(f"a tube with ks/d = {one:.2g}")
+            for one in np.unique(wall)[[0, -1]]
         ),
     )
 
 
-def _predicted(points: FrictionPoints, defect: str | None) -> FloatArray:
-    if defect == "roughness_ignored":
-        smooth = np.zeros_like(points.relative_roughness)
-        return dataclasses.replace(points, relative_roughness=smooth).predicted()
-    return MUTATIONS[defect] * points.predicted()
-
-
-def _figure(points: FrictionPoints, predicted: FloatArray, wall: float) -> Series:
-    here = points.relative_roughness == wall
-    return points.where(here).figure(f"a tube with ks/d = {wall:.2g}", predicted[here])
+def _points(defect: str | None) -> Comparison:
+    data = measurements("nikuradse_1933")
+    if defect != "roughness_ignored":
+        return friction(data, mutation=defect)
+    smooth = {**data.columns, "relative_roughness": np.zeros(len(data))}
+    return replace(friction(data), predicted=friction(replace(data, columns=smooth)).predicted)

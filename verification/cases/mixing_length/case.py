@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from ringbalance.physics.tube.friction import friction_factor
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 from ringbalance.verification.reference.mixing_length import MixingLength, mixing_length, mixing_length_flow
-from ringbalance.verification.validation.tube_friction import friction_points
+from ringbalance.verification.validation.comparison import friction
+from ringbalance.verification.validation.kinds import measurements
 
 Friction = Callable[[FloatArray, FloatArray], FloatArray]
 
@@ -34,7 +35,6 @@ _HIGH: Final = 1e5
 _SMOOTH: Final = {"light": 5, "heavy": 1}
 _SAND: Final = {"light": 40, "heavy": 8}
 """Every which measured point is taken, of smooth tubes and of sand."""
-_CELLS: Final = {"light": 48, "heavy": 128}
 _FULLY_ROUGH: Final = 70.0
 """ks+ above which the wall is fully rough."""
 _BETWEEN: Final = (3.0, 40.0)
@@ -44,28 +44,29 @@ _SHOWN: Final = 126.0
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    closure, cells = _CLOSURES[defect], _CELLS[level]
+    closure = _CLOSURES[defect]
 
     def by_length(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:
         flows = (
-            mixing_length_flow(reynolds=re, relative_roughness=e, closure=closure, cells=cells)
+            mixing_length_flow(reynolds=re, relative_roughness=e, closure=closure)
             for re, e in zip(reynolds, roughness, strict=True)
         )
         return np.array([flow.friction_factor for flow in flows])
 
-    sand = friction_points("nikuradse_1933").where(slice(None, None, _SAND[level]))
-    every = friction_points("mckeon_2004")
-    smooth = every.where(every.reynolds >= _HIGH).where(slice(None, None, -_SMOOTH[level]))
+    sand = friction(measurements("nikuradse_1933")).where(slice(None, None, _SAND[level]))
+    reynolds, rough = (sand.columns[name] for name in ("reynolds", "relative_roughness"))
+    every = friction(measurements("mckeon_2004"))
+    smooth = every.where(every.columns["reynolds"] >= _HIGH).where(slice(None, None, -_SMOOTH[level]))
     even = np.array(_LOW + _EVEN[level])
     apart = by_length(even, np.zeros_like(even)) / friction_factor(reynolds=even, relative_roughness=0.0) - 1
-    measured = by_length(smooth.reynolds, smooth.relative_roughness) / smooth.friction - 1
-    wall = by_length(sand.reynolds, sand.relative_roughness) / sand.friction - 1
-    formula = sand.predicted() / sand.friction - 1
-    grain = sand.reynolds * np.sqrt(sand.friction / 8) * sand.relative_roughness
+    measured = by_length(smooth.columns["reynolds"], np.zeros(smooth.measured.size)) / smooth.measured - 1
+    wall = by_length(reynolds, rough) / sand.measured - 1
+    formula = sand.predicted / sand.measured - 1
+    grain = reynolds * np.sqrt(sand.measured / 8) * rough
     between = (grain > _BETWEEN[0]) & (grain < _BETWEEN[1])
     return Evidence(
         found=as_found(
-            quadrature=_quadrature_gap(closure, cells),
+            quadrature=_quadrature_gap(closure),
             smooth=np.max(np.abs(apart[even >= _HIGH])),
             between=np.mean(np.abs(wall[between])),
         ),
@@ -74,7 +75,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "measured": float(np.max(np.abs(measured))),
             "formula_between": float(np.mean(formula[between])),
             "formula_worst": float(np.max(formula[between])),
-            "bar": float(np.max((sand.stated() / sand.friction)[between])),
+            "bar": float(np.max((sand.stated / sand.measured)[between])),
             "rough": float(np.max(np.abs(wall[grain > _FULLY_ROUGH]))),
             "formula_rough": float(np.max(np.abs(formula[grain > _FULLY_ROUGH]))),
         },
@@ -82,33 +83,32 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-def _quadrature_gap(closure: MixingLength, cells: int) -> float:
-    """Friction factor at Re = 1e5 against the integral of the slope 2 tau/(1 + sqrt(1 + 4 l^2 tau))."""
-    flow = mixing_length_flow(reynolds=_HIGH, closure=closure, cells=cells)
+def _quadrature_gap(closure: MixingLength) -> float:
+    """Friction factor at Re = 1e5 against an integral of slopes that are roots of (1 + l^2 s) s = tau."""
+    flow = mixing_length_flow(reynolds=_HIGH, closure=closure)
     radius = flow.friction_reynolds
 
     def flux(y: float) -> float:
         squared = float(mixing_length(wall_distance=y, radius=radius, closure=closure)) ** 2
         tau = 1 - y / radius
-        return 2 * tau / (1 + math.sqrt(1 + 4 * squared * tau)) * (radius - y) ** 2
+        return float(brentq(lambda s: (1 + squared * s) * s - tau, 0.0, 1.0, xtol=1e-15)) * tau**2
 
     cuts = [0.0, 5.0, 30.0, 200.0, radius]
-    parts = (float(quad(flux, a, b, epsrel=1e-10)[0]) for a, b in itertools.pairwise(cuts))
-    bulk = sum(parts) / radius**2
+    bulk = sum(float(quad(flux, a, b, epsrel=1e-9)[0]) for a, b in itertools.pairwise(cuts))
     return abs(flow.friction_factor / (8 / bulk**2) - 1)
 
 
 def _figure(by_length: Friction) -> Series:
     """One sand over Re, where formula and measurements part."""
-    sand = friction_points("nikuradse_1933")
-    shown = sand.where(np.isclose(sand.relative_roughness, 0.5 / _SHOWN)).where(slice(None, None, 8))
-    reynolds, roughness = shown.reynolds, shown.relative_roughness
-    formula = shown.predicted()
+    sand = friction(measurements("nikuradse_1933"))
+    wall = np.isclose(sand.columns["relative_roughness"], 0.5 / _SHOWN)
+    shown = sand.where(wall).where(slice(None, None, 8))
+    reynolds, roughness = (shown.columns[name] for name in ("reynolds", "relative_roughness"))
     return figure(
         f"friction factor on sand of R/ks = {_SHOWN:.0f}",
         ("Reynolds number", "1", reynolds),
-        Curve("formula", "1", formula, uncertainty=shown.stated()),
+        Curve("formula", "1", shown.predicted, uncertainty=shown.stated),
         Curve("mixing length", "1", by_length(reynolds, roughness), style="paper"),
-        Curve("Nikuradse (1933)", "1", shown.friction, style="reference"),
+        Curve("Nikuradse (1933)", "1", shown.measured, style="reference"),
         log=True,
     )

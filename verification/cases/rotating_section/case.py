@@ -8,13 +8,13 @@ import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Reference, Series, as_found, figure
-from ringbalance.verification.navier_stokes.newton import FlowSystem
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
     solve_section,
     solve_section_without_inertia,
 )
+from ringbalance.verification.navier_stokes.system import FlowSystem
 
 _SERIES: Final = 9216.0
 _INERTIA_SERIES: Final = 16515072.0

@@ -9,20 +9,13 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.sloshing.modes import (
-    default_sloshing_cells,
-    resonant_fills,
-    sloshing_modes,
-)
+from ringbalance.physics.sloshing.modes import default_sloshing_cells, resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing.response import SloshingResponse, sloshing_response
 from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
-from ringbalance.verification.reference.sloshing_exact import (
-    CosineWaves,
-    cosine_waves,
-)
+from ringbalance.verification.reference.sloshing_exact import CosineWaves, cosine_waves
 
 _MODES: Final = 4
 _FILLS: Final = (0.1, 0.25, 0.5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -85,12 +85,6 @@ def simulation_history(simulation: Simulation) -> dict[str, Sequence[Any]]:
                 gas[(time >= injection.time) & (time <= end)] = 1
         columns |= {f"fill_ratio_{letter}": fill.tolist(), f"valve_open_{letter}": gas.tolist()}
     return columns
-
-
-def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
-    """Columns of one length as a table with its names in the first line; None is an empty cell."""
-    texts = [["" if value is None else str(value) for value in values] for values in columns.values()]
-    return "\n".join([",".join(columns), *map(",".join, zip(*texts, strict=True))]) + "\n"
 
 
 def _injection(injection: Injection) -> dict[str, Any]:

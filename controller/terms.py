@@ -32,17 +32,21 @@ def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:
 
 
 def dynamics_of(
-    *, scene: Scene, model: BalancerModel, modelled: Collection[str], residual_fill: float = 0.0
+    *,
+    scene: Scene,
+    model: BalancerModel,
+    modelled: Collection[str],
+    residual_fill: float = 0.0,
+    checked: bool = False,
 ) -> Dynamics | None:
-    """The plant's terms; None when none is modelled. `residual_fill` is that of a driven chamber."""
-    _check(scene, model, modelled)
-    return known_dynamics(scene=scene, model=model, modelled=modelled, residual_fill=residual_fill)
+    """The plant's terms; None when none is modelled.
 
-
-def known_dynamics(
-    *, scene: Scene, model: BalancerModel, modelled: Collection[str], residual_fill: float = 0.0
-) -> Dynamics | None:
-    """`dynamics_of` terms that are known to have numbers, for the many scenes that differ in values alone."""
+    Args: `residual_fill`: of a driven chamber. `checked`: whether the terms are known to have numbers, as
+        for the many scenes of a fit that differ in values alone.
+    Raises: ValueError: a term that is not known, or that the scene or the law gives no numbers for.
+    """
+    if not checked:
+        _check(scene, model, modelled)
     line = gas_line(scene.gas) if FILLING in modelled else None
     gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
     column = Column.of(law=model.flow, tube=scene.tube, gas_off=gas_off)

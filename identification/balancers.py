@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -198,8 +198,3 @@ def with_model_error(scene: Scene, name: str, change: float) -> Scene:
     models = scene.tube.models
     errors = (*models.errors, (cause, change * even, change * odd))
     return replace(scene, tube=replace(scene.tube, models=replace(models, errors=errors)))
-
-
-def causes(names: Iterable[str]) -> list[str]:
-    """Causes of the errors of models among the names of inputs."""
-    return list(dict.fromkeys(MODEL_ERRORS[name][0] for name in names if name in MODEL_ERRORS))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -12,7 +12,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.identification.balancers import MODEL_ERRORS, causes, exact_inputs
+from ringbalance.identification.balancers import MODEL_ERRORS, exact_inputs
 from ringbalance.identification.criticism.law_comparison import summaries
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.kinds import KINDS
@@ -111,7 +111,7 @@ def _remarks(result: FitResult) -> Iterator[Text]:
     yield from (Text(_sentence(each), style="yellow") for each in result.pulled)
     if held := [name for name in result.held if name not in MODEL_ERRORS]:
         yield Text(f"Not fitted, their [uncertainty] is in all intervals: {', '.join(held)}.", "dim")
-    if models := causes(result.held):
+    if models := _causes(result.held):
         yield Text(f"So is what the models themselves may be off by: {', '.join(models)}.", "dim")
     if exact := exact_inputs(result):
         yield Text(f"Not fitted and without [uncertainty], so taken as exact: {', '.join(exact)}.", "dim")
@@ -165,3 +165,8 @@ def _listed(lines: Sequence[int]) -> str:
     shown = ", ".join(map(str, lines[:_MOST_LINES]))
     more = f" and {len(lines) - _MOST_LINES} more" if len(lines) > _MOST_LINES else ""
     return f"line {shown} is" if len(lines) == 1 else f"lines {shown}{more} are"
+
+
+def _causes(names: Iterable[str]) -> list[str]:
+    """Causes of the errors of models among the names of inputs."""
+    return list(dict.fromkeys(MODEL_ERRORS[name][0] for name in names if name in MODEL_ERRORS))

@@ -16,9 +16,8 @@ from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state
 from ringbalance.reduced_model.operating.point import OperatingPoint
-from ringbalance.reduced_model.operating.residual import ResidualLiquid, usable_moment_uncertainty
+from ringbalance.reduced_model.operating.residual import ResidualLiquid
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
-from ringbalance.reduced_model.tube.heads import without_inputs
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths, shifted
 
@@ -198,7 +197,7 @@ def _flow_parts(scene: Scene, calibration: _Calibrated) -> dict[str, _Parts]:
         "usable_moment": (
             rest.usable_pair_moment,
             calibration.chamber.moment.interpolation,
-            usable_moment_uncertainty(scene, rest=rest, law=law),
+            rest.usable_moment_uncertainty(scene, law=law),
         ),
         "velocity": (point.velocity, error * abs(point.velocity), float(flow.uncertainty)),
     }
@@ -246,7 +245,7 @@ def _law_without_inputs(scene: Scene, calibration: _Calibrated) -> CalibratedLaw
     chamber, law, point = calibration.chamber, calibration.flow_law, calibration.operating_point
     return replace(
         law,
-        heads=without_inputs(law.heads, scene=scene, velocity=point.loss_velocity or 1.0),
+        heads=law.heads.without_inputs(scene=scene, velocity=point.loss_velocity or 1.0),
         inputs=DriveUncertainty(),
         wall_pressure_uncertainty=chamber.wall_pressure.uncertainty_table(
             inputs=np.zeros_like(chamber.fill_ratio)

@@ -27,14 +27,6 @@ PAPER_LAMBDA: Final = 72e-3
 """lambda, m: balancing moment per unit mass of liquid, "72 mm within 0.7 %" (section 5.2)."""
 
 
-def sector_area(*, disc: Disc) -> float:
-    """Area of a chamber without its plates, S_c = theta (R2^2 - R1^2)/2.
-
-    Source: Eqs. 1 and 2.
-    """
-    return disc.central_angle / 2 * (disc.outer_radius**2 - disc.inner_radius**2)
-
-
 def flat_strip_area(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
     """Area between a radius and the outer wall less two flat strips, theta (R2^2 - a^2)/2 - 2 t (R2 - a).
 

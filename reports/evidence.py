@@ -24,7 +24,7 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reports.pictures.imported_field import shown_field
+from ringbalance.reports.pictures.fields import shown_field
 from ringbalance.reports.provenance import provenance, versions
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene
 from ringbalance.reports.section import Level, Record, Work

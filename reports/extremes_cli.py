@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_format
 import os
+import tomllib
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Final
@@ -15,17 +16,16 @@ from rich.table import Table
 from ringbalance.reports.numbers import number
 from ringbalance.reports.pages.extremes import axis_rows, map_drawings
 from ringbalance.reports.section import Cells
+from ringbalance.scene.faults import Fault, SceneError, toml_text
+from ringbalance.scene.loader import read_scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.processes import checked_workers
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import places_of
-from ringbalance.verification.extremes.study import (
-    SIZES,
-    Record,
-    find_extremes,
-    scene_base,
-)
+from ringbalance.verification.extremes.design import Base
+from ringbalance.verification.extremes.study import SIZES, Record, find_extremes
 
 DONE: Final = 0
 BROKEN: Final = 1
@@ -59,7 +59,7 @@ def extremes(
         SceneError: a scene that cannot be used; nothing is written.
         OSError: the folder cannot be written.
     """
-    base = scene_base(scene)
+    base = _scene_base(scene)
     console = messages_console()
     with nullcontext() if out is None else staged(out, files=(KEPT, FILE)) as stage:
         with activity("extremes", "axes") as shown:
@@ -103,3 +103,23 @@ def _show(told: Record, rows: list[Cells]) -> None:
     console.print(table, highlight=False)
     for fault in told["violations"]:
         console.print(Padding(f"{fault['violations']} at {fault['point']}", (0, 0, 0, 2)), style="red")
+
+
+def _scene_base(path: Path) -> Base:
+    """Take a scene file as the scene to vary.
+
+    Raises: SceneError: the file is no liquid-ring scene, or its chamber is imported.
+    """
+    read, text = read_scene(path)
+    scene = liquid_ring_scene(read)
+    if scene.disc.geometry is not None:
+        fault = Fault(
+            file=scene.file,
+            table="disc",
+            key="mesh",
+            value=toml_text(scene.disc.geometry.file),
+            problem="the study takes the dimensions of a sector between plates to their extremes",
+            allowed="a scene that gives the dimensions of its chambers",
+        )
+        raise SceneError([fault])
+    return Base(document=tomllib.loads(text), file=scene.source)

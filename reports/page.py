@@ -16,10 +16,10 @@ from PIL import Image
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
-from ringbalance.reports.figures.chamber import moment, pressure_profile, transfer_lambda
-from ringbalance.reports.figures.loop import amplitude, early_amplitude, early_time, fill_ratios, regimes
+from ringbalance.reports.figures.chamber import chamber_figures
+from ringbalance.reports.figures.loop import loop_figures
 from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.figures.tube import drag, drag_terms, flow_laws
+from ringbalance.reports.figures.tube import tube_figures
 from ringbalance.reports.numbers import (
     PLUS_MINUS,
     display_unit,
@@ -64,19 +64,7 @@ _PICTURE_QUALITY: Final = 80
 
 def _page_figures(evidence: Record) -> Record:
     """The figures of the sections, by name; one whose evidence is missing is None."""
-    calibration, paper, runs = evidence["calibration"], evidence["paper"], evidence["closed_loop"]
-    return {
-        "pressure_profile": pressure_profile(evidence["pressure"]["profile"]),
-        "moment": moment(calibration["chamber"]),
-        "transfer_lambda": transfer_lambda(calibration["chamber"], calibration["lambda"], paper),
-        "drag": drag(calibration["tube"], evidence["operating_point"], paper),
-        "drag_terms": drag_terms(calibration["tube"]),
-        "flow_laws": flow_laws(evidence["flow_law"]),
-        "amplitude": amplitude(runs, evidence["limit_m"]) if runs else None,
-        "early_amplitude": early_amplitude(runs, evidence["limit_m"]) if runs else None,
-        "regimes": regimes(runs["calibrated"]) if "calibrated" in runs else None,
-        "fill_ratios": fill_ratios(runs["calibrated"], early_time(runs)) if "calibrated" in runs else None,
-    }
+    return chamber_figures(evidence) | tube_figures(evidence) | loop_figures(evidence)
 
 
 def _column(values: list[float], unit: str, *, digits: int = 6) -> list[str]:

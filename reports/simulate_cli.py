@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json as json_format
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.controller.document import csv_text, simulation_document, simulation_history
+from ringbalance.controller.document import simulation_document, simulation_history
 from ringbalance.controller.eccentric_mass.document import eccentric_document, eccentric_history
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.show import show_eccentric
@@ -109,7 +109,7 @@ def _ring(scene: Scene, law: str, outputs: _Outputs) -> bool:
         found = run_loop(scene, model, progress=_clock(shown))
         at_ends = line_runs(scene, model)
     if outputs.csv is not None:
-        write_whole(outputs.csv, csv_text(simulation_history(found)))
+        write_whole(outputs.csv, _csv_text(simulation_history(found)))
     if outputs.plot is not None:
         _draw(outputs.plot, deferred.run_figures(simulation_document(found)))
     if outputs.json:
@@ -128,7 +128,7 @@ def _eccentric_masses(scene: EccentricScene, outputs: _Outputs) -> bool:
         found = simulate_eccentric(scene, progress=_clock(shown))
         locked = None if outputs.plot is None else locked_run(scene, progress=_clock(shown))
     if outputs.csv is not None:
-        write_whole(outputs.csv, csv_text(eccentric_history(found)))
+        write_whole(outputs.csv, _csv_text(eccentric_history(found)))
     if outputs.plot is not None and locked is not None:
         runs = eccentric_document(found), eccentric_document(locked)
         _draw(outputs.plot, deferred.eccentric_figures(scene, *runs))
@@ -146,3 +146,9 @@ def _draw(path: Path, figures: Any) -> None:
 def _clock(shown: Activity) -> Callable[[float, float], None]:
     """Shows the simulated time, s, of the time limit, s."""
     return lambda time, limit: shown.show(f"{time:.1f} s of {limit:g} s simulated", done=time, total=limit)
+
+
+def _csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
+    """Columns of one length as a table with its names in the first line; None is an empty cell."""
+    texts = [["" if value is None else str(value) for value in values] for values in columns.values()]
+    return "\n".join([",".join(columns), *map(",".join, zip(*texts, strict=True))]) + "\n"

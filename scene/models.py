@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.keys.declaration import UNCERTAIN, derived, listed, needed, shown, standard, unused
-from ringbalance.scene.keys.derivations import even_number_of_chambers, half_of, radius_of_edge
+from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, chamber_count, number, quantity
 from ringbalance.scene.keys.quantities import (
     FillRatio,
@@ -95,7 +95,7 @@ class Disc:
             "half of max_fill_ratio, the only value allowed",
             "fill ratio of every chamber at the start",
             "disc.max_fill_ratio",
-            rule=half_of,
+            rule=lambda fill_ratio: fill_ratio / 2,
         ),
         shown("fill ratio at the start"),
     ]
@@ -255,7 +255,7 @@ class Tube:
             "needed with a rounded entrance, not allowed otherwise",
             "radius of the rounded edge",
             "tube.entrance",
-            rule=radius_of_edge,
+            rule=lambda entrance: None if entrance == "rounded" else 0.0,
         ),
     ]
     bends: Annotated[

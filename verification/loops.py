@@ -81,12 +81,6 @@ def flow_law_of(scene: Scene) -> CalibratedLaw:
     return chamber_and_law(scene)[1]
 
 
-def sampled_amplitudes(run: Simulation) -> np.ndarray:
-    """Amplitudes that the controller saw, m, in order."""
-    seen = [sample.measurement.amplitude for sample in run.samples if sample.measurement is not None]
-    return np.array(seen)
-
-
 def settling(run: Simulation) -> float:
     """Settling time, s, infinite where the run did not settle."""
     return math.inf if run.settling_time is None else run.settling_time

@@ -32,8 +32,6 @@ _AT_MOST: Final = "at most"
 _LIMIT: Final = "supervisor.limit"
 _ROUNDING: Final = 1e-12
 _FEWEST: Final = 3
-
-
 Interval = tuple[float, float]
 Judged = Mapping[str, float | None]
 """Numbers that a run comes to, by name; None: it does not come to it."""

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.ensemble.compiled_records import SHARED, Record
+from ringbalance.controller.ensemble.compiled_records import Record
 
 Words = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
@@ -74,10 +74,3 @@ def noise_pair(shared: Record, member: int, sample: int) -> tuple[float, float]:
     radius = math.sqrt(-2.0 * math.log(radii[sample & 1]))
     angle = 2.0 * math.pi * turns[sample & 1]
     return radius * math.cos(angle), radius * math.sin(angle)
-
-
-def member_noise(*, seed: int, member: int, sample: int) -> tuple[float, float]:
-    """Noise of amplitude and phase in one sample of one member, in standard deviations."""
-    shared = np.zeros(1, dtype=SHARED)
-    shared["key_0"], shared["key_1"] = noise_key(seed=seed)
-    return noise_pair(shared[0], member, sample)

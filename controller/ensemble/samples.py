@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.reduced_model.chamber.moment import CalibratedMoment
+from ringbalance.reduced_model.law.calibrated_law import CalibratedMoment
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray

@@ -21,7 +21,6 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.reduced_model.selection.tube_terms import with_tube_models
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
-from ringbalance.reduced_model.tube.heads import without_inputs
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import half_widths, shifted
 
@@ -97,7 +96,7 @@ def _without_inputs(scene: Scene, model: BalancerModel) -> BalancerModel:
     law = model.flow
     if not isinstance(law, CalibratedLaw):
         return model
-    heads = without_inputs(law.heads, scene=scene, velocity=_velocity(scene, model) or 1.0)
+    heads = law.heads.without_inputs(scene=scene, velocity=_velocity(scene, model) or 1.0)
     return replace(model, flow=replace(law, heads=heads, inputs=DriveUncertainty()))
 
 

@@ -20,7 +20,7 @@ from ringbalance.controller.liquid_ring.compiled_march import advance, command
 from ringbalance.controller.liquid_ring.interval import packed
 from ringbalance.controller.liquid_ring.motion import Motion
 from ringbalance.controller.liquid_ring.records import WORKSPACE, X
-from ringbalance.controller.terms import known_dynamics
+from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.observations import Observations
 from ringbalance.reduced_model.chamber.range import mean_gravity
 from ringbalance.reduced_model.law.building import nominal_law
@@ -96,7 +96,7 @@ class Device:
         gas = self.scene.gas
         line = gas.conductance is not None and gas.critical_ratio is not None
         terms = [INERTIA, HELD, *([FILLING] if line else []), *([LAG] if gas.valve_lag is not None else [])]
-        dynamics = known_dynamics(scene=self.scene, model=balancer_model(self.law), modelled=terms)
+        dynamics = dynamics_of(scene=self.scene, model=balancer_model(self.law), modelled=terms, checked=True)
         if dynamics is None:
             raise ValueError("the calibrated law has a column in the tube")
         return dynamics.plant(total=2 * self.scene.disc.initial_fill, relative_error=RELATIVE_ERROR)

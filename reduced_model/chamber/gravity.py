@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import half_angle, surface_radius
+from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.describe import scene_fault
@@ -69,20 +69,3 @@ def closed_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
     closed, wet = np.ones(fill_ratio.shape, dtype=np.bool_), fill_ratio > 0
     closed[wet] = tilted_ring(scene, fill_ratio[wet]).closed
     return closed
-
-
-def spilling_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
-    """Whether gravity tilts the free surface past the inner radius, shape (n,).
-
-    Horizontal shaft: a - delta [(cos(alpha) - s)^2 + sin^2(alpha)]^(1/2) < R1, s = sin(alpha)/alpha;
-    vertical: a^2 - delta B/2 < R1^2; delta = g/omega^2.
-    Source: the free surface |r + g/omega^2| = const, to first order.
-    """
-    disc, delta = scene.disc, scene.environment.gravity / scene.rotor.speed**2
-    a = surface_radius(disc=disc, fill_ratio=fill_ratio)
-    alpha = half_angle(disc=disc, radius=a)
-    if scene.environment.shaft == "vertical":
-        innermost = np.sqrt(np.maximum(a**2 - delta * disc.axial_width / 2, 0.0))
-    else:
-        innermost = a - delta * np.hypot(np.cos(alpha) - np.sin(alpha) / alpha, np.sin(alpha))
-    return np.asarray(innermost < disc.inner_radius * (1 - 1e-9))

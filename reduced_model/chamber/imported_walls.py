@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from ringbalance.mesh.cut.faceting import drawing_error
 from ringbalance.mesh.cut.table import chamber_table
-from ringbalance.mesh.geometry import moment_across, surface_radius
-from ringbalance.reduced_model.tables.fit import table_from_samples
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Scene
-
-_NEXT_TO_NOTHING: Final = 0.01
-"""Of the tolerance: no mesh of a symmetric chamber is quite symmetric."""
+from ringbalance.scene.models import Disc
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,18 +46,3 @@ def share_across(disc: Disc, fills: FloatArray) -> FloatArray:
         return np.zeros(fills.shape)
     _, along, across = chamber_table(disc.geometry).surface(surface_radius(disc=disc, fill_ratio=fills))
     return np.asarray(across / along)
-
-
-def across_table(scene: Scene, fills: FloatArray) -> HermiteTable | None:
-    """W(x), the moment across a chamber's middle, kg m; None where it turns moments by next to nothing.
-
-    Gravity is left out, whose mean changes U and W alike in the first place.
-    Args: `fills`: nodes, equally spaced from zero.
-    Source: rho int y dV over the liquid, times the scene's factor on moments.
-    """
-    disc = scene.disc
-    if np.max(np.abs(share_across(disc, fills))) <= _NEXT_TO_NOTHING * scene.tolerance:
-        return None
-    a = surface_radius(disc=disc, fill_ratio=fills)
-    value = scene.liquid.density * disc.axial_width * moment_across(disc=disc, surface_radius=a)
-    return table_from_samples(start=0.0, stop=float(fills[-1]), value=disc.moment_factor * value)

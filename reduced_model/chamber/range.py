@@ -8,15 +8,11 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing.range import SMALL
 from ringbalance.reduced_model.chamber.gravity import closed_ring
-from ringbalance.reduced_model.chamber.terms import (
-    MEAN,
-    chamber_contributions,
-    resonant_fill,
-    wave_height,
-)
+from ringbalance.reduced_model.chamber.terms import MEAN, chamber_contributions, wave_height
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray, distinct
 from ringbalance.scene.models import Scene
@@ -37,7 +33,7 @@ def chamber_fills(scene: Scene) -> FloatArray:
 
 def range_fills(scene: Scene) -> FloatArray:
     """Fill ratios of `FILLS`, with the one at which sloshing is resonant where that lies within."""
-    fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), resonant_fill(scene)
+    fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), _resonant_fill(scene)
     if resonant is None or not fills[0] < resonant < fills[-1]:
         return fills
     return distinct(np.append(fills, resonant))
@@ -89,3 +85,18 @@ def _waves(scene: Scene, fills: FloatArray) -> Status:
             "faster"
         ),
     )
+
+
+def _resonant_fill(scene: Scene) -> float | None:
+    """Fill ratio at which the lowest mode meets the speed, s = 1, by the same estimate.
+
+    Returns: x; None without gravity across the shaft, or where the mode stays below the speed at any fill.
+    Source: tanh(k ln(R2/a)) = 1/k.
+    """
+    disc, k = scene.disc, np.pi / scene.disc.central_angle
+    if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 or k <= 1:
+        return None
+    radius = disc.outer_radius * float(np.exp(-np.arctanh(1 / k) / k))
+    if radius < disc.inner_radius:
+        return None
+    return float(liquid_area(disc=disc, surface_radius=radius)) * disc.axial_width / chamber_volume(disc=disc)

@@ -7,13 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
-from ringbalance.reduced_model import paper
+from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
 from ringbalance.reduced_model.chamber.imported_walls import drawing_shares, share_across
 from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import Disc, Scene
 
 Terms = Mapping[str, Contribution]
 
@@ -146,21 +145,6 @@ def wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
     return np.minimum(wave_height(scene, fills) ** 2 / 4, 1.0)
 
 
-def resonant_fill(scene: Scene) -> float | None:
-    """Fill ratio at which the lowest mode meets the speed, s = 1, by the same estimate.
-
-    Returns: x; None without gravity across the shaft, or where the mode stays below the speed at any fill.
-    Source: tanh(k ln(R2/a)) = 1/k.
-    """
-    disc, k = scene.disc, np.pi / scene.disc.central_angle
-    if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 or k <= 1:
-        return None
-    radius = disc.outer_radius * float(np.exp(-np.arctanh(1 / k) / k))
-    if radius < disc.inner_radius:
-        return None
-    return float(liquid_area(disc=disc, surface_radius=radius)) * disc.axial_width / chamber_volume(disc=disc)
-
-
 def chamber_contributions(scene: Scene, fills: FloatArray) -> Mapping[str, Terms]:
     """Contributions to wall pressure and to moment with lambda, the largest over fills."""
     rows = [_at(scene, float(x)) for x in fills]
@@ -195,7 +179,7 @@ def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
 def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
     largest = {name: max((row[name] for row in rows), default=0.0) for name in (RIPPLE, SLOSHING, MEAN)}
     disc = scene.disc
-    bare = paper.sector_area(disc=disc) * disc.axial_width
+    bare = _sector_area(disc=disc) * disc.axial_width
     strips = 1 - chamber_volume(disc=disc) / bare
     pressures = part == "pressures"
     first = "rho omega^2 G |R2 s_2 - a s|/P" if pressures else "rho B a^2 G |shape|/U"
@@ -221,3 +205,11 @@ def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
         term: Contribution(term=term, value=float(value), formula=formula, source=source)
         for term, value, formula, source in found
     }
+
+
+def _sector_area(*, disc: Disc) -> float:
+    """Area of a chamber without its plates, S_c = theta (R2^2 - R1^2)/2.
+
+    Source: Eqs. 1 and 2.
+    """
+    return disc.central_angle / 2 * (disc.outer_radius**2 - disc.inner_radius**2)

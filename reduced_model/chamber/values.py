@@ -8,11 +8,10 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.geometry import surface_radius
+from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.physics.pressure.hydrostatics import displaced_by_gravity
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.chamber.gravity import spilling_ring
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring, turn_samples
 from ringbalance.scene.arrays import BoolArray, FloatArray
@@ -149,7 +148,7 @@ def _under_gravity(
     ring = tilted_ring(scene, fills[wet])
     found = plain.copy()
     found[:, wet] = [ring.wall_pressure, ring.moment, ring.moment_per_volume]
-    closed = ~spilling_ring(scene, fills) | ~wet
+    closed = ~_spilling_ring(scene, fills) | ~wet
     closed[wet] &= ring.closed
     tilt = gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
     quadrature = (_QUADRATURE + min(tilt, 1.0) ** turn_samples(scene)) * np.abs(plain)
@@ -166,10 +165,27 @@ def _status(scene: Scene, fills: FloatArray, closed: BoolArray) -> Status:
         return Status()
     x = fills[~closed][:1]
     where, change = "run dry on the outer wall", "raise the speed or the fill ratio"
-    if spilling_ring(scene, x)[0]:
+    if _spilling_ring(scene, x)[0]:
         where, change = "pass the inner radius", "raise the speed or lower the fill ratio"
     return Status(
         code=StatusCode.NO_RING,
         text=f"at a fill ratio of {x[0]:.4g}: the free surface would {where}: {change}; "
         "values there are without gravity",
     )
+
+
+def _spilling_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
+    """Whether gravity tilts the free surface past the inner radius, shape (n,).
+
+    Horizontal shaft: a - delta [(cos(alpha) - s)^2 + sin^2(alpha)]^(1/2) < R1, s = sin(alpha)/alpha;
+    vertical: a^2 - delta B/2 < R1^2; delta = g/omega^2.
+    Source: the free surface |r + g/omega^2| = const, to first order.
+    """
+    disc, delta = scene.disc, scene.environment.gravity / scene.rotor.speed**2
+    a = surface_radius(disc=disc, fill_ratio=fill_ratio)
+    alpha = half_angle(disc=disc, radius=a)
+    if scene.environment.shaft == "vertical":
+        innermost = np.sqrt(np.maximum(a**2 - delta * disc.axial_width / 2, 0.0))
+    else:
+        innermost = a - delta * np.hypot(np.cos(alpha) - np.sin(alpha) / alpha, np.sin(alpha))
+    return np.asarray(innermost < disc.inner_radius * (1 - 1e-9))

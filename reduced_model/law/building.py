@@ -7,25 +7,27 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume, wall_radius
+from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius, wall_radius
 from ringbalance.physics.gas import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
-from ringbalance.reduced_model.chamber.imported_walls import across_table
-from ringbalance.reduced_model.chamber.moment import CalibratedMoment
+from ringbalance.reduced_model.chamber.imported_walls import share_across
 from ringbalance.reduced_model.chamber.values import ring_values
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.tables.fit import flat_table, table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads, nominal_heads
 from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.uncertain import NORMAL_95, half_widths
 
 # Density and speed act on both wall pressures and on the tube at once, so the law handles them separately.
 _SHARED: Final = ("density", "speed")
+_NEXT_TO_NOTHING: Final = 0.01
+"""Of the tolerance: no mesh of a symmetric chamber is quite symmetric."""
 
 
 def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads) -> CalibratedLaw:
@@ -45,7 +47,7 @@ def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHead
         moment=CalibratedMoment(
             chamber_moment=chamber.moment.table,
             half_width=chamber.moment.uncertainty_table(inputs=no_inputs),
-            across=across_table(scene, chamber.moment.table.nodes),
+            across=_across_table(scene, chamber.moment.table.nodes),
         ),
     )
 
@@ -72,7 +74,7 @@ def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
         moment=CalibratedMoment(
             chamber_moment=table_from_samples(value=scene.disc.moment_factor * ring.moment.value, **ends),
             half_width=exact,
-            across=across_table(scene, fills),
+            across=_across_table(scene, fills),
         ),
     )
 
@@ -147,3 +149,18 @@ def _drive_uncertainty(scene: Scene) -> DriveUncertainty:
         hump_pressure=moved,
         vapour_pressure=math.hypot(width.get("vapour_pressure", 0.0), width.get("ambient_pressure", 0.0)),
     )
+
+
+def _across_table(scene: Scene, fills: FloatArray) -> HermiteTable | None:
+    """W(x), the moment across a chamber's middle, kg m; None where it turns moments by next to nothing.
+
+    Gravity is left out, whose mean changes U and W alike in the first place.
+    Args: `fills`: nodes, equally spaced from zero.
+    Source: rho int y dV over the liquid, times the scene's factor on moments.
+    """
+    disc = scene.disc
+    if np.max(np.abs(share_across(disc, fills))) <= _NEXT_TO_NOTHING * scene.tolerance:
+        return None
+    a = surface_radius(disc=disc, fill_ratio=fills)
+    value = scene.liquid.density * disc.axial_width * moment_across(disc=disc, surface_radius=a)
+    return table_from_samples(start=0.0, stop=float(fills[-1]), value=disc.moment_factor * value)

@@ -12,8 +12,7 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from ringbalance.reduced_model.chamber.moment import CalibratedMoment
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.law.model import CompleteLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment
 from ringbalance.reduced_model.law.storage import FORMAT, VERSION

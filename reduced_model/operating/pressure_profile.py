@@ -22,7 +22,6 @@ from ringbalance.reduced_model.operating.crest_margin import DirectedState, dire
 from ringbalance.reduced_model.tube.path import (
     Places,
     crest_span,
-    loss_before,
     lowest_place,
     path_radius,
     places,
@@ -178,7 +177,7 @@ def _flowing(
     if cavity is not None and terms is not None:
         return _separated(scene, tube, terms, ends, cavity, head, points)
     at = places(tube=tube, points=points)
-    lost = 0.0 if terms is None else head * loss_before(tube=tube, state=terms, at=at)
+    lost = 0.0 if terms is None else head * at.loss_before(tube=tube, state=terms)
     hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share))
     return _Line(
         share=at.share,
@@ -201,7 +200,7 @@ def _separated(
 
     def behind(at: Places) -> FloatArray:
         """Pressure of a full tube seen from its downstream end."""
-        lost = float(terms.k) + 1 - loss_before(tube=tube, state=terms, at=at)
+        lost = float(terms.k) + 1 - at.loss_before(tube=tube, state=terms)
         return np.asarray(
             top - column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share)) + head * lost
         )
@@ -213,7 +212,7 @@ def _separated(
     from_top = ends.upstream_pressure() - column_pressure(
         scene=scene, radius=path_radius(tube=tube, share=at.share)
     )
-    ahead = from_top - head * loss_before(tube=tube, state=terms, at=at)
+    ahead = from_top - head * at.loss_before(tube=tube, state=terms)
     near = (at.share < crest) | ((at.share == crest) & ~at.after)
     far = (at.share > again) | ((at.share == again) & at.after)
     pressure = np.where(near, ahead, np.where(far, behind(at), cavity))

@@ -50,6 +50,16 @@ class ResidualLiquid:
     """Largest moment of a pair that no gas passes through, kg m."""
     usable_pair_moment_uncertainty: float
 
+    def usable_moment_uncertainty(self, scene: Scene, *, law: CalibratedLaw) -> float:
+        """Of the usable pair moment, with the law's own uncertainties in place of those it was found with."""
+        top, x = scene.disc.max_fill_ratio, self.fill_ratio
+        ends = np.hypot(*law.moment.half_width(np.array([x, top - x])))
+        if self.depth_uncertainty == 0:
+            return float(ends)
+        relative = _depth_uncertainty(*_flow_rate(scene, law, np.array([x])))
+        by_depth = math.sqrt(max(self.usable_pair_moment_uncertainty**2 - ends**2, 0.0))
+        return math.hypot(by_depth * relative * self.depth / self.depth_uncertainty, ends)
+
 
 def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
     """Fill ratio below which gas enters the port of the driven chamber under the scene's gas pressure.
@@ -101,17 +111,6 @@ def residual_liquid(scene: Scene, *, law: CalibratedLaw) -> ResidualLiquid:
             (moment(min(low, top / 2)) - moment(min(high, top / 2))) / 2, *ends
         ),
     )
-
-
-def usable_moment_uncertainty(scene: Scene, *, rest: ResidualLiquid, law: CalibratedLaw) -> float:
-    """That of the usable pair moment with the law's own uncertainties in place of those it was found with."""
-    top, x = scene.disc.max_fill_ratio, rest.fill_ratio
-    ends = np.hypot(*law.moment.half_width(np.array([x, top - x])))
-    if rest.depth_uncertainty == 0:
-        return float(ends)
-    relative = _depth_uncertainty(*_flow_rate(scene, law, np.array([x])))
-    by_depth = math.sqrt(max(rest.usable_pair_moment_uncertainty**2 - ends**2, 0.0))
-    return math.hypot(by_depth * relative * rest.depth / rest.depth_uncertainty, ends)
 
 
 def _depth_uncertainty(rate: FloatArray, width: FloatArray) -> float:

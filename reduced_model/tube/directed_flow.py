@@ -14,13 +14,13 @@ import numpy as np
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
 from ringbalance.reduced_model.tube.regime import (
+    CLEARING,
     ColumnFlow,
     SiphonCrest,
     Truth,
     TubeEnds,
     TubePath,
     column_flow,
-    separation_margins,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
@@ -100,7 +100,7 @@ def directed_flow(
     undecided = np.zeros_like(drive.primed)
     if crest is not None and hump_head is not None:
         broken = _separated_width(hump_head, heads.hump_uncertainty, path.density, inputs, drive, crest, flow)
-        margins = separation_margins(
+        margins = _separation_margins(
             ends=drive.ends, crest=crest, primed=drive.primed, spill=flow.spill_velocity
         )
         flows, full = flow.velocity > 0, flow.siphon_velocity
@@ -225,3 +225,19 @@ def _width(
     driven = np.where(flows, np.maximum(pressure, 1e-100), 1.0)
     squares = np.maximum(uncertainty_95(log_u), 0.0) ** 2 + sum((p / driven) ** 2 for p in parts)
     return np.where(flows, velocity / slope * np.sqrt(squares), 0.0)
+
+
+def _separation_margins(
+    *, ends: TubeEnds[FloatArray], crest: SiphonCrest[FloatArray], primed: BoolArray, spill: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest separation margin that the cavity's pressure and the gas over the crest allow, Pa.
+
+    Args: `spill`: `ColumnFlow.spill_velocity`; within `CLEARING` the gas may be there or gone.
+    """
+    low, high = crest.cavity_bounds(ends)
+    gas = np.maximum(crest.gas_pressure(ends), high)
+    slowest, fastest = (number * crest.froude_velocity for number in CLEARING)
+    rest = crest.resting_pressure(ends)
+    highest = np.where(~primed & (spill < fastest), gas, high)
+    lowest = np.where(~primed & (spill < slowest), gas, low)
+    return rest - highest, rest - lowest

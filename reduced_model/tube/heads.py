@@ -60,6 +60,13 @@ class TubeHeads:
         """From the chamber that gives liquid; None without a crest."""
         return self.return_hump_head if reverse else self.hump_head
 
+    def without_inputs(self, *, scene: Scene, velocity: float) -> TubeHeads:
+        """The heads with models' uncertainties alone, for velocities within a factor of e^4 of one, m/s."""
+        place = crest_end_uncertainty(scene.tube, 0.0)
+        log_velocity = np.log(velocity) + np.linspace(-4.0, 4.0, 33)
+        widths = _widths(scene, log_velocity, place=place, by_inputs=False)
+        return replace(self, **widths)  # type: ignore[arg-type]
+
 
 def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -> FloatArray:
     """Velocity that belongs to a head.
@@ -114,14 +121,6 @@ def exact_heads(scene: Scene, *, tolerance: float = _TABLE_ERROR, first: int = _
         fraction_uncertainty=exact,
         interpolation_error=max(error for _, error in found),
     )
-
-
-def without_inputs(heads: TubeHeads, *, scene: Scene, velocity: float) -> TubeHeads:
-    """The heads with the uncertainties of models alone, for velocities within a factor of e^4 of one, m/s."""
-    place = crest_end_uncertainty(scene.tube, 0.0)
-    log_velocity = np.log(velocity) + np.linspace(-4.0, 4.0, 33)
-    widths = _widths(scene, log_velocity, place=place, by_inputs=False)
-    return replace(heads, **widths)  # type: ignore[arg-type]
 
 
 def _widths(

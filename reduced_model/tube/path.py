@@ -31,6 +31,25 @@ class Places:
     after: BoolArray
     """At a doubled share: whether this entry lies behind what is lumped there."""
 
+    def loss_before(self, *, tube: Tube, state: TubeState) -> FloatArray:
+        """Fall of pressure from the giving chamber to each place, over rho u^2/2, but for the radius.
+
+        Zero before the entrance; inside, alpha and what of k lies before; behind the exit k + 1.  In
+        turbulent flow the "+1" counts alpha as 1, so the pressure there rises by the small rest at the exit.
+        Source: energy balance; at the crest it is alpha and `upstream_loss`.
+        """
+        entrance = float(state.terms.get("entrance", np.zeros(())))
+        inside = float(state.kinetic_factor) + entrance + float(state.along) * self.share
+        if "decree" not in state.terms:
+            for first, second, bend in zip(*_bend_shares(tube), state.bends, strict=True):
+                halves = [
+                    (self.share > share) | ((self.share == share) & self.after) for share in (first, second)
+                ]
+                inside = inside + float(bend) / 2 * np.sum(halves, axis=0)
+        entered = (self.share > 0) | self.after
+        left = (self.share == 1) & self.after
+        return np.where(left, float(state.k) + 1, np.where(entered, inside, 0.0))
+
 
 def reversed_tube(tube: Tube) -> Tube:
     """The tube as the opposite chamber sees it. Returns: The tube with crest and bends from the other end."""
@@ -178,21 +197,3 @@ def share_at_radius(*, tube: Tube, radius: float, far_leg: bool) -> float:
         out = math.sqrt(max(radius**2 - crest**2, 0.0) / (port**2 - crest**2))
     inward, (start, end) = 1 - min(max(out, 0.0), 1.0), crest_span(tube)
     return 1 - inward * (1 - end) if far_leg else inward * start
-
-
-def loss_before(*, tube: Tube, state: TubeState, at: Places) -> FloatArray:
-    """Fall of pressure from the giving chamber to each place, over rho u^2/2, without the fall in radius.
-
-    Zero before the entrance; inside, alpha and what of k lies before; behind the exit k + 1.  In turbulent
-    flow the "+1" counts alpha as 1, so the pressure there rises by the small rest at the exit.
-    Source: energy balance; at the crest it is alpha and `upstream_loss`.
-    """
-    entrance = float(state.terms.get("entrance", np.zeros(())))
-    inside = float(state.kinetic_factor) + entrance + float(state.along) * at.share
-    if "decree" not in state.terms:
-        for first, second, bend in zip(*_bend_shares(tube), state.bends, strict=True):
-            halves = [(at.share > share) | ((at.share == share) & at.after) for share in (first, second)]
-            inside = inside + float(bend) / 2 * np.sum(halves, axis=0)
-    entered = (at.share > 0) | at.after
-    left = (at.share == 1) & at.after
-    return np.where(left, float(state.k) + 1, np.where(entered, inside, 0.0))

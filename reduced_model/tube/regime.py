@@ -300,22 +300,6 @@ def column_flow(
     )
 
 
-def separation_margins(
-    *, ends: TubeEnds[FloatArray], crest: SiphonCrest[FloatArray], primed: BoolArray, spill: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Smallest and largest separation margin that the cavity's pressure and the gas over the crest allow, Pa.
-
-    Args: `spill`: `ColumnFlow.spill_velocity`; within `CLEARING` the gas may be there or gone.
-    """
-    low, high = crest.cavity_bounds(ends)
-    gas = np.maximum(crest.gas_pressure(ends), high)
-    slowest, fastest = (number * crest.froude_velocity for number in CLEARING)
-    rest = crest.resting_pressure(ends)
-    highest = np.where(~primed & (spill < fastest), gas, high)
-    lowest = np.where(~primed & (spill < slowest), gas, low)
-    return rest - highest, rest - lowest
-
-
 def _larger(first: Pressure, second: Pressure | float) -> Pressure:
     """The larger of two, without the cost of an array for plain numbers."""
     if isinstance(first, float):

@@ -13,7 +13,17 @@ from ringbalance.reports.numbers import percent, short, shown
 from ringbalance.reports.section import Record
 
 
-def pressure_profile(profile: Record) -> Drawing:
+def chamber_figures(evidence: Record) -> dict[str, Drawing]:
+    """By the names that the templates have for them."""
+    calibration = evidence["calibration"]
+    return {
+        "pressure_profile": _pressure_profile(evidence["pressure"]["profile"]),
+        "moment": _moment(calibration["chamber"]),
+        "transfer_lambda": _transfer_lambda(calibration["chamber"], calibration["lambda"], evidence["paper"]),
+    }
+
+
+def _pressure_profile(profile: Record) -> Drawing:
     """Pressure from the free surface to the wall: finite elements against what Eq. 12 implies.
 
     p(r) = rho omega^2 (r^2 - a^2)/2; Eq. 12 has the same form with the surface a of a chamber without plates.
@@ -51,7 +61,7 @@ def pressure_profile(profile: Record) -> Drawing:
     )
 
 
-def moment(chamber: Record) -> Drawing:
+def _moment(chamber: Record) -> Drawing:
     """Balancing moment of one chamber over its fill, with and without the plates."""
     fill = chamber["fill_ratio"]
     found = np.asarray(chamber["moment_kg_m"]) * 1e6
@@ -75,7 +85,7 @@ def moment(chamber: Record) -> Drawing:
     )
 
 
-def transfer_lambda(chamber: Record, summary: Record, paper: Record) -> Drawing:
+def _transfer_lambda(chamber: Record, summary: Record, paper: Record) -> Drawing:
     """Lambda per transferred mass over the fill, with the paper's value and its spread."""
     fill = chamber["fill_ratio"]
     found = np.asarray(chamber["lambda_per_transferred_mass_m"]) * 1e3

@@ -24,7 +24,15 @@ _APART: Final = 0.155
 _PAPER: Final = 50.0
 
 
-def map_figure(found: Record) -> Drawing:
+def drag_figures(found: Record) -> dict[str, Drawing | None]:
+    """By the names that the section's template has for them; None where there is nothing to draw."""
+    return {
+        "map": _map_figure(found) if found["map"]["runs"] else None,
+        "apparent": _apparent_figure(found["apparent"]) if found["apparent"] else None,
+    }
+
+
+def _map_figure(found: Record) -> Drawing:
     """k over bore and viscosity: lines of equal k, k = 50 with its band, the separated column, liquids."""
     told = found["map"]
     bore, nu = (np.asarray(told[key]) for key in ("bore_m", "kinematic_viscosity_m2_s"))
@@ -165,7 +173,7 @@ def _spread(wanted: list[float], apart: float) -> list[float]:
     return [middle + (i - (count - 1) / 2) * apart for middle, count in blocks for i in range(count)]
 
 
-def apparent_figure(read: Record) -> Drawing:
+def _apparent_figure(read: Record) -> Drawing:
     """The k that Eq. 18 reads off the tube, over the velocity: its 1/u^2 line, k(u) and k = 50.
 
     Args: `read`: `apparent` of the evidence's `fifty`.

@@ -1,4 +1,4 @@
-"""Figures of the closed loop: amplitude and fill ratios against time under both laws."""
+"""Figures of the closed loop: one run of a liquid ring, and runs under both laws against time."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
+from ringbalance.reports.figures.operation import residual_polar
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import shown
 from ringbalance.reports.section import Record
@@ -26,7 +27,19 @@ _LAWS: Final[dict[str, dict[str, Any]]] = {
 }
 
 
-def early_time(runs: Record) -> float:
+def loop_figures(evidence: Record) -> Record:
+    """By the names that the templates have for them; None where the law was not run."""
+    runs, limit = evidence["closed_loop"], evidence["limit_m"]
+    found = runs.get("calibrated")
+    return {
+        "amplitude": _amplitude(runs, limit) if runs else None,
+        "early_amplitude": _early_amplitude(runs, limit) if runs else None,
+        "regimes": _regimes(found) if found else None,
+        "fill_ratios": _fill_ratios(found, _early_time(runs)) if found else None,
+    }
+
+
+def _early_time(runs: Record) -> float:
     """Time by which most of the gas has been spent under the calibrated law: where the loop does its work.
 
     Args: `runs`: simulation documents by law, SI.
@@ -40,7 +53,7 @@ def early_time(runs: Record) -> float:
     return float(min(run["time_s"][-1], 1.4 * (last["time_s"] + last["duration_s"])))
 
 
-def amplitude(runs: Record, limit: float) -> Drawing:
+def _amplitude(runs: Record, limit: float) -> Drawing:
     """Vibration amplitude at the controller's samples, m, under the laws that were run."""
     # Samples at rest repeat one value: the first of them say enough.
     marks = {"linewidth": 1.2, "marker": "o", "markersize": 3, "markevery": slice(0, _MARKED)}
@@ -50,7 +63,7 @@ def amplitude(runs: Record, limit: float) -> Drawing:
         time = np.asarray(run["samples"]["time_s"])
         return time, np.interp(time, run["time_s"], run["amplitude_m"]), {**line, **marks}
 
-    until, end = still_from(list(runs.values()))
+    until, end = _still_from(list(runs.values()))
 
     def paint(axes: Axes) -> None:
         style.amplitudes(axes, [curve(runs[name], line) for name, line in laws.items()], limit)
@@ -73,7 +86,7 @@ def amplitude(runs: Record, limit: float) -> Drawing:
     )
 
 
-def still_from(runs: Sequence[Record]) -> tuple[float, float]:
+def _still_from(runs: Sequence[Record]) -> tuple[float, float]:
     """Time from which no amplitude changes, with some room before it, and the end of the runs; both in s."""
     end = max(float(run["time_s"][-1]) for run in runs)
     last = 0.0
@@ -85,9 +98,9 @@ def still_from(runs: Sequence[Record]) -> tuple[float, float]:
     return (room, end) if 0 < room < _CROPPED * end else (end, end)
 
 
-def early_amplitude(runs: Record, limit: float) -> Drawing:
+def _early_amplitude(runs: Record, limit: float) -> Drawing:
     """Vibration amplitude within the first operations, m, liquid flowing, under the laws that were run."""
-    until = early_time(runs)
+    until = _early_time(runs)
 
     def curve(run: Record, line: dict[str, Any]) -> style.Curve:
         time, values = np.asarray(run["time_s"]), np.asarray(run["amplitude_m"])
@@ -108,7 +121,7 @@ def early_amplitude(runs: Record, limit: float) -> Drawing:
     )
 
 
-def regimes(run: Record) -> Drawing | None:
+def _regimes(run: Record) -> Drawing | None:
     """The regime of the tube in every gas operation under the calibrated law, by chamber and time.
 
     Args: `run`: a simulation document, SI.
@@ -163,7 +176,7 @@ def regimes(run: Record) -> Drawing | None:
     )
 
 
-def fill_ratios(run: Record, until: float) -> Drawing:
+def _fill_ratios(run: Record, until: float) -> Drawing:
     """Fill ratio of every chamber against time under the calibrated law.
 
     Args: `run`: a simulation document, SI. `until`: end of the time axis, s.
@@ -183,4 +196,67 @@ def fill_ratios(run: Record, until: float) -> Drawing:
         paint=paint,
         alt=f"Fill ratios of chambers {letters} against time.",
         caption=f"Fill ratios of chambers {letters} under the calibrated law.",
+    )
+
+
+def run_figures(run: Record) -> list[Drawing]:
+    """Amplitude with its limit, valve-open times, fills, and the path of the residual vector."""
+    times = [_valve_open_times(run)] if run["injections"] else []
+    return [_run_amplitude(run), *times, _fill_ratios(run, _early_time({"run": run})), residual_polar(run)]
+
+
+def _run_amplitude(run: Record) -> Drawing:
+    """True and measured vibration amplitude over time, m, with the limit."""
+    seen = [
+        (time, value)
+        for time, value in zip(run["samples"]["time_s"], run["samples"]["amplitude_m"], strict=True)
+        if value is not None
+    ]
+    time, measured = np.array(seen, dtype=np.float64).reshape(-1, 2).T
+    dots = {"color": style.PAPER, "linestyle": "", "marker": "o", "markersize": 2.5, "label": "measured"}
+    line = {"color": style.FOUND, "linewidth": 1.2, "label": "true"}
+
+    def paint(axes: Axes) -> None:
+        curves = [(run["time_s"], np.asarray(run["amplitude_m"]), line), (time, measured, dots)]
+        style.amplitudes(axes, curves, run["limit_m"])
+
+    end = shown(run["amplitude_m"][-1], "m", digits=2)
+    return draw(
+        name="run-amplitude",
+        paint=paint,
+        columns=3,
+        wide=True,
+        height=3.2,
+        alt=f"Vibration amplitude against time on a logarithmic scale; it ends at {end}.",
+        caption=f"Vibration amplitude and its limit. It ends at {end}.",
+    )
+
+
+def _valve_open_times(run: Record) -> Drawing:
+    """How long each injection keeps its valve open, s, by chamber, over the time at which it opens."""
+    injections = run["injections"]
+
+    def paint(axes: Axes) -> None:
+        for index, letter in enumerate(run["fill_ratio"]):
+            mine = [item for item in injections if item["chamber"] == letter]
+            axes.plot(
+                [item["time_s"] for item in mine],
+                [item["duration_s"] for item in mine],
+                linestyle="",
+                label=letter,
+                **style.line(index, size=3.5),
+            )
+        spans = [item["duration_s"] for item in injections]
+        style.logarithmic(axes, "y", within=(0.5 * min(spans), 2 * max(spans)))
+        axes.set_ylim(0.7 * min(spans), 1.4 * max(spans))
+        axes.set_xlim(left=0)
+
+    return draw(
+        columns=6,
+        x="time in s",
+        y="valve-open time in s",
+        name="run-valve-open",
+        paint=paint,
+        alt=f"Valve-open times of {len(injections)} injections against time, by chamber.",
+        caption=f"Valve-open times of {len(injections)} injections, by the chamber that the gas drives.",
     )

@@ -151,7 +151,7 @@ def _panel(bars: Axes, title: str, budget: Record) -> None:
     bars.set(ylim=(len(causes) - 0.4, -0.6), xlim=(-limit, limit))
     bars.set_yticks(range(len(causes)), [name for name, _ in causes])
     bars.tick_params(axis="y", length=0)
-    ticks = style.nice_span(limit)
+    ticks = _nice_span(limit)
     bars.set_xticks(
         ticks[:: len(ticks) // 2], [f"{style.plain_number(t)} %" for t in ticks[:: len(ticks) // 2]]
     )
@@ -208,7 +208,7 @@ def _histogram(panel: Axes, sample: Record) -> None:
         place, never, width=width, color=style.SURFACE, edgecolor=style.PAPER, hatch="////", linewidth=1
     )
     panel.text(place, never + 1.5, percent(sample["not_settled"]), ha="center", color=style.PAPER)
-    ticks = [tick for tick in style.nice_span(float(ends[-1])) if ends[0] <= tick <= ends[-1] - 0.05 * span]
+    ticks = [tick for tick in _nice_span(float(ends[-1])) if ends[0] <= tick <= ends[-1] - 0.05 * span]
     panel.set_xticks([*ticks, place], [*(style.plain_number(tick) for tick in ticks), "never"])
     panel.set_title(sample["title"], loc="left", fontsize="medium", color=style.INK)
     panel.set(xlabel="settling time in s", xlim=(ends[0], place + width), ylim=(0, 112))
@@ -273,7 +273,7 @@ def _residual(panel: Axes, vector: Any, limit: float, span: float, ends: Any) ->
     panel.grid(visible=False)
     for spine in panel.spines.values():
         spine.set_visible(False)
-    rings = [ring for ring in style.nice_span(span) if ring > 0]
+    rings = [ring for ring in _nice_span(span) if ring > 0]
     for ring in rings:
         panel.add_patch(Circle((0, 0), ring, fill=False, color=style.GRID, linewidth=0.8))
         label = _clearest(ring, vector, ends)
@@ -355,3 +355,15 @@ def _requirement_bar(axes: Axes, place: int, row: Record, end: float) -> None:
         axes.text(0.995 * end, place - 0.28, beyond, ha="right", va="bottom", color=style.INK)
     sense = "at least" if row["at_least"] else "at most"
     axes.text(0.0, place - 0.28, f"{row['label']} ({sense}): {row['verdict']}", va="bottom", color=style.INK)
+
+
+def _nice_span(span: float) -> list[float]:
+    """Two to five round ticks on either side of zero, and zero, within plus and minus a span."""
+    step = next(
+        step * 10.0**exponent
+        for exponent in range(math.floor(math.log10(span)) - 1, 99)
+        for step in (1, 2, 5)
+        if span / (step * 10.0**exponent) < 3
+    )
+    count = int(span / step)
+    return [step * place for place in range(-count, count + 1)]

@@ -24,7 +24,18 @@ _LINES: Final = {
 }
 
 
-def figure_4(velocity: list[Record]) -> list[Drawing]:
+def paper_figures(found: Record) -> Record:
+    """By the names that the section's template has for them."""
+    limit = found["limit_m"]
+    return {
+        "velocity": _figure_4(found["velocity"]),
+        "trial": _figure_6(found["trial"], limit),
+        "gains": [_figure_7(found["gains"], limit), _figure_7_phase(found["gains"])],
+        "amplitudes": _figure_8(found["amplitudes"], limit),
+    }
+
+
+def _figure_4(velocity: list[Record]) -> list[Drawing]:
     """Velocity over the fill at both gas pressures: Eq. 19 against finite elements, and against the law.
 
     Returns: Two figures: with the paper's k and the finite elements' wall pressures, and with the calibrated
@@ -110,7 +121,7 @@ def _settled(run: Record) -> str:
     return shown(run["settling_time_s"], "s", digits=2) if run["settled"] else "not at all"
 
 
-def figure_6(runs: list[Record], limit: float) -> Drawing:
+def _figure_6(runs: list[Record], limit: float) -> Drawing:
     """The trial algorithm from four phases; limit in m."""
     names = [f"{math.degrees(run['of']):.0f}°" for run in runs]
 
@@ -131,7 +142,7 @@ def figure_6(runs: list[Record], limit: float) -> Drawing:
     )
 
 
-def figure_7(runs: list[Record], limit: float) -> Drawing:
+def _figure_7(runs: list[Record], limit: float) -> Drawing:
     """The target-vector algorithm with five gains: amplitude; limit in m."""
     names = [f"Kp = {run['of'] * 1e-6:.2f}" for run in runs]
 
@@ -150,7 +161,7 @@ def figure_7(runs: list[Record], limit: float) -> Drawing:
     )
 
 
-def figure_7_phase(runs: list[Record]) -> Drawing:
+def _figure_7_phase(runs: list[Record]) -> Drawing:
     """The same runs: phase."""
 
     def paint(axes: Axes) -> None:
@@ -176,7 +187,7 @@ def figure_7_phase(runs: list[Record]) -> Drawing:
     )
 
 
-def figure_8(runs: list[Record], limit: float) -> Drawing:
+def _figure_8(runs: list[Record], limit: float) -> Drawing:
     """The target-vector algorithm with the paper's parameters from five amplitudes; limit in m."""
     names = [given(run["of"], "m") for run in runs]
 

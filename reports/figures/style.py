@@ -7,7 +7,6 @@ no date and no fixed colour remains, so the same data gives the same bytes.
 from __future__ import annotations
 
 import io
-import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -212,18 +211,6 @@ def decade(value: float, _position: object = None) -> str:
     """
     exponent = f"{value:.0e}".split("e")
     return power_of_ten(int(exponent[1])) if exponent[0] == "1" else ""
-
-
-def nice_span(span: float) -> list[float]:
-    """Two to five round ticks on either side of zero, and zero, within plus and minus a span."""
-    step = next(
-        step * 10.0**exponent
-        for exponent in range(math.floor(math.log10(span)) - 1, 99)
-        for step in (1, 2, 5)
-        if span / (step * 10.0**exponent) < 3
-    )
-    count = int(span / step)
-    return [step * place for place in range(-count, count + 1)]
 
 
 def logarithmic(

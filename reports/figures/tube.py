@@ -19,6 +19,16 @@ from ringbalance.scene.arrays import FloatArray
 _VELOCITY_TICKS: Final = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]
 
 
+def tube_figures(evidence: Record) -> Record:
+    """By the names that the templates have for them."""
+    tube, law = evidence["calibration"]["tube"], evidence["flow_law"]
+    return {
+        "drag": _drag(tube, evidence["operating_point"], evidence["paper"]),
+        "drag_terms": _drag_terms(tube),
+        "flow_laws": [_flow_law(law, row) for row in range(len(law["gas_pressure_Pa"]))],
+    }
+
+
 def _nice_ticks(low: float, high: float) -> list[float]:
     """1-2-5 ticks of a logarithmic axis of a few decades, decades alone beyond three."""
     steps = (1, 2, 5) if high / low < 1e3 else (1,)
@@ -53,7 +63,7 @@ def _reynolds_axis(axes: Axes, reynolds_per_velocity: float) -> None:
     top.xaxis.set_minor_locator(NullLocator())
 
 
-def drag(tube: Record, point: Record, paper: Record) -> Drawing:
+def _drag(tube: Record, point: Record, paper: Record) -> Drawing:
     """k against velocity and Reynolds number, with its 95 % band and the paper's one number."""
     velocity, k = np.asarray(tube["velocity_m_s"]), np.asarray(tube["k"])
     band = np.asarray(tube["k_uncertainty"])
@@ -93,7 +103,7 @@ def drag(tube: Record, point: Record, paper: Record) -> Drawing:
     )
 
 
-def drag_terms(tube: Record) -> Drawing:
+def _drag_terms(tube: Record) -> Drawing:
     """What k is made of, term by term, over velocity."""
     velocity = np.asarray(tube["velocity_m_s"])
     terms = {name: np.asarray(values) for name, values in tube["terms"].items() if np.any(values)}
@@ -139,7 +149,7 @@ _REGIME_LINES: Final[dict[str, Record]] = {
 }
 
 
-def flow_law(law: Record, row: int) -> Drawing:
+def _flow_law(law: Record, row: int) -> Drawing:
     """Velocity over fill ratio at one gas pressure: the calibrated law with its regimes against Eq. 19."""
     fill = np.asarray(law["fill_ratio"])
     velocity, paper = np.asarray(law["velocity_m_s"][row]), np.asarray(law["velocity_paper_m_s"][row])
@@ -168,8 +178,3 @@ def flow_law(law: Record, row: int) -> Drawing:
         alt=f"Velocity over fill ratio at {pressure}: calibrated ({names}), and by Eq. 19.",
         caption=f"Flow law at {pressure} gas pressure, drawn as in Fig. 4 of the paper. Calibrated: {names}.",
     )
-
-
-def flow_laws(law: Record) -> list[Drawing]:
-    """The flow law at every gas pressure of the evidence."""
-    return [flow_law(law, row) for row in range(len(law["gas_pressure_Pa"]))]

@@ -12,14 +12,14 @@ from ringbalance.physics.tube.range import VELOCITIES
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reports.figures.drag_coefficient import apparent_figure, map_figure
+from ringbalance.reports.figures.drag_coefficient import drag_figures
 from ringbalance.reports.numbers import MISSING, given, measured, percent, shown
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
-from ringbalance.reports.studies.apparent_drag import apparent_drag
 from ringbalance.reports.studies.drag_map import (
     BORES,
     DragMap,
     LiquidVerdicts,
+    apparent_drag,
     drag_map,
     liquid_verdicts,
 )
@@ -223,8 +223,7 @@ def _view(found: Record, evidence: Record) -> Record:
         "needs": ", ".join(needs),
         "decreed": given(found["decreed_k"], "1") if found["decreed_k"] is not None else "",
         "gas": given(found["map"]["gas_pressure_Pa"], "Pa"),
-        "map": map_figure(found) if found["map"]["runs"] else None,
-        "apparent": apparent_figure(apparent) if apparent else None,
+        **drag_figures(found),
         "hidden": _hidden(apparent) if apparent else "",
     }
 

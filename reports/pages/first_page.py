@@ -21,10 +21,9 @@ from ringbalance.reports.pages.requirements import (
     requirement_table,
     requirements,
 )
-from ringbalance.reports.pages.within_reach import LIKELY
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.summary import MISSED, OPEN
+from ringbalance.reports.summary import LIKELY, MISSED, OPEN
 from ringbalance.reports.traces import found_at, read, states_uncertainty, traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.uncertain import half_widths

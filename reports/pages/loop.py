@@ -8,8 +8,8 @@ from typing import Any, Final
 from ringbalance.reports.figures.operation import residual_polar, settling_histogram
 from ringbalance.reports.numbers import MISSING, given, number, percent, shown
 from ringbalance.reports.pages.first_page import RETUNED, place_of_run
-from ringbalance.reports.pages.within_reach import runs_settled
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
+from ringbalance.reports.summary import runs_settled
 from ringbalance.reports.traces import found_at, traced
 
 _MICROMETRE: Final = 1e6

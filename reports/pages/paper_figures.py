@@ -16,7 +16,7 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
-from ringbalance.reports.figures.paper import figure_4, figure_6, figure_7, figure_7_phase, figure_8
+from ringbalance.reports.figures.paper import paper_figures
 from ringbalance.reports.numbers import given, number, percent, short, shown
 from ringbalance.reports.section import Record, Section, Table, Work
 from ringbalance.scene.models import Scene
@@ -175,15 +175,11 @@ def literal_moment(model: BalancerModel) -> PaperMoment:
 
 def _view(found: Record, _evidence: Record) -> Record:
     """The section's tables and figures."""
-    limit = found["limit_m"]
     return {
         "constants": _constant_table(found["constants"]),
         "results": _results(found),
         "reading": _reading_text(found),
-        "velocity": figure_4(found["velocity"]),
-        "trial": figure_6(found["trial"], limit),
-        "gains": [figure_7(found["gains"], limit), figure_7_phase(found["gains"])],
-        "amplitudes": figure_8(found["amplitudes"], limit),
+        **paper_figures(found),
     }
 
 

@@ -12,17 +12,23 @@ from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import given, number, percent, shown
 from ringbalance.reports.origins import resting
-from ringbalance.reports.pages.within_reach import (
+from ringbalance.reports.section import Record, Table
+from ringbalance.reports.summary import (
     LIKELY,
+    MET,
+    MISSED,
+    OPEN,
+    UNASKED,
+    above,
+    below,
     ideal_valve,
     line_verdict,
     runs_settled,
     settles,
     tuning_of,
     what_enlarges,
+    worst,
 )
-from ringbalance.reports.section import Record, Table
-from ringbalance.reports.summary import MET, MISSED, OPEN, UNASKED, above, below, worst
 from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
 

@@ -26,9 +26,7 @@ from PIL import Image
 
 from ringbalance.reports.pictures.disc_shapes import chamber_outline, ring, split_cells, web
 from ringbalance.reports.pictures.draw_tube import draw_tube
-from ringbalance.reports.pictures.draw_view import label_at, look
-from ringbalance.reports.pictures.text import Bar, Label, bar, letter
-from ringbalance.reports.pictures.theme import PICTURE, THEMES, Theme
+from ringbalance.reports.pictures.style import PICTURE, THEMES, Bar, Label, Theme, bar, label_at, letter, look
 from ringbalance.reports.pictures.tube_path import tube_path
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.processes import end_with

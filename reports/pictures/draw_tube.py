@@ -10,9 +10,7 @@ import pyvista as pv
 from matplotlib import colormaps
 
 from ringbalance.reports.pictures.disc_shapes import ring
-from ringbalance.reports.pictures.draw_view import label_at, look
-from ringbalance.reports.pictures.text import Bar, Label, bar
-from ringbalance.reports.pictures.theme import Theme
+from ringbalance.reports.pictures.style import Bar, Label, Theme, bar, label_at, look
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
 Record = dict[str, Any]

@@ -1,23 +1,42 @@
-"""Pressure fields for the report: solved here, written as VTU, drawn elsewhere."""
+"""Pressure fields for the report: of a sector, of an imported chamber and of the tube; drawn elsewhere."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 
 from ringbalance.mesh.chamber import chamber_mesh, default_cells
-from ringbalance.mesh.export import write_vtu
+from ringbalance.mesh.export import write_cells, write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.mesh.liquid_body import Level, liquid_body
+from ringbalance.mesh.quadratic_tetrahedra import FACES, Tetrahedra, tetrahedra
+from ringbalance.physics.pressure.imported import solve_on
+from ringbalance.physics.pressure.linear import LinearSolution
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
+from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.reduced_model import paper
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.operating.pressure_profile import hump_profile
+from ringbalance.reports.numbers import given
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Scene
+from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
+_RADII = 17
+"""At which a profile is shown."""
+_POINTS: Final = 241
+_FILLS: Final = {
+    Regime.SIPHON: "liquid fills it all the way",
+    Regime.SEPARATED: "the column is separated at the siphon crest, and a cavity follows",
+    Regime.UNDECIDED: "whether liquid fills it all the way or separates at the siphon crest cannot be told",
+    Regime.BLOCKED: "gas stands over the siphon crest and nothing flows",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +76,7 @@ class ShownField(Protocol):
         ...
 
 
-def profile(scene: Scene, fill_ratio: float, radius: FloatArray, pressure: FloatArray) -> Record:
+def _profile(scene: Scene, fill_ratio: float, radius: FloatArray, pressure: FloatArray) -> Record:
     """Pressure over the radius, and the profile that Eq. 12 implies, SI.
 
     Eq. 12's wall pressure is that of a ring whose surface lies at sqrt(R2^2 - 2 V'/(B theta)).
@@ -108,7 +127,7 @@ class ChamberField:
         chamber = self.solution.chamber
         line = chamber.grid[:, chamber.grid.shape[1] // 2, chamber.grid.shape[2] // 2]
         radius = np.hypot(*chamber.places[:2, line])
-        return profile(scene, self.fill_ratio, radius, self.solution.pressure[line])
+        return _profile(scene, self.fill_ratio, radius, self.solution.pressure[line])
 
     def outside(self) -> Outside:
         """What bounds the liquid."""
@@ -155,3 +174,99 @@ def chamber_field(scene: Scene, *, fill_ratio: float) -> ChamberField:
     liquid = RotatingLiquid(density=scene.liquid.density, angular_velocity=scene.rotor.speed)
     solution = solve_pressure(chamber=chamber, problem=liquid.problem())
     return ChamberField(fill_ratio=fill_ratio, surface_radius=radius, solution=solution)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportedField:
+    """On the chamber's own mesh, cut along the free surface."""
+
+    fill_ratio: float
+    surface_radius: float
+    """m."""
+    body: Tetrahedra
+    solution: LinearSolution
+
+    def record(self) -> Record:
+        return {
+            "cells": [len(self.body.cells)],
+            "unknowns": len(self.body.nodes),
+            "relative_residual": self.solution.statistics.relative_residual,
+            "status": self.solution.status.text,
+        }
+
+    def pressure_profile(self, *, scene: Scene) -> Record:
+        """Pressure at the nodes nearest to even radii, and the profile that Eq. 12 implies, SI."""
+        radius = np.hypot(self.body.nodes[:, 0], self.body.nodes[:, 1])
+        order = np.argsort(radius)
+        even = np.linspace(radius[order[0]], radius[order[-1]], _RADII)
+        nearest = order[np.minimum(np.searchsorted(radius[order], even), radius.size - 1)]
+        return _profile(scene, self.fill_ratio, radius[nearest], self.solution.values[nearest])
+
+    def write(self, *, path: Path) -> Path:
+        radius = np.hypot(self.body.nodes[:, 0], self.body.nodes[:, 1])
+        fields = {
+            "pressure_Pa": self.solution.values,
+            "depth_m": np.maximum(radius - self.surface_radius, 0.0),
+        }
+        return write_cells(path, kind="tetra10", points=self.body.nodes, cells=self.body.cells, fields=fields)
+
+    def outside(self) -> Outside:
+        cell, face = np.nonzero(self.body.faces >= 0)
+        corners = np.take_along_axis(self.body.cells[cell], FACES[face], axis=1)
+        faces = np.concatenate([corners, corners[:, -1:]], axis=1)
+        return Outside(places=self.body.nodes, faces=faces, pressure=self.solution.values)
+
+
+def _imported_field(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: float) -> ImportedField:
+    """Solve the pressure of the liquid in one chamber, gravity left out.
+
+    Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem.
+    """
+    radius = float(surface_radius(disc=scene.disc, fill_ratio=fill_ratio))
+    body = liquid_body(tetrahedra(geometry), Level(constant=radius**2 / 2))
+    liquid = RotatingLiquid(density=scene.liquid.density, angular_velocity=scene.rotor.speed)
+    solution = solve_on(TetrahedronSpace(body=body), liquid.problem())
+    return ImportedField(fill_ratio=fill_ratio, surface_radius=radius, body=body, solution=solution)
+
+
+def shown_field(scene: Scene, *, fill_ratio: float) -> ShownField:
+    """Of a sector between plates, or of an imported chamber. Args: `fill_ratio`: x, within (0, 1)."""
+    if scene.disc.geometry is None:
+        return chamber_field(scene, fill_ratio=fill_ratio)
+    return _imported_field(scene, scene.disc.geometry, fill_ratio=fill_ratio)
+
+
+def tube_field(scene: Scene) -> Record | None:
+    """Centre line and pressure of the tube at equal fills under the scene's gas.
+
+    Returns: Points of the centre line (m, shape (n, 3) as lists), pressure (Pa), whether liquid fills the
+    bore there, and the picture's text; None for a tube without a crest.
+    Raises: SceneError: a scene that cannot be calibrated.
+    """
+    if scene.tube.hump_radius is None:
+        return None
+    calibration = calibration_of(scene)
+    scene, law = calibration.scene, calibration.flow_law
+    equal = law.max_fill_ratio / 2
+    found = hump_profile(scene=scene, law=law, fill_ratio=equal, opposite_fill_ratio=equal, points=_POINTS)
+    # Where a step stands twice, the later entry is kept: a line may not stand still.
+    last = np.append(np.diff(found.path) > 0, True)
+    share = found.path[last] / scene.tube.length
+    return {
+        "points": _spiral(share=share, radius=found.radius[last]).tolist(),
+        "pressure": found.pressure[last].tolist(),
+        "full": found.full[last].astype(int).tolist(),
+        "hump": int(np.argmin(found.radius[last])),
+        "text": _FILLS.get(found.regime, "the column flows back"),
+        "gas": given(scene.gas.pressure, "Pa"),
+    }
+
+
+def _spiral(*, share: FloatArray, radius: FloatArray) -> FloatArray:
+    """Half a turn about the shaft at a given radius, from the first chamber to the opposite one.
+
+    Args: `share`: s/L, shape (n,). `radius`: r, m, shape (n,).
+    Returns: Points, m, shape (n, 3), in the plane across the shaft.
+    """
+    angle = np.pi * share
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(angle.size)], axis=1)

@@ -23,7 +23,7 @@ _SAME: Final = 1e-6
 Entity = tuple[int, int]
 
 
-def mesh_step(source: str, target: str, share: float) -> None:
+def _mesh_step(source: str, target: str, share: float) -> None:
     """Write the mesh of a STEP file in metres. Args: `share`: size of cells over the solid's extent."""
     _start()
     gmsh.model.occ.importShapes(source)
@@ -93,4 +93,4 @@ def _nodes(face: Entity) -> list[tuple[float, float]]:
 
 
 if __name__ == "__main__":
-    mesh_step(sys.argv[1], sys.argv[2], float(sys.argv[3]))
+    _mesh_step(sys.argv[1], sys.argv[2], float(sys.argv[3]))

@@ -25,16 +25,6 @@ def swept_area(*, radius: npt.ArrayLike, central_angle: float, plate_thickness: 
     return np.asarray(swept - r**2 * np.arcsin(t / r) - t * np.sqrt(r**2 - t**2), dtype=np.float64)
 
 
-def half_of(fill_ratio: float) -> float:
-    """Fill ratio of each of two chambers that share the liquid of a pair."""
-    return fill_ratio / 2
-
-
-def radius_of_edge(entrance: str) -> float | None:
-    """Radius of an entrance's edge, m; None for a rounded one, whose radius must be given."""
-    return None if entrance == "rounded" else 0.0
-
-
 def even_number_of_chambers(central_angle: float) -> int | None:
     """Number of chambers of an angle theta (rad) that fill the circle; None when it would not be even.
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ringbalance.controller.ensemble.compiled_noise import member_noise, noise_key, noise_pair, philox
+from ringbalance.controller.ensemble.compiled_noise import noise_key, noise_pair, philox
 from ringbalance.controller.ensemble.compiled_records import SHARED
 
 
@@ -61,6 +61,13 @@ def test_the_noise_of_neighbours_is_independent(drawn: np.ndarray[Any, np.dtype[
         assert abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) < 4 / np.sqrt(one.size)
         squares = np.corrcoef(one.ravel() ** 2, other.ravel() ** 2)[0, 1]
         assert abs(squares) < 4 / np.sqrt(one.size)
+
+
+def member_noise(*, seed: int, member: int, sample: int) -> tuple[float, float]:
+    """Noise of amplitude and phase in one sample of one member, in standard deviations."""
+    shared = np.zeros(1, dtype=SHARED)
+    shared["key_0"], shared["key_1"] = noise_key(seed=seed)
+    return noise_pair(shared[0], member, sample)
 
 
 def test_seed_member_and_sample_all_count() -> None:

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.algorithms.algorithm import Measurement
-from ringbalance.controller.ensemble.compiled_noise import member_noise
+from ringbalance.controller.ensemble.compiled_noise import noise_key, noise_pair
+from ringbalance.controller.ensemble.compiled_records import SHARED
 from ringbalance.controller.ensemble.moment import MomentTable
 from ringbalance.controller.ensemble.monte_carlo import (
     QUANTILES,
@@ -46,6 +47,13 @@ def noisy(scene: Scene, *, time_limit: float = 12.0, **controller: Any) -> Scene
         controller=replace(scene.controller, **controller),
         run=replace(scene.run, time_limit=time_limit),
     )
+
+
+def member_noise(*, seed: int, member: int, sample: int) -> tuple[float, float]:
+    """Noise of amplitude and phase in one sample of one member, in standard deviations."""
+    shared = np.zeros(1, dtype=SHARED)
+    shared["key_0"], shared["key_1"] = noise_key(seed=seed)
+    return noise_pair(shared[0], member, sample)
 
 
 def sensor_of(scene: Scene, *, seed: int, member: int) -> Sensor:

@@ -18,7 +18,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile, hump_profile
 from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.reports.studies.apparent_drag import apparent_drag
+from ringbalance.reports.studies.drag_map import apparent_drag
 from ringbalance.scene.models import InputUncertainty, Scene
 
 AMBIENT, VAPOUR, DENSITY = 101325.0, 2339.0, 1000.0

@@ -10,7 +10,7 @@ import pytest
 import pyvista
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reports.pictures.imported_field import ImportedField, shown_field
+from ringbalance.reports.pictures.fields import ImportedField, shown_field
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.block_chambers import imported
 

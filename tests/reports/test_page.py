@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from ringbalance.reports.figures.style import DARK, LIGHT
-from ringbalance.reports.pictures.theme import THEMES
+from ringbalance.reports.pictures.style import THEMES
 from ringbalance.reports.render import render
 
 Record = dict[str, Any]

@@ -11,10 +11,10 @@ import pytest
 from PIL import Image
 
 from ringbalance.reports.cli import plot
+from ringbalance.reports.pictures.fields import tube_field
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.process import start_drawing, write_fields
-from ringbalance.reports.pictures.theme import PICTURE, THEMES
-from ringbalance.reports.pictures.tube import tube_field
+from ringbalance.reports.pictures.style import PICTURE, THEMES
 from ringbalance.scene import Scene, bundled_scene
 
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")

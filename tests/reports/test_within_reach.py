@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ringbalance.reports.pages.requirements import smallest_row
-from ringbalance.reports.pages.within_reach import line_verdict, what_enlarges
+from ringbalance.reports.summary import line_verdict, what_enlarges
 
 
 @pytest.mark.parametrize(

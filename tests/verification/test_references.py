@@ -12,8 +12,8 @@ from scipy.integrate import dblquad
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
 from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.cases.manufactured_flow import case
 from ringbalance.verification.comparison import input_uncertainty
-from ringbalance.verification.reference import manufactured_flow as flow
 from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
 from ringbalance.verification.reference.gravity import exact_ring
 from ringbalance.verification.reference.manufactured import Manufactured
@@ -87,16 +87,16 @@ def test_the_manufactured_flow_satisfies_its_equation() -> None:
 
     def second(axis: int) -> np.ndarray:
         shift = step * np.eye(2)[axis]
-        ahead, behind = flow.velocity(place + shift), flow.velocity(place - shift)
-        return (ahead + behind - 2 * flow.velocity(place)) / step**2
+        ahead, behind = case.velocity(place + shift), case.velocity(place - shift)
+        return (ahead + behind - 2 * case.velocity(place)) / step**2
 
-    u, v, w = flow.velocity(place)
-    along = [derivative(flow.velocity, axis) for axis in (0, 1)]
+    u, v, w = case.velocity(place)
+    along = [derivative(case.velocity, axis) for axis in (0, 1)]
     assert along[0][0] + along[1][1] == pytest.approx(0.0, abs=1e-7)
     turning = np.array([w, 0.0, -u])
-    slope = np.array([*(derivative(flow.pressure, axis) for axis in (0, 1)), 0.0])
+    slope = np.array([*(derivative(case.pressure, axis) for axis in (0, 1)), 0.0])
     expected = 3.0 * (u * along[0] + v * along[1]) + 5.0 * turning - 0.7 * (second(0) + second(1)) + slope
-    np.testing.assert_allclose(flow.body_force(place), expected, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(case.body_force(place), expected, rtol=1e-5, atol=1e-5)
 
 
 def test_the_exact_ring_across_the_shaft_is_a_circle_that_holds_the_liquid(disc: Disc) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +10,9 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.scenes import at_constant_speed, changed, envelope, thinned
-from ringbalance.verification.evidence import Curve, Series, figure
+from ringbalance.verification.cases.driven_fig9_run_up.case import _amplitude_figure
+from ringbalance.verification.eccentric_mass.scenes import at_constant_speed, changed
+from ringbalance.verification.evidence import Series
 
 _PAPER_PLACES = (45.0, 135.0)
 """Phases of the imbalance in Figs. 7 and 8, deg."""
@@ -37,20 +37,7 @@ class BalancingFigure:
     def amplitudes(self, *, until: float = math.inf) -> Series:
         """Amplitude over time of every run."""
         names = [f"imbalance at {phase:.0f} degrees" for phase in self.phases]
-        return amplitude_figure("amplitude", dict(zip(names, self.runs, strict=True)), until=until)
-
-
-def amplitude_figure(
-    name: str, runs: Mapping[str, EccentricRun], *, until: float = math.inf, beside: str = ""
-) -> Series:
-    """Amplitude over time of runs with the same samples, by curve name; `beside` is one to compare with."""
-    time = next(iter(runs.values())).time
-    shown = time <= until
-    curves = (
-        Curve(label, "m", envelope(run.amplitude[shown]), style="reference" if label == beside else "found")
-        for label, run in runs.items()
-    )
-    return figure(name, ("time", "s", thinned(time[shown])), *curves)
+        return _amplitude_figure("amplitude", dict(zip(names, self.runs, strict=True)), until=until)
 
 
 def figure_seven(scene: EccentricScene, *, time_limit: float = 30.0) -> BalancingFigure:

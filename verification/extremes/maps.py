@@ -126,13 +126,14 @@ def _answered(judgement: Judgement) -> bool:
 def sweeps(
     base: Base, *, count: int, fineness: float, workers: int = 1, progress: Progress | None = None
 ) -> tuple[Sweep, ...]:
-    """Every axis alone, from end to end, as `_swept`."""
+    """Every axis alone, from end to end, as `_swept`, those of the numerics last."""
 
     def judge_all(places: Sequence[tuple[Axis, float]]) -> Sequence[Judgement]:
         points = [{axis.name: value} for axis, value in places]
         return base.judged(points, workers=workers, progress=progress)
 
-    return _swept(AXES, judge_all, count=count, fineness=fineness)
+    of_inputs = _swept(AXES, judge_all, count=count, fineness=fineness)
+    return of_inputs + _numerical_sweeps(base.scene, count=count, fineness=fineness)
 
 
 def _swept(
@@ -213,7 +214,7 @@ def stability_maps(
     )
 
 
-def numerical_sweeps(scene: Scene, *, count: int, fineness: float) -> tuple[Sweep, ...]:
+def _numerical_sweeps(scene: Scene, *, count: int, fineness: float) -> tuple[Sweep, ...]:
     """The numerics' own axes, `_ASPECT` and `_STEP`, as `_swept`."""
     judges = {_ASPECT.name: at_aspect, _STEP.name: at_step}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -11,16 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.scene.faults import Fault, SceneError, toml_text
-from ringbalance.scene.loader import read_scene
-from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import MAP_PREFIX
 from ringbalance.verification.extremes.design import Base, Point, design
 from ringbalance.verification.extremes.maps import (
     StabilityMap,
     Sweep,
-    numerical_sweeps,
     stability_maps,
     sweeps,
 )
@@ -106,26 +101,6 @@ class _Extremes:
         return sum(bool(j.violations) for j in self.everything)
 
 
-def scene_base(path: Path) -> Base:
-    """Take a scene file as the scene to vary.
-
-    Raises: SceneError: the file is no liquid-ring scene, or its chamber is imported.
-    """
-    read, text = read_scene(path)
-    scene = liquid_ring_scene(read)
-    if scene.disc.geometry is not None:
-        fault = Fault(
-            file=scene.file,
-            table="disc",
-            key="mesh",
-            value=toml_text(scene.disc.geometry.file),
-            problem="the study takes the dimensions of a sector between plates to their extremes",
-            allowed="a scene that gives the dimensions of its chambers",
-        )
-        raise SceneError([fault])
-    return Base(document=tomllib.loads(text), file=scene.source)
-
-
 def find_extremes(
     base: Base,
     *,
@@ -149,10 +124,7 @@ def find_extremes(
     return _Extremes(
         points=points,
         judgements=judgements,
-        sweeps=(
-            *sweeps(base, count=size.sweep, fineness=size.fineness, workers=workers, progress=told("axes")),
-            *numerical_sweeps(base.scene, count=size.sweep, fineness=size.fineness),
-        ),
+        sweeps=sweeps(base, count=size.sweep, fineness=size.fineness, workers=workers, progress=told("axes")),
         maps=stability_maps(base, count=size.grid, workers=workers, progress=told("maps")),
     )
 

@@ -22,7 +22,6 @@ from ringbalance.verification.validation.model_bias import (
     ModelStatistics,
     bias,
     model_statistics,
-    statistics_numbers,
     within,
 )
 from ringbalance.verification.validation.tube_at_rest import TUBE_AT_REST
@@ -201,7 +200,7 @@ def data_evidence(*sets: Measurements, unit: str, mutation: str | None = None) -
     comparison = compare(*sets, mutation=mutation)
     return Evidence(
         found=as_found(share_within=comparison.statistics.share_within, bias=abs(comparison.statistics.bias)),
-        numbers=statistics_numbers(comparison.statistics),
+        numbers=comparison.statistics.numbers(),
         series=(comparison.scatter(kind_of(sets[0]).title, unit),),
     )
 

@@ -38,6 +38,10 @@ class ModelStatistics:
     width_needed: float
     """Factor on both uncertainties at which they hold 95 % of the points."""
 
+    def numbers(self) -> dict[str, float]:
+        """Numbers for a case's text, by the names of `ModelStatistics`."""
+        return {key: float(value) for key, value in vars(self).items()}
+
 
 def model_statistics(
     *,
@@ -96,8 +100,3 @@ def _mean_uncertainty(means: FloatArray, measurement_uncertainty: float) -> floa
         return measurement_uncertainty
     factor = float(special.stdtrit(means.size - 1, 0.975))
     return factor * float(np.std(means, ddof=1)) / math.sqrt(means.size)
-
-
-def statistics_numbers(statistics: ModelStatistics) -> dict[str, float]:
-    """Numbers for a case's text, by the names of `ModelStatistics`."""
-    return {key: float(value) for key, value in vars(statistics).items()}

@@ -175,17 +175,6 @@ def turned_back(sample: FloatArray, rotor_angle: float) -> FloatArray:
 
 
 @compiled
-def with_fresh_whirl(estimate: ImbalanceEstimate, start: ImbalanceEstimate) -> ImbalanceEstimate:
-    """Forget the whirl and keep the imbalance, after a time in which the filter's model did not hold."""
-    state, covariance = start.state.copy(), start.covariance.copy()
-    for i in range(4, 6):
-        state[i] = estimate.state[i]
-        for k in range(4, 6):
-            covariance[i, k] = estimate.covariance[i, k]
-    return ImbalanceEstimate(state, covariance)
-
-
-@compiled
 def imbalance_deviation(covariance: FloatArray) -> float:
     """Largest standard deviation of the imbalance in any direction, kg m."""
     a, b, c = covariance[4, 4], covariance[4, 5], covariance[5, 5]

@@ -1,4 +1,4 @@
-"""Motor voltages: what the rotor asks for, what friction takes, and what brings the masses to their places.
+"""Motor torques: what the rotor asks for, what friction takes, and what brings the masses to their places.
 
 The rotor's acceleration is not measured but follows from its own equation, with the acceleration that the
 masses are about to have; friction is compensated in the sense in which the mass moves or, at rest, is meant
@@ -91,12 +91,6 @@ def regulator_torque(law: DriveLaw, angle: float, rate: float, goal: float) -> f
     Source: Eq. 49 of the paper on eccentric masses.
     """
     return -law.position_gain * (angle - goal) - law.rate_gain * rate
-
-
-@compiled
-def voltage_for(law: DriveLaw, torque: float) -> float:
-    """Voltage that gives a torque, as far as the supply allows. Returns: V."""
-    return min(max(torque / law.torque_per_volt, -law.maximum_voltage), law.maximum_voltage)
 
 
 @compiled

@@ -18,6 +18,7 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     friction_step,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
+    ImbalanceEstimate,
     MassInput,
     correct,
     encoder_covariance,
@@ -26,14 +27,15 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     predict,
     start_estimate,
     turned_back,
-    with_fresh_whirl,
 )
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices, filter_matrices
+from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
+    FilterMatrices,
+    filter_matrices,
+)
 from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
     known_torques,
     motor_torques,
     share_of_friction,
-    voltage_for,
 )
 from ringbalance.controller.eccentric_mass.strategy.plan import Facts, Plan
 from ringbalance.controller.eccentric_mass.strategy.records import (
@@ -99,7 +101,7 @@ def strategy_step(
     plan = supervise(settings.gates, old, facts)
     asked = motor_torques(settings, plan, beliefs, motion, smoothed)
     if count % settings.voltage_every == 0:
-        voltage = (voltage_for(settings.law, asked[0]), voltage_for(settings.law, asked[1]))
+        voltage = (_voltage_for(settings.law, asked[0]), _voltage_for(settings.law, asked[1]))
     if plan.stage == FRICTION:
         torque = known_torques(settings.law, torque, motion, beliefs.imbalance, voltage)
     return StrategyState(count + 1, plan, smoothed, whirl, beliefs, torque, rate, voltage), voltage
@@ -113,6 +115,12 @@ def _usable(measurement: EccentricMeasurement) -> bool:
     for i in range(2):
         total += measurement.angle[i] + measurement.rate[i]
     return math.isfinite(total)
+
+
+@compiled
+def _voltage_for(law: DriveLaw, torque: float) -> float:
+    """Voltage that gives a torque, as far as the supply allows. Returns: V."""
+    return min(max(torque / law.torque_per_volt, -law.maximum_voltage), law.maximum_voltage)
 
 
 @compiled
@@ -171,7 +179,7 @@ def _with_sample(
     before, drift = old.place, old.pace
     if not old.running:
         start = start_estimate(told.start_position, told.start_velocity, told.start_imbalance)
-        estimate, before, drift = with_fresh_whirl(estimate, start), place, pace
+        estimate, before, drift = _with_fresh_whirl(estimate, start), place, pace
     masses = _mass_input(settings, motion, 0.5 * (before + place), 0.5 * (drift + pace))
     mass, shifted = settings.law.whirl.mass, sample.copy()
     shifted[2] += pace.real / mass
@@ -277,3 +285,14 @@ def _facts(
         deviation,
         load,
     )
+
+
+@compiled
+def _with_fresh_whirl(estimate: ImbalanceEstimate, start: ImbalanceEstimate) -> ImbalanceEstimate:
+    """Forget the whirl and keep the imbalance, after a time in which the filter's model did not hold."""
+    state, covariance = start.state.copy(), start.covariance.copy()
+    for i in range(4, 6):
+        state[i] = estimate.state[i]
+        for k in range(4, 6):
+            covariance[i, k] = estimate.covariance[i, k]
+    return ImbalanceEstimate(state, covariance)

@@ -18,7 +18,6 @@ from ringbalance.verification.loops import (
     mistaken_lag,
     over_period,
     run_loop,
-    sampled_amplitudes,
     settled_after,
     slowest_within,
 )
@@ -76,7 +75,7 @@ def _run(scene: Scene, kind: Any, period: float, phase: float, **settings: float
 
 
 def _largest_rise(run: Simulation) -> float:
-    amplitude = sampled_amplitudes(run)
+    amplitude = _sampled_amplitudes(run)
     return float(np.max(np.diff(amplitude), initial=-np.inf)) if amplitude.size > 1 else 0.0
 
 
@@ -99,3 +98,9 @@ def _table(runs: Mapping[float, tuple[list[Simulation], list[Simulation]]]) -> T
         },
         units={"period": "s", "phase": "rad", "target vector": "s", "trial": "s"},
     )
+
+
+def _sampled_amplitudes(run: Simulation) -> np.ndarray:
+    """Amplitudes that the controller saw, m, in order."""
+    seen = [sample.measurement.amplitude for sample in run.samples if sample.measurement is not None]
+    return np.array(seen)

@@ -6,6 +6,7 @@ The critical speed that the paper prints leaves the eccentric masses out.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -15,9 +16,8 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.comparison import from_rounding
-from ringbalance.verification.eccentric_mass.runs import amplitude_figure
-from ringbalance.verification.eccentric_mass.scenes import changed
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+from ringbalance.verification.eccentric_mass.scenes import changed, envelope, thinned
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
 
 _RPM = 30 / np.pi
 _PRINTED = 135.0
@@ -40,7 +40,7 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
         found={"critical": Found(value=critical, corrected=without), "peak": Found(value=peak / largest)},
         numbers={"locked": largest, "balanced": peak, "peak_speed": _RPM * speed, "without": without},
         series=(
-            amplitude_figure(
+            _amplitude_figure(
                 "amplitude during the run-up",
                 {"locked": locked, "balanced at 100 rpm": balanced},
                 beside="locked",
@@ -60,3 +60,16 @@ def _run_up_peak(run: EccentricRun, *, after: float) -> tuple[float, float]:
     first = int(np.searchsorted(run.time, after))
     at = first + int(np.argmax(run.amplitude[first:]))
     return float(run.amplitude[at]), float(run.speed[at])
+
+
+def _amplitude_figure(
+    name: str, runs: Mapping[str, EccentricRun], *, until: float = math.inf, beside: str = ""
+) -> Series:
+    """Amplitude over time of runs with the same samples, by curve name; `beside` is one to compare with."""
+    time = next(iter(runs.values())).time
+    shown = time <= until
+    curves = (
+        Curve(label, "m", envelope(run.amplitude[shown]), style="reference" if label == beside else "found")
+        for label, run in runs.items()
+    )
+    return figure(name, ("time", "s", thinned(time[shown])), *curves)

@@ -16,8 +16,7 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
 from ringbalance.verification.orders import OrderStudy, order_study
 from ringbalance.verification.reference.block_chambers import disc_chamber, sector_chamber
-from ringbalance.verification.reference.ring_waves_exact import ring_frequencies, still_frequency
-from ringbalance.verification.reference.sloshing_exact import cosine_waves
+from ringbalance.verification.reference.sloshing_exact import cosine_waves, ring_frequencies, still_frequency
 
 _FILL: Final = 0.4
 _PLANE_CELLS: Final = {"light": (10, 12, 8), "heavy": (16, 20, 14)}

@@ -11,7 +11,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.validation.comparison import friction
 from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.model_bias import MUTATIONS, statistics_numbers
+from ringbalance.verification.validation.model_bias import MUTATIONS
 
 _LAMINAR: Final = 1800.0
 _TURBULENT: Final = 4000.0
@@ -41,7 +41,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found=as_found(share_within=whole.share_within, laminar=abs(laminar.bias)),
         numbers={
-            **statistics_numbers(whole),
+            **whole.numbers(),
             "laminar_points": float(laminar.points),
             "laminar_bias": laminar.bias,
             "turbulent_points": float(turbulent.points),

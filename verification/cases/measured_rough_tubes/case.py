@@ -11,7 +11,6 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.validation.comparison import Comparison, friction
 from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.model_bias import statistics_numbers
 
 _FULLY_ROUGH: Final = 70.0
 
@@ -24,7 +23,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
         numbers={
-            **statistics_numbers(statistics),
+            **statistics.numbers(),
             "worst": float(np.max(points.predicted / points.measured - 1)),
             "rough_points": float(rough.points),
             "rough_bias": rough.bias,

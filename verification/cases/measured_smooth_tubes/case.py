@@ -8,7 +8,6 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.validation.comparison import Comparison, friction
 from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.model_bias import statistics_numbers
 
 _LAMINAR: Final = 1800.0
 _TURBULENT: Final = 4000.0
@@ -23,9 +22,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "transitional": points.where((reynolds >= _LAMINAR) & (reynolds < _TURBULENT)),
         "turbulent": points.where(reynolds >= _TURBULENT),
     }
-    numbers = statistics_numbers(whole)
+    numbers = whole.numbers()
     for name, part in parts.items():
-        numbers |= {f"{name}_{key}": value for key, value in statistics_numbers(part.statistics).items()}
+        numbers |= {f"{name}_{key}": value for key, value in part.statistics.numbers().items()}
     return Evidence(
         found=as_found(share_within=whole.share_within, bias=abs(numbers["turbulent_bias"])),
         numbers=numbers,

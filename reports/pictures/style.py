@@ -1,11 +1,11 @@
-"""Lettering of the 3-D pictures: labels with leaders and a colour bar, set with a proper font."""
+"""How every 3-D picture looks: colours on a light and a dark page, camera, lettering in a proper font."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import matplotlib
 import numpy as np
@@ -13,7 +13,48 @@ from matplotlib.colors import Colormap
 from matplotlib.ticker import MaxNLocator
 from PIL import Image, ImageDraw, ImageFont
 
-FONT_SIZE: Final = 34
+from ringbalance.scene.arrays import FloatArray
+
+PICTURE: Final = (1500, 1000)
+"""Pixels of a finished picture."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Theme:
+    """Colours of a picture, so that it sits on the page without a frame."""
+
+    name: str
+    background: str
+    ink: str
+    metal: str
+    tube: str
+    mark: str
+    edge: str
+
+
+THEMES: Final = (
+    Theme(
+        name="light",
+        background="#ffffff",
+        ink="#1d2530",
+        metal="#c3cad2",
+        tube="#c2661c",
+        mark="#1d2530",
+        edge="#5b6675",
+    ),
+    Theme(
+        name="dark",
+        background="#12171e",
+        ink="#e4e8ee",
+        metal="#66717e",
+        tube="#ffa35c",
+        mark="#ffffff",
+        edge="#9aa6b5",
+    ),
+)
+
+
+_FONT_SIZE: Final = 34
 """px of the finished picture."""
 
 
@@ -26,7 +67,7 @@ class Label:
     """Pixels from the upper left corner; of the thing that is named."""
     shift: tuple[float, float] = (0.0, 0.0)
     """Of the text's middle from the place, pixels; a leader is drawn when it is not zero."""
-    size: int = FONT_SIZE
+    size: int = _FONT_SIZE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +121,7 @@ def _draw_label(pen: ImageDraw.ImageDraw, label: Label, ink: str, ground: str, s
         pen.ellipse([x - dot, y - dot, x + dot, y + dot], fill=ink)
         # The leader ends at the text, above or below it.
         anchor = "md" if dy < 0 else "ma"
-    face = _font(label.size * scale, bold=label.size > FONT_SIZE)
+    face = _font(label.size * scale, bold=label.size > _FONT_SIZE)
     pen.text(
         (x + dx, y + dy),
         label.text,
@@ -98,8 +139,39 @@ def _draw_bar(pen: ImageDraw.ImageDraw, bar: Bar, height: int, ink: str, scale: 
     for row, (red, green, blue, _) in enumerate(shades.tolist(), start=top):
         pen.line([(left, row), (right, row)], fill=(red, green, blue))
     pen.rectangle([left, top, right, bottom], outline=ink, width=2 * scale)
-    pen.text((left, top - 28 * scale), bar.title, font=_font(FONT_SIZE * scale), fill=ink, anchor="ls")
+    pen.text((left, top - 28 * scale), bar.title, font=_font(_FONT_SIZE * scale), fill=ink, anchor="ls")
     for tick, text in zip(bar.ticks, bar.labels, strict=True):
         y = bottom - (tick - bar.low) / (bar.high - bar.low) * (bottom - top)
         pen.line([(right, y), (right + 10 * scale, y)], fill=ink, width=2 * scale)
-        pen.text((right + 18 * scale, y), text, font=_font((FONT_SIZE - 4) * scale), fill=ink, anchor="lm")
+        pen.text((right + 18 * scale, y), text, font=_font((_FONT_SIZE - 4) * scale), fill=ink, anchor="lm")
+
+
+def look(
+    plotter: Any,
+    *,
+    direction: tuple[float, float, float],
+    up: tuple[float, float, float],
+    zoom: float,
+    bounds: tuple[float, ...],
+    lift: float,
+) -> None:
+    """Points the camera at a box from a direction; the box stands a little right, the bar has the left.
+
+    Args: `direction`: from the box to the camera, mm.
+    """
+    middle = np.array(bounds).reshape(3, 2).mean(axis=1)
+    plotter.camera_position = [tuple(middle + np.array(direction)), tuple(middle), up]
+    plotter.camera.view_angle = 18
+    plotter.reset_camera(bounds=bounds, render=False)
+    plotter.camera.zoom(zoom)
+    plotter.camera.SetWindowCenter(-0.12, -lift)
+
+
+def label_at(
+    text: str, place: FloatArray, *, shift: tuple[float, float] = (0, 0), size: int = _FONT_SIZE
+) -> tuple[FloatArray, Label]:
+    """A label at a place of the scene; its place in the picture is found once the camera stands.
+
+    Args: `place`: mm, shape (3,). `size`: px.
+    """
+    return place, Label(text=text, place=(0, 0), shift=shift, size=size)

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import brentq
 
+from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
@@ -23,7 +24,7 @@ from ringbalance.verification.reference.tube_running import (
     Running,
     driving_head,
     running_tube,
-    tube_curve,
+    running_tubes,
     with_bore,
 )
 
@@ -35,6 +36,8 @@ _WARM: Final = 333.15
 _OIL: Final = "silicone oil 100 cSt"
 _OIL_TABLE: Final = 298.15
 """K, at which its data are given."""
+_VELOCITIES: Final = (1e-4, 3000.0, 401)
+"""Of the figure, m/s."""
 _NARROWEST: Final = 0.1
 """Smallest bore searched for k = 50, in units of the scene's."""
 
@@ -88,8 +91,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-def _over_fills(scene: Scene) -> list[Running]:
-    return [running_tube(scene, head=driving_head(scene, share=s)) for s in np.linspace(0, 1, 11)]
+def _over_fills(scene: Scene) -> Sequence[Running]:
+    return running_tubes(scene, tuple(driving_head(scene, share=s) for s in np.linspace(0, 1, 11)))
 
 
 def _liquids() -> tuple[Liquid, ...]:
@@ -130,7 +133,7 @@ def _bore_for(scene: Scene, k: float) -> float:
 
 
 def _over_velocity(scene: Scene) -> Series:
-    curve = tube_curve(scene)
+    curve = tube_loss(scene, np.geomspace(*_VELOCITIES))
     return figure(
         "k against the velocity, the scene's tube and liquid",
         ("velocity", "m/s", curve.velocity),

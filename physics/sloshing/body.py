@@ -126,7 +126,9 @@ def reduced_waves(
         block, least = fields.new_directions(fields.coriolis_part(blocks[-1]), blocks, _NOISE)
         blocks.append(block)
         left_out.append(least)
-    fast = fast_waves(fields, start, waves)
+    # Without rotation they are close to the waves; the constant and what is random complete them.
+    first_guesses = np.concatenate([start[:, :1], potential, start[:, -_RANDOM:]], axis=1)
+    fast = fast_waves(fields, first_guesses, waves)
     return _assembled(fields, wall, blocks, errors[resolved], max(left_out), fast)
 
 

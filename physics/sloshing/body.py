@@ -33,12 +33,12 @@ from itertools import product
 from typing import Final
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags_array
 from scipy.sparse.linalg import lobpcg, splu
 
 from ringbalance.mesh.liquid_body import Level
-from ringbalance.physics.pressure.tetrahedra import CELL_POINTS, TetrahedronSpace
-from ringbalance.physics.sloshing.projection import TOLERANCE, Fields, RepeatedSolves
+from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
+from ringbalance.physics.sloshing.fast import FastWaves, fast_waves
+from ringbalance.physics.sloshing.projection import TOLERANCE, Fields, gradient_errors
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 _NOISE: Final = 0.05
@@ -49,8 +49,8 @@ _ROUGH: Final = 0.02
 """Squared error of a potential, relative, above which the mesh does not resolve it, and it is left out."""
 _SMALL: Final = 1e-3
 """As `_NOISE`, for potentials: these are smooth."""
-_SHIFT: Final = 0.3
-"""Of the squared frequencies, which makes the matrix of the potentials positive."""
+_RANDOM: Final = 3
+"""Random fields among the first guesses: a wave that is orthogonal to all low powers is found, too."""
 _ITERATIONS: Final = 9
 
 
@@ -91,6 +91,7 @@ class ReducedWaves:
     quasi_static: ComplexArray
     """Integrals of (1, x, y) n . xi of a surface that follows G = x + i y at once, shape (3,)."""
     wall: WallMean
+    fast: FastWaves
     residual: float
     """Largest relative one of the linear solves."""
     excess: float
@@ -98,13 +99,14 @@ class ReducedWaves:
 
 
 def reduced_waves(
-    *, space: TetrahedronSpace, level: Level, wall: str, potentials: int, levels: int
+    *, space: TetrahedronSpace, level: Level, wall: str, waves: int, potentials: int, levels: int
 ) -> ReducedWaves:
     """Choose the fields on one mesh and assemble the small problem.
 
     Args:
         space: on the liquid's body, lengths in outer radii; `level` in the same unit.
         wall: boundary over which the mean pressure is taken.
+        waves: of the surface, of which those too fast for these fields are found by their pressure.
         potentials: number of waves without rotation in the first level, at most 19, next to the two that
             gravity across the shaft drives.
         levels: of the Coriolis force, at least 1.
@@ -112,10 +114,11 @@ def reduced_waves(
         "Matrix Computations", chapter 10.
     """
     fields = Fields(space, level)
-    waves = _potentials(fields, potentials)
-    errors = _squared_errors(space, space.gradient @ waves)
+    start = guesses(fields, potentials + 1)
+    potential = _potentials(fields, start)
+    errors = _squared_errors(space, space.gradient @ potential)
     resolved = errors < _ROUGH
-    first, _ = fields.new_directions(fields.gradient @ waves[:, resolved], [], _NOISE)
+    first, _ = fields.new_directions(fields.gradient @ potential[:, resolved], [], _NOISE)
     plane = fields.gradient @ fields.harmonic(_plane_functions(space.body.nodes))
     blocks = [np.concatenate([first, fields.new_directions(plane, [first], _SMALL)[0]], axis=1)]
     left_out = []
@@ -123,7 +126,10 @@ def reduced_waves(
         block, least = fields.new_directions(fields.coriolis_part(blocks[-1]), blocks, _NOISE)
         blocks.append(block)
         left_out.append(least)
-    return _assembled(fields, wall, blocks, errors[resolved], max(left_out))
+    # Without rotation they are close to the waves; the constant and what is random complete them.
+    first_guesses = np.concatenate([start[:, :1], potential, start[:, -_RANDOM:]], axis=1)
+    fast = fast_waves(fields, first_guesses, waves)
+    return _assembled(fields, wall, blocks, errors[resolved], max(left_out), fast)
 
 
 def _plane_functions(places: FloatArray) -> FloatArray:
@@ -133,22 +139,27 @@ def _plane_functions(places: FloatArray) -> FloatArray:
     return np.concatenate([powers.real, powers.imag], axis=1)
 
 
-def _potentials(fields: Fields, count: int) -> FloatArray:
+def guesses(fields: Fields, count: int) -> FloatArray:
+    """Low powers of x, y and z, the constant first, and random fields on the surface."""
+    x, y, z = fields.space.body.nodes.T
+    powers = sorted((p for p in product(range(4), repeat=3) if sum(p) < 4), key=sum)[:count]
+    noise = fields.surface_mass @ np.random.default_rng(1).standard_normal((x.size, _RANDOM))
+    drawn = np.stack([fields.shifted.cycle @ column for column in noise.T], axis=1)
+    powers_there = np.stack([x**i * y**j * z**k for i, j, k in powers], axis=1)
+    return np.concatenate([powers_there, drawn / np.abs(drawn).max(axis=0)], axis=1)
+
+
+def _potentials(fields: Fields, start: FloatArray) -> FloatArray:
     """Columns phi of the slowest waves without rotation, K phi = s^2 M phi, (grad phi)^2 = 1."""
-    space, mass = fields.space, fields.surface_mass
-    matrix = csr_matrix(space.stiffness + _SHIFT * mass)
-    near = RepeatedSolves(matrix, space.prolongation(np.arange(space.unknowns)))
-    x, y, z = space.body.nodes.T
-    powers = sorted((p for p in product(range(4), repeat=3) if sum(p) < 4), key=sum)[: count + 1]
-    start = np.stack([x**i * y**j * z**k for i, j, k in powers], axis=1)
+    space, mass, near = fields.space, fields.surface_mass, fields.shifted
     with warnings.catch_warnings():
         # It warns that its last fields are rough ones; they need not be better.
         warnings.simplefilter("ignore", UserWarning)
         values, shapes = lobpcg(
-            mass, start, B=matrix, M=near.cycle, largest=True, tol=1e-14, maxiter=_ITERATIONS
+            mass, start, B=near.matrix, M=near.cycle, largest=True, tol=1e-14, maxiter=_ITERATIONS
         )
     # The largest belongs to the constant.
-    slow = np.argsort(-values)[1:]
+    slow = np.argsort(-values)[1 : start.shape[1] - _RANDOM]
     waves = fields.harmonic(shapes[:, slow])
     lower = np.linalg.cholesky(waves.T @ (space.stiffness @ waves))
     small = np.linalg.solve(lower, np.linalg.solve(lower, waves.T @ (mass @ waves)).T)
@@ -157,7 +168,12 @@ def _potentials(fields: Fields, count: int) -> FloatArray:
 
 
 def _assembled(
-    fields: Fields, wall: str, blocks: list[FloatArray], errors: FloatArray, left_out: float
+    fields: Fields,
+    wall: str,
+    blocks: list[FloatArray],
+    errors: FloatArray,
+    left_out: float,
+    fast: FastWaves,
 ) -> ReducedWaves:
     surface = fields.surface
     coriolis = np.block([[fields.turned_products(left, right) for right in blocks] for left in blocks])
@@ -178,6 +194,7 @@ def _assembled(
         displacement=over / np.linalg.norm(fields.level.gradient(places), axis=1)[:, None],
         quasi_static=_quasi_static(fields),
         wall=_wall_mean(fields, wall, blocks, over),
+        fast=fast,
         residual=fields.pinned.residual,
         excess=fields.pinned.excess,
     )
@@ -214,22 +231,7 @@ def _wall_mean(fields: Fields, wall: str, blocks: list[FloatArray], over: FloatA
 
 
 def _squared_errors(space: TetrahedronSpace, gradients: FloatArray) -> FloatArray:
-    """Of each column's gradient, relative: its distance from the mean of the cells around each corner.
-
-    Source: Zienkiewicz and Zhu (1987), doi:10.1002/nme.1620240206; of an eigenvalue it is the relative error.
-    """
-    cells, count = space.body.cells[:, :4], gradients.shape[1]
-    points = gradients.reshape(len(cells), 4, 3 * count)
-    # Linear in the cell: from its four points to its corners.
-    corners = np.einsum("cp,epk->eck", np.linalg.inv(CELL_POINTS), points)
-    size = space.weights.reshape(len(cells), 4).sum(axis=1)
-    gather = csr_matrix(
-        (np.repeat(size, 4), (cells.ravel(), np.arange(cells.size))), shape=(space.unknowns, cells.size)
-    )
-    total = np.maximum(gather @ np.ones(cells.size), np.finfo(np.float64).tiny)
-    smooth = (diags_array(1 / total) @ (gather @ corners.reshape(cells.size, -1)))[cells]
-    back = np.einsum("pc,eck->epk", CELL_POINTS, smooth - corners)
-    weights = space.weights.reshape(len(cells), 4)
-    squared = np.einsum("ep,epk->k", weights, back**2).reshape(3, count).sum(axis=0)
-    whole = np.einsum("ep,epk->k", weights, points**2).reshape(3, count).sum(axis=0)
-    return np.asarray(squared / whole)
+    """Of each column's gradient, relative; of an eigenvalue it is the relative error."""
+    weights = np.repeat(space.weights, 3)
+    wrong = gradient_errors(space, gradients)
+    return np.asarray((weights @ np.abs(wrong) ** 2) / (weights @ gradients**2))

@@ -15,6 +15,7 @@ from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
 from ringbalance.physics import deferred
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
+from ringbalance.physics.sloshing.fast import LOWEST
 from ringbalance.physics.sloshing.range import SMALL
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
@@ -33,6 +34,8 @@ _OF_SURFACE: Final = 0.5
 share one, no more than one of them has most of it."""
 _PERHAPS: Final = 0.35
 """The same with one level less, where a wave is only looked for again."""
+_OVERLAP: Final = 1.1
+"""Over `LOWEST`: how much too fast a wave may be found that is counted among the slower ones."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,14 +97,15 @@ def ring_waves(
         gravity: across the shaft, m/s^2: turns in the disc's frame.
         axial_gravity: along the shaft, m/s^2: shapes the surface and excites no wave.
         frequency_ratio: s of the force, above 0; 1 for gravity.
-        modes: number of frequencies, 1 to 12; where a coarse mesh does not tell waves of the surface from
-            inertial ones, some of the latter are among them.
+        modes: number of frequencies, 1 to 12.  From s = 2.1 on none is missing; below, their number is
+            counted, but where a coarse mesh does not tell waves of the surface from inertial ones, some of
+            the latter are among them.
         levels: of the Coriolis force, 2 or more; the change from the last one is part of the uncertainty.
     Returns: RingWaves.  Status NO_RING where gravity exceeds omega^2 a, OUT_OF_RANGE where waves would not be
         small, NOT_CONVERGED where a linear solve failed.
     Raises: ValueError: arguments out of range, or a free surface that misses the chamber.
     Validity: small waves; thin Stokes layers on the walls without the Coriolis force in them.
-    Source: derived in `physics/sloshing/body.py`.
+    Source: derived in `physics/sloshing/body.py` and `physics/sloshing/fast.py`.
     """
     _check(angular_velocity, kinematic_viscosity, gravity, frequency_ratio, modes, levels)
     tilt = -axial_gravity / angular_velocity**2
@@ -146,7 +150,12 @@ def wave_system(geometry: ChamberGeometry, radius: float, tilt: float, modes: in
     space = TetrahedronSpace(body=replace(body, nodes=body.nodes / scale))
     level = Level(constant=radius**2 / 2 / scale**2, tilt=(0.0, 0.0, tilt / scale))
     reduced = deferred.reduced_waves(
-        space=space, level=level, wall=OUTER_WALL, potentials=modes + _SPARE, levels=levels
+        space=space,
+        level=level,
+        wall=OUTER_WALL,
+        waves=modes,
+        potentials=modes + _SPARE,
+        levels=levels,
     )
     surface = space.facets(FREE_SURFACE)
     missed = np.abs(level.value(surface.points)) / (radius / scale)
@@ -160,12 +169,23 @@ def wave_system(geometry: ChamberGeometry, radius: float, tilt: float, modes: in
 
 def frequencies(system: WaveSystem, modes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Frequencies of the surface's waves, their vortical shares and expanded uncertainties."""
+    fast = system.reduced.fast
+    slow = _slow(system, min(modes, fast.slower))
+    widths = _SAFETY * fast.error + system.faceting * fast.frequency
+    both = zip(slow, (fast.frequency, fast.vortical_share, widths), strict=True)
+    values, shares, widths = (np.concatenate(pair)[:modes] for pair in both)
+    return values, shares, widths
+
+
+def _slow(system: WaveSystem, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The same for so many waves slower than those that are found by their pressure."""
     reduced = system.reduced
     values, potential, weights = _waves(reduced, reduced.levels[-1])
     before, probable, _ = _waves(reduced, reduced.levels[-2])
     # Waves of the surface by their frequency; the likeliest of the others if these do not suffice.
-    by_rank = np.lexsort((values, np.where(potential > _OF_SURFACE, -1.0, -potential)))
-    chosen = np.sort(by_rank[:modes])
+    surface = (potential > _OF_SURFACE) & (values < _OVERLAP * LOWEST)
+    by_rank = np.lexsort((values, np.where(surface, -1.0, -potential * (values < LOWEST))))
+    chosen = np.sort(by_rank[:count])
     values, potential, weights = values[chosen], potential[chosen], weights[chosen]
     errors = reduced.squared_errors
     change = np.abs(values[:, None] - before[probable > _PERHAPS]).min(axis=1)

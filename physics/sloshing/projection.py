@@ -17,20 +17,23 @@ from scipy.sparse.linalg import LinearOperator, cg
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.liquid_body import Level
 from ringbalance.physics.pressure.multigrid import multigrid
-from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.physics.pressure.tetrahedra import CELL_POINTS, TetrahedronSpace
+from ringbalance.scene.arrays import ComplexArray, FloatArray, IntArray
 
 TOLERANCE: Final = 1e-7
 """Relative residual of a harmonic potential, whose gradient is small beside it."""
 _TURNED_TOLERANCE: Final = 1e-5
 """Relative residual of what is taken from a turned field: far below what the mesh leaves of the field."""
 
+_SHIFT: Final = 0.3
+"""Of the squared frequencies."""
+
 
 class RepeatedSolves:
     """Repeated solves with one positive definite matrix of quadratic elements."""
 
     def __init__(self, matrix: csr_matrix, prolongation: csr_matrix) -> None:
-        self._matrix = matrix
+        self.matrix = matrix
         self.cycle = LinearOperator(matrix.shape, matvec=multigrid(matrix, prolongation), dtype=np.float64)
         self.residual = 0.0
         """Largest relative one of all solves."""
@@ -45,10 +48,10 @@ class RepeatedSolves:
             if size == 0.0:
                 continue
             found, _ = cg(
-                self._matrix, b, x0=result[:, column], rtol=tolerance, atol=0.0, maxiter=500, M=self.cycle
+                self.matrix, b, x0=result[:, column], rtol=tolerance, atol=0.0, maxiter=500, M=self.cycle
             )
             result[:, column] = found
-            left = float(np.linalg.norm(b - self._matrix @ found)) / size
+            left = float(np.linalg.norm(b - self.matrix @ found)) / size
             self.residual, self.excess = max(self.residual, left), max(self.excess, left / tolerance)
         return result
 
@@ -97,6 +100,12 @@ class Fields:
         end = whole.indptr[rows]
         parts = (whole.data[:end], whole.indices[:end], whole.indptr[: rows + 1])
         return csr_matrix(parts, shape=(rows, self.space.unknowns))
+
+    @cached_property
+    def shifted(self) -> RepeatedSolves:
+        """The stiffness of all nodes and a part of the surface's mass, which makes it positive."""
+        matrix = csr_matrix(self.space.stiffness + _SHIFT * self.surface_mass)
+        return RepeatedSolves(matrix, self.space.prolongation(np.arange(self.space.unknowns)))
 
     @cached_property
     def pinned(self) -> RepeatedSolves:
@@ -149,3 +158,24 @@ class Fields:
         kept = squares > least**2
         left_out = float(squares[~kept].max(initial=0.0))
         return np.asarray(fields @ (axes[:, kept] / np.sqrt(squares[kept]))), left_out
+
+
+def gradient_errors(
+    space: TetrahedronSpace, gradients: FloatArray | ComplexArray
+) -> FloatArray | ComplexArray:
+    """Distance of each column's gradient from the mean of the cells around each corner, of the same shape.
+
+    Source: Zienkiewicz and Zhu (1987), doi:10.1002/nme.1620240206.
+    """
+    cells, count = space.body.cells[:, :4], gradients.shape[1]
+    points = gradients.reshape(len(cells), 4, 3 * count)
+    # Linear in the cell: from its four points to its corners.
+    corners = np.einsum("cp,epk->eck", np.linalg.inv(CELL_POINTS), points)
+    size = space.weights.reshape(len(cells), 4).sum(axis=1)
+    gather = csr_matrix(
+        (np.repeat(size, 4), (cells.ravel(), np.arange(cells.size))), shape=(space.unknowns, cells.size)
+    )
+    total = np.maximum(gather @ np.ones(cells.size), np.finfo(np.float64).tiny)
+    smooth = (diags_array(1 / total) @ (gather @ corners.reshape(cells.size, -1)))[cells]
+    back = np.einsum("pc,eck->epk", CELL_POINTS, smooth - corners)
+    return np.asarray(back).reshape(gradients.shape)

@@ -9,11 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.tube.loss import TubeLoss, tube_loss
+from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.reduced_model.selection.loss_models import TABLES, velocity_under_head
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
-_VELOCITIES: Final = (1e-4, 3000.0, 401)
 _LEAST: Final = 0.05
 """Smallest head asked for, in units of the gas pressure's: below it lies a stall."""
 
@@ -27,36 +27,33 @@ class Running:
     k: float
     half_width: float
     """95 %, of k."""
+    exit_loss: float
+    """What a laminar exit adds to k."""
     reynolds: float
     flow_state: str
 
-    @classmethod
-    def under(cls, scene: Scene, *, head: float) -> Running:
-        """The velocity with (k(u) + 1) u^2/2 = head, by interpolation in logarithms; the head grows with u.
 
-        Args: `head`: H_A - H_C, m^2/s^2, positive.
-        Raises: ValueError: a head beyond the velocities at hand.
-        """
-        curve = tube_curve(scene)
-        heads = (curve.k.value + 1) * curve.velocity**2 / 2
-        if not heads[0] <= head <= heads[-1]:
-            raise ValueError(f"a head of {head:g} m^2/s^2 is outside the velocities of {_VELOCITIES[:2]} m/s")
-        log_u = np.log(curve.velocity)
-        at = float(np.interp(np.log(head), np.log(heads), log_u))
-        velocity = float(np.exp(at))
-        return cls(
-            velocity=velocity,
-            k=2 * head / velocity**2 - 1,
-            half_width=float(np.interp(at, log_u, curve.k.uncertainty)),
-            reynolds=float(np.exp(np.interp(at, log_u, np.log(curve.reynolds)))),
-            flow_state=str(curve.flow_state[int(np.argmin(np.abs(log_u - at)))]),
+def running_tube(scene: Scene, *, head: float) -> Running:
+    """The velocity with (k(u) + 1) u^2/2 = head, m^2/s^2, above zero."""
+    return running_tubes(scene, (head,))[0]
+
+
+@lru_cache(maxsize=64)
+def running_tubes(scene: Scene, heads: tuple[float, ...]) -> tuple[Running, ...]:
+    """The same under several heads at once."""
+    found = tube_loss(scene, velocity_under_head(scene, loss=TABLES, head=heads))
+    leaving = found.terms.get("exit", np.zeros(len(heads)))
+    return tuple(
+        Running(
+            velocity=float(found.velocity[i]),
+            k=float(found.k.value[i]),
+            half_width=float(found.k.uncertainty[i]),
+            exit_loss=float(leaving[i]),
+            reynolds=float(found.reynolds[i]),
+            flow_state=str(found.flow_state[i]),
         )
-
-
-@lru_cache(maxsize=256)
-def tube_curve(scene: Scene) -> TubeLoss:
-    """k(u) of a scene's tube over all velocities that any scene may reach."""
-    return tube_loss(scene, np.geomspace(*_VELOCITIES))
+        for i in range(len(heads))
+    )
 
 
 def driving_head(scene: Scene, *, share: float) -> float:

@@ -7,11 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.paper import (
-    max_liquid_volume_paper,
-    moment_paper,
-    surface_radius_paper,
-)
+from ringbalance.reduced_model.paper import max_liquid_volume_paper, moment_paper, surface_radius_paper
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure

@@ -13,7 +13,7 @@ from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.reference.fig_7 import readings
-from ringbalance.verification.reference.tube_running import Running, driving_head, tube_curve
+from ringbalance.verification.reference.tube_running import driving_head, running_tube, running_tubes
 
 _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
 """In units of the scene's."""
@@ -45,25 +45,20 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _one_k(scene: Scene) -> Found:
     """k's own uncertainty is common to all velocities, so it only scales the difference."""
-    middle = Running.under(scene, head=driving_head(scene, share=0.5))
-    errors = []
-    for share in (0.0, 0.25, 0.75, 1.0):
-        head = driving_head(scene, share=share)
-        errors.append(
-            abs(math.sqrt(2 * head / (middle.k + 1)) / Running.under(scene, head=head).velocity - 1)
-        )
+    heads = tuple(driving_head(scene, share=share) for share in (0.5, 0.0, 0.25, 0.75, 1.0))
+    middle, *others = running_tubes(scene, heads)
+    errors = [
+        abs(math.sqrt(2 * head / (middle.k + 1)) / other.velocity - 1)
+        for head, other in zip(heads[1:], others, strict=True)
+    ]
     worst = max(errors)
     return Found(value=worst, input=from_half_width(worst * middle.half_width / (middle.k + 1)))
 
 
 def _exit(scene: Scene) -> tuple[float, float]:
     """Exit loss beyond '+1', and half its share of k + 1: its effect on the velocity."""
-    if scene.tube.drag_coefficient is not None:
-        return 0.0, 0.0
-    own = Running.under(scene, head=driving_head(scene, share=0.5))
-    curve = tube_curve(scene)
-    excess = float(np.interp(np.log(own.velocity), np.log(curve.velocity), curve.terms["exit"]))
-    return excess, abs(excess) / (2 * (own.k + 1))
+    own = running_tube(scene, head=driving_head(scene, share=0.5))
+    return own.exit_loss, abs(own.exit_loss) / (2 * (own.k + 1))
 
 
 def _siphon_share(scene: Scene) -> float:
@@ -80,7 +75,7 @@ def _figure(scene: Scene) -> Series:
     law = flow_law_of(scene)
     fills = _FILLS * law.max_fill_ratio
     flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=False)
-    middle = Running.under(scene, head=driving_head(scene, share=0.5))
+    middle = running_tube(scene, head=driving_head(scene, share=0.5))
     one_k = [math.sqrt(2 * driving_head(scene, share=float(s)) / (middle.k + 1)) for s in _FILLS]
     return figure(
         "velocity at the scene's gas pressure",

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import brentq
 
+from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
@@ -19,7 +20,13 @@ from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure
 from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.reference.fig_7 import readings
-from ringbalance.verification.reference.tube_running import Running, driving_head, tube_curve, with_bore
+from ringbalance.verification.reference.tube_running import (
+    Running,
+    driving_head,
+    running_tube,
+    running_tubes,
+    with_bore,
+)
 
 _ABOUT: Final = 0.1
 _BORES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
@@ -29,6 +36,8 @@ _WARM: Final = 333.15
 _OIL: Final = "silicone oil 100 cSt"
 _OIL_TABLE: Final = 298.15
 """K, at which its data are given."""
+_VELOCITIES: Final = (1e-4, 3000.0, 401)
+"""Of the figure, m/s."""
 _NARROWEST: Final = 0.1
 """Smallest bore searched for k = 50, in units of the scene's."""
 
@@ -41,14 +50,14 @@ reference = {
 
 
 def values(scene: Scene) -> dict[str, float]:
-    own = Running.under(scene, head=driving_head(scene, share=0.5))
+    own = running_tube(scene, head=driving_head(scene, share=0.5))
     return {"k_scene": own.k, "fill_spread": _range(_over_fills(scene)).value}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    own = Running.under(scene, head=driving_head(scene, share=0.5))
+    own = running_tube(scene, head=driving_head(scene, share=0.5))
     printed, bare = readings()
-    narrow = Running.under(bare, head=driving_head(bare, share=0.5))
+    narrow = running_tube(bare, head=driving_head(bare, share=0.5))
     fills = _over_fills(scene)
     bores = [_with_bore(scene, factor) for factor in _BORES]
     differences = _differences(printed, bare)
@@ -82,8 +91,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-def _over_fills(scene: Scene) -> list[Running]:
-    return [Running.under(scene, head=driving_head(scene, share=s)) for s in np.linspace(0, 1, 11)]
+def _over_fills(scene: Scene) -> Sequence[Running]:
+    return running_tubes(scene, tuple(driving_head(scene, share=s) for s in np.linspace(0, 1, 11)))
 
 
 def _liquids() -> tuple[Liquid, ...]:
@@ -99,11 +108,11 @@ def _liquids() -> tuple[Liquid, ...]:
 
 def _with_liquid(scene: Scene, liquid: Liquid) -> Running:
     changed = dataclasses.replace(scene, liquid=liquid)
-    return Running.under(changed, head=scene.gas.pressure / liquid.density)
+    return running_tube(changed, head=scene.gas.pressure / liquid.density)
 
 
 def _with_bore(scene: Scene, factor: float) -> Running:
-    return Running.under(with_bore(scene, factor), head=scene.gas.pressure / scene.liquid.density)
+    return running_tube(with_bore(scene, factor), head=scene.gas.pressure / scene.liquid.density)
 
 
 def _range(runs: Sequence[Running]) -> Found:
@@ -124,7 +133,7 @@ def _bore_for(scene: Scene, k: float) -> float:
 
 
 def _over_velocity(scene: Scene) -> Series:
-    curve = tube_curve(scene)
+    curve = tube_loss(scene, np.geomspace(*_VELOCITIES))
     return figure(
         "k against the velocity, the scene's tube and liquid",
         ("velocity", "m/s", curve.velocity),

@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
-from ringbalance.reduced_model.paper import (
-    PAPER_DRAG_COEFFICIENT,
-    stall_pressure,
-    velocity_from_pressures,
-)
+from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT, stall_pressure, velocity_from_pressures
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, NotRunError, Series, as_found, figure
 from ringbalance.verification.paper_numbers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE

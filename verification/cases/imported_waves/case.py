@@ -15,7 +15,7 @@ from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
 from ringbalance.verification.orders import OrderStudy
-from ringbalance.verification.reference.block_chambers import disc_chamber, sector_chamber
+from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber, sector_chamber
 from ringbalance.verification.reference.sloshing_exact import CosineWaves, ring_frequencies, still_frequency
 
 _FILL: Final = 0.4
@@ -27,6 +27,13 @@ _RING_WAVES: Final = 7
 _LEVELS: Final = {"light": ((4, 4, 3), (6, 6, 5), (8, 8, 6)), "heavy": ((4, 4, 3), (8, 8, 6), (16, 16, 12))}
 _SECTOR: Final = (0.5, 0.75, np.pi / 2, 1.2)
 """Inner radius, surface, angle and width of a sector, in outer radii."""
+_BOX: Final = (2000.0, 0.5, (1.0, 1.002))
+"""Distance from the shaft, depth, and width and length of a box, whose first two waves are 0.1 % apart."""
+_BOX_CELLS: Final = {"light": (8, 6, 6), "heavy": (12, 9, 9)}
+_CLOSE: Final = 0.01
+"""Relative distance of waves that the mutation takes for one."""
+_MISSING: Final = 1e3
+"""Deviation over uncertainty of a wave that is not listed."""
 _STILL: Final = ((1, 0), (0, 1), (1, 1), (2, 0))
 """Half waves round and along of the waves whose order is judged."""
 
@@ -45,6 +52,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "ring_held": float((off / widths[nearest]).max()),
         "still_order": study.settled_order,
         "still_error": study.finest_error,
+        **_pair(level, defect),
     }
     return Evidence(
         found=as_found(**judged),
@@ -77,6 +85,39 @@ def _ring(level: Level) -> WaveSystem:
     inner, a, width = _RING
     geometry = sector_chamber(_RING_CELLS[level], radii=(inner, 1.0), angle=2 * np.pi, width=width)
     return wave_system(geometry, a, 0.0, _RING_WAVES + 1, 2)
+
+
+def _pair(level: Level, defect: str | None) -> dict[str, float]:
+    """A box far from the shaft, nearly as wide as long: s^2 = far k tanh(k depth) twice, nearly."""
+    system = _box(level)
+    if defect == "close_waves_listed_once":
+        fast = system.reduced.fast
+        kept = np.append(True, np.diff(fast.frequency) > _CLOSE * fast.frequency[1:])
+        parts = (part[kept] for part in (fast.frequency, fast.error, fast.vortical_share))
+        frequency, error, shares = parts
+        fast = replace(fast, frequency=frequency, error=error, vortical_share=shares)
+        system = replace(system, reduced=replace(system.reduced, fast=fast))
+    values, _, widths = frequencies(system, 3)
+    far, depth, sides = _BOX
+    k = np.pi * np.sort([1 / sides[0], 1 / sides[1], np.hypot(*np.reciprocal(sides))])
+    exact = np.sqrt(far * k * np.tanh(k * depth))
+    listed = min(values.size, 3)
+    off = np.abs(values[:listed] - exact[:listed])
+    return {
+        "pair": float((off / exact[:listed]).max()) if listed == 3 else 1.0,
+        "pair_held": float((off / widths[:listed]).max()) if listed == 3 else _MISSING,
+    }
+
+
+@lru_cache(maxsize=2)
+def _box(level: Level) -> WaveSystem:
+    far, depth, (across, along) = _BOX
+
+    def place(cube: FloatArray) -> FloatArray:
+        x, y, z = np.moveaxis(cube - 0.5, -1, 0)
+        return np.stack([far + 2 * depth * x, across * y, along * z], axis=-1)
+
+    return wave_system(block_chamber(_BOX_CELLS[level], place), far, 0.0, 3, 2)
 
 
 @lru_cache(maxsize=1)

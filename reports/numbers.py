@@ -176,24 +176,14 @@ def shown(value: float | None, unit: str, half_width: float | None = None, *, di
     Args: `half_width`: 95 %, in `unit`; without one the value has `digits` significant digits.
     Raises: ValueError: a value that is not finite.
     """
-    text, symbol = shown_apart(value, unit, half_width, digits=digits)
-    wants_brackets = "±" in text and bool(symbol) and not text.startswith("(")
-    return with_unit(f"({text})" if wants_brackets else text, symbol)
-
-
-def shown_apart(
-    value: float | None, unit: str, half_width: float | None = None, *, digits: int = 4
-) -> tuple[str, str]:
-    """As `shown`, without brackets and with number and unit apart, to be set in different type.
-
-    Raises: ValueError: a value that is not finite.
-    """
     # A value that its own half-width exceeds is shown in the unit of that half-width.
     display = display_unit(unit, value, half_width)
     if value is None:
-        return MISSING, ""
+        return MISSING
     width = None if half_width is None else half_width * display.factor
-    return measured(value * display.factor, width, digits=digits), display.symbol
+    text = measured(value * display.factor, width, digits=digits)
+    wants_brackets = "±" in text and bool(display.symbol) and not text.startswith("(")
+    return with_unit(f"({text})" if wants_brackets else text, display.symbol)
 
 
 def given(value: float | None, unit: str, *, digits: int = 6) -> str:

@@ -78,10 +78,10 @@ def begun(scene: Scene, level: Level, pool: Workers | None) -> Begun:
     if pool is None:
         return {}
     apart = [section.name for section in SECTIONS if section.apart]
-    return {name: pool.submit(section_evidence, name, scene, level) for name in apart}
+    return {name: pool.submit(_section_evidence, name, scene, level) for name in apart}
 
 
-def section_evidence(name: str, scene: Scene, level: Level) -> Record | None:
+def _section_evidence(name: str, scene: Scene, level: Level) -> Record | None:
     """What one section collects of a scene."""
     work = Work(scene=scene, calibration=calibration_of(scene), level=level)
     return next(section for section in SECTIONS if section.name == name).collect(work)
@@ -98,7 +98,7 @@ def finished(begun: Begun, pool: Workers | None, scene: Scene, level: Level) -> 
     if pool is None:
         return {}
     found = {
-        name: pool.taken(future, partial(section_evidence, name, scene, level))
+        name: pool.taken(future, partial(_section_evidence, name, scene, level))
         for name, future in reversed(begun.items())
     }
     return {name: record for name, record in found.items() if record is not None}

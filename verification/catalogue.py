@@ -17,7 +17,7 @@ _PAPERS: Final = ("liquid_ring", "eccentric_mass")
 
 
 @lru_cache(maxsize=1)
-def case_ids() -> tuple[str, ...]:
+def _case_ids() -> tuple[str, ...]:
     """Ids of all cases: the names of the folders that hold a case.toml, sorted."""
     folders = (item for item in files(cases).iterdir() if item.is_dir())
     return tuple(sorted(item.name for item in folders if (item / "case.toml").is_file()))
@@ -37,12 +37,12 @@ def case_code(case_id: str) -> CaseCode:
     """
     study = load_case(case_id).study
     if study is not None:
-        return SharedCode(study)
+        return _SharedCode(study)
     return cast(CaseCode, getattr(cases, f"{case_id}_code"))
 
 
 @dataclass(frozen=True)
-class SharedCode:
+class _SharedCode:
     """The computation of a case whose case.toml names a study and its settings."""
 
     study: Study
@@ -66,7 +66,7 @@ def load_case(case_id: str) -> CaseDefinition:
 
 def load_cases() -> tuple[CaseDefinition, ...]:
     """All cases in the order of the report: first by `order`, then the claims by paper and number."""
-    return tuple(sorted(map(load_case, case_ids()), key=_place))
+    return tuple(sorted(map(load_case, _case_ids()), key=_place))
 
 
 def _place(definition: CaseDefinition) -> tuple[bool, int, int, str]:
@@ -76,9 +76,9 @@ def _place(definition: CaseDefinition) -> tuple[bool, int, int, str]:
 
 
 def _check_known(case_id: str) -> None:
-    if case_id in case_ids():
+    if case_id in _case_ids():
         return
-    near = _by_number(case_id) or difflib.get_close_matches(case_id, case_ids(), n=1, cutoff=0.5)
+    near = _by_number(case_id) or difflib.get_close_matches(case_id, _case_ids(), n=1, cutoff=0.5)
     guess = f', did you mean "{near[0]}"?' if near else "."
     raise UnknownCaseError(f'unknown case "{case_id}"{guess} `ringbalance verify --list` names them all.')
 
@@ -87,4 +87,4 @@ def _by_number(case_id: str) -> list[str]:
     """A claim may be asked for by its number alone."""
     number = re.fullmatch(r"(?:claim)?_?0*(\d+)\w*", case_id)
     wanted = f"claim_{int(number[1]):02d}_" if number else None
-    return [known for known in case_ids() if wanted and known.startswith(wanted)]
+    return [known for known in _case_ids() if wanted and known.startswith(wanted)]

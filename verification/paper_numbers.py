@@ -9,8 +9,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
+from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_rounding, input_uncertainty
 from ringbalance.verification.evidence import Reference
@@ -74,3 +76,17 @@ def rounded_radius(quantity: Callable[[float], float]) -> float:
 def with_plate(disc: Disc, thickness: float) -> Disc:
     """A disc with another plate thickness, m."""
     return dataclasses.replace(disc, plate_thickness=thickness)
+
+
+@lru_cache(maxsize=1)
+def fig_7_readings() -> tuple[Scene, Scene]:
+    """The paper's disc with its bore from k = 50, and from the calibrated law: both readings of Fig. 7.
+
+    The figure fixes only the product kappa lambda rho S u, and the paper gives no bore.  Each bundled scene
+    has the paper's rate under the law that its bore came from.
+    """
+    k_50, calibrated = (
+        liquid_ring_scene(load_scene(bundled_scene(name)))
+        for name in ("liquid_ring_paper", "liquid_ring_paper_calibrated")
+    )
+    return k_50, calibrated

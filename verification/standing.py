@@ -16,7 +16,7 @@ _NEARLY_ALL: Final = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
-class Subject:
+class _Subject:
     """A quantity or a part of the model, and what no case can say of it."""
 
     title: str
@@ -28,29 +28,29 @@ class Subject:
     balancer: Literal["liquid_ring", "eccentric_mass"] = "liquid_ring"
 
 
-SUBJECTS: Final[Mapping[str, Subject]] = MappingProxyType(
+SUBJECTS: Final[Mapping[str, _Subject]] = MappingProxyType(
     {
-        "ring": Subject(
+        "ring": _Subject(
             title="Volume, wall pressure, moment and lever arm",
             assumed="liquid at rest in the disc; waves counted apart",
             budgets=("chamber_volume", "wall_pressure", "moment", "lambda", "stall_pressure"),
         ),
-        "friction": Subject(
+        "friction": _Subject(
             title="Friction in a straight tube at rest",
             assumed="roughness of the wall",
             budgets=("drag_coefficient", "velocity"),
         ),
-        "rotation": Subject(
+        "rotation": _Subject(
             title="Friction in a rotating tube",
             assumed="turbulent flow: a formula recalled, not read",
             budgets=("drag_coefficient", "velocity"),
         ),
-        "fittings": Subject(
+        "fittings": _Subject(
             title="Entrance, exit, bends and developing flow",
             assumed="bends one by one, far from each other",
             budgets=("drag_coefficient", "velocity"),
         ),
-        "crest": Subject(
+        "crest": _Subject(
             title="Flow over the siphon crest, separation",
             calibrated="the cavity's pressure, with two thresholds of one siphon in view",
             assumed="cavity between vapour and gas pressure; air leaves at Froude numbers 0.6 to 1.1",
@@ -62,31 +62,33 @@ SUBJECTS: Final[Mapping[str, Subject]] = MappingProxyType(
                 "priming_pressure_trapped",
             ),
         ),
-        "residual": Subject(
+        "residual": _Subject(
             title="Residual liquid over the port",
             assumed="draw-down depth derived, 30 % wide",
             budgets=("usable_moment",),
         ),
-        "gas": Subject(
+        "gas": _Subject(
             title="Filling and venting of a chamber with gas",
             assumed="conductance, critical ratio and lag of a line that the scene does not give",
         ),
-        "waves": Subject(
+        "waves": _Subject(
             title="Waves on the liquid ring",
             calibrated="6 % of a natural frequency, to 24 points of four tanks",
             assumed="damping; Coriolis force without data",
         ),
-        "vibration": Subject(
+        "vibration": _Subject(
             title="Vibration by an unbalance",
             calibrated="the influence coefficient, to runs with small unbalances",
             assumed="one plane, away from resonances",
         ),
-        "loop": Subject(
+        "loop": _Subject(
             title="Fills and vibration in closed loop", assumed="noise, control period, start of the run"
         ),
-        "uncertainty": Subject(title="Stated uncertainties", assumed="inputs independent of each other"),
-        "range": Subject(title="Choice of models, limits of validity", assumed="estimates of left-out terms"),
-        "eccentric": Subject(
+        "uncertainty": _Subject(title="Stated uncertainties", assumed="inputs independent of each other"),
+        "range": _Subject(
+            title="Choice of models, limits of validity", assumed="estimates of left-out terms"
+        ),
+        "eccentric": _Subject(
             title="Eccentric masses: estimation, positioning, run-up",
             assumed="friction, motor and filter data; vertical shaft",
             balancer="eccentric_mass",
@@ -129,7 +131,7 @@ def budget_standing(cases: Sequence[Mapping[str, Any]], quantity: str) -> str:
     return "; ".join([*parts, f"{', '.join(without)}: {NO_DATA}"] if without else parts)
 
 
-def _row(subject: Subject, cases: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+def _row(subject: _Subject, cases: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     measured = [_measured(case) for case in cases if case["kind"] == "validation"]
     verified = [case["id"].replace("_", " ") for case in cases if case["kind"].endswith("verification")]
     return (

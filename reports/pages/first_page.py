@@ -134,7 +134,7 @@ def _view(found: Record, evidence: Record) -> Record:
         "requirements": requirement_table(rows),
         "bars": requirement_figure(rows),
         "actions": _actions(evidence, rows),
-        "dominant": dominant(evidence),
+        "dominant": _dominant(evidence),
         "unmeasured": f"{_measured(evidence)} {_OF_PARTS}",
         "rests": [*_bore(found, evidence), *_exact(evidence), *_borrowed(evidence)],
     }
@@ -163,7 +163,7 @@ def loop_sentences(evidence: Record) -> list[str]:
     line = evidence["calibration"].get("gas_line") or {"given": True}
     ideal = "" if line["given"] else ", with a valve that acts at once,"
     told = [f"Under the calibrated law{ideal} the loop {_ending(run)}{_factor(run)}."]
-    tuned = retuned(evidence)
+    tuned = _retuned(evidence)
     if tuned is not None:
         gain, own = (_gain_of(evidence, name) for name in (RETUNED, "calibrated"))
         change = _change(evidence)
@@ -182,7 +182,7 @@ def _change(evidence: Record) -> str:
     return str(((evidence.get("summary") or {}).get("tuning") or {}).get("change") or "")
 
 
-def retuned(evidence: Record) -> Record | None:
+def _retuned(evidence: Record) -> Record | None:
     """The run with the recommended settings, if there are any."""
     place = place_of_run(evidence, RETUNED)
     return None if place is None else evidence["consequences"]["runs"][place]
@@ -295,7 +295,7 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
     valve = _VALVE.get(verdicts.get(SMALLEST, ""))
     valve_named = "the scene’s valve" if line["given"] else "any valve of the default range"
     told = [valve.format(valve=valve_named)] if valve else []
-    tuned, tuning = retuned(evidence), (evidence.get("summary") or {}).get("tuning") or {}
+    tuned, tuning = _retuned(evidence), (evidence.get("summary") or {}).get("tuning") or {}
     if tuned is None:
         return told
     gain = shown(tuned["proportional_s_per_m"], "s/m", digits=2)
@@ -316,7 +316,7 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
     return told
 
 
-def dominant(evidence: Record) -> list[str]:
+def _dominant(evidence: Record) -> list[str]:
     """The three effects of one cause on one main result that are largest, relative to it."""
     budgets = evidence["calibration"].get("budgets") or {}
     effects = []

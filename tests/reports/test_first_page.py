@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reports.pages.first_page import SECTION, crest_range, dominant, loop_sentences
+from ringbalance.reports.pages.first_page import SECTION, crest_range, loop_sentences
 from ringbalance.reports.pages.loop import SECTION as LOOP
 from ringbalance.reports.pages.requirements import (
     Requirement,
@@ -343,7 +343,7 @@ def test_what_rests_on_assumptions_says_so(evidence: Record) -> None:
 
 
 def test_the_largest_effects_come_first(evidence: Record) -> None:
-    first, second, third = dominant(evidence)
+    first, second, third = view(evidence)["dominant"]
     assert first.startswith("Bore of the tube (assumed)")
     assert "9.3\u202f% of the flow velocity" in first
     assert second.startswith("The model itself")
@@ -353,7 +353,7 @@ def test_the_largest_effects_come_first(evidence: Record) -> None:
 
 def test_the_capacity_needed_is_as_uncertain_as_the_influence_coefficient(evidence: Record) -> None:
     evidence["summary"]["needed_uncertainty_kg_m"] = 0.5 * evidence["summary"]["needed_moment_kg_m"]
-    first = dominant(evidence)[0]
+    first = view(evidence)["dominant"][0]
     assert first.startswith("Influence coefficient of the rotor")
     assert "50\u202f% of the capacity needed" in first
 

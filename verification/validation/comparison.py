@@ -109,7 +109,7 @@ def compare(*sets: Measurements, mutation: str | None = None) -> Comparison:
     Raises: MeasurementsError: a kind that cannot be predicted, a column that is missing, or a measured value
         that is not positive.
     """
-    kind = kind_of(sets[0])
+    kind = _kind_of(sets[0])
     for each in sets:
         _check(each, kind)
     predictions = [kind.predict(each) for each in sets]
@@ -130,7 +130,7 @@ def friction(*sets: Measurements, mutation: str | None = None) -> Comparison:
     return found.where(np.argsort(found.columns["reynolds"], kind="stable"))
 
 
-def kind_of(data: Measurements) -> Kind:
+def _kind_of(data: Measurements) -> Kind:
     """The kind of a data set. Raises: MeasurementsError: one that cannot be predicted."""
     if data.source.kind not in KINDS:
         raise MeasurementsError(
@@ -195,7 +195,7 @@ def data_evidence(*sets: Measurements, unit: str, mutation: str | None = None) -
     return Evidence(
         found=as_found(share_within=comparison.statistics.share_within, bias=abs(comparison.statistics.bias)),
         numbers=comparison.statistics.numbers(),
-        series=(comparison.scatter(kind_of(sets[0]).title, unit),),
+        series=(comparison.scatter(_kind_of(sets[0]).title, unit),),
     )
 
 
@@ -206,7 +206,7 @@ def data_document(path: Path) -> dict[str, Any]:
     """
     data = Measurements.read(path)
     try:
-        kind, comparison = kind_of(data), compare(data)
+        kind, comparison = _kind_of(data), compare(data)
         if len(data) < _FEWEST:
             raise MeasurementsError(f"{len(data)} point, and {_FEWEST} are the fewest that can be judged")
     except MeasurementsError as error:

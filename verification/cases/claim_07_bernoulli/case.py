@@ -12,7 +12,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
 from ringbalance.verification.loops import flow_law_of
-from ringbalance.verification.reference.fig_7 import readings
+from ringbalance.verification.paper_numbers import fig_7_readings
 from ringbalance.verification.reference.tube_running import driving_head, running_tube, running_tubes
 
 _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
@@ -27,7 +27,7 @@ def values(scene: Scene) -> dict[str, float]:
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     excess, by_exit = _exit(scene)
-    _, bare = readings()
+    _, bare = fig_7_readings()
     return Evidence(
         found={
             "one_k": _one_k(scene),

@@ -19,7 +19,7 @@ from ringbalance.scene.models import Liquid, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure
 from ringbalance.verification.loops import flow_law_of
-from ringbalance.verification.reference.fig_7 import readings
+from ringbalance.verification.paper_numbers import fig_7_readings
 from ringbalance.verification.reference.tube_running import (
     Running,
     driving_head,
@@ -56,7 +56,7 @@ def values(scene: Scene) -> dict[str, float]:
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     own = running_tube(scene, head=driving_head(scene, share=0.5))
-    printed, bare = readings()
+    printed, bare = fig_7_readings()
     narrow = running_tube(bare, head=driving_head(bare, share=0.5))
     fills = _over_fills(scene)
     bores = [_with_bore(scene, factor) for factor in _BORES]

@@ -16,7 +16,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_range
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
 from ringbalance.verification.loops import amplitude_series, flow_law_of, loop_scene, run_loop, settled_after
-from ringbalance.verification.reference.fig_7 import readings
+from ringbalance.verification.paper_numbers import fig_7_readings
 
 _GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
 """Kp of Fig. 7, s/m."""
@@ -40,7 +40,7 @@ def values(scene: Scene) -> dict[str, float]:
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     runs = {gain: _run(scene, gain) for gain in _GAINS}
     rate = _rate(scene, paper_model(scene))
-    _, bare = readings()
+    _, bare = fig_7_readings()
     calibrated = _rate(bare, BalancerModel.of(flow_law_of(bare)))
     onset = _onset(scene)
     return Evidence(

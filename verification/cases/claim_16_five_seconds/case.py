@@ -21,7 +21,7 @@ from ringbalance.verification.loops import (
     settling,
     slowest_within,
 )
-from ringbalance.verification.reference.fig_7 import readings
+from ringbalance.verification.paper_numbers import fig_7_readings
 
 _BOUND: Final = 5.0
 
@@ -37,7 +37,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     runs = {period: _runs(given, period) for period in PERIODS}
     slowest = [slowest_within(scene, group) for group in runs.values()]
     rises = [max(run.misadjustments for run in group) for group in runs.values()]
-    _, bare = readings()
+    _, bare = fig_7_readings()
     calibrated = _short_runs(bare)
     return Evidence(
         found={

@@ -57,7 +57,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
     friction_ratio,
 )
-from ringbalance.verification.reference.bent_tube import bent_tube_flow
+from ringbalance.verification.reference.bent_tube import BentTubeFlow
 
 HERE = Path(__file__).resolve().parent
 KEPT = HERE / "openfoam.json"
@@ -181,7 +181,7 @@ def _refined(segments: Sequence[Segment], factor: float) -> list[Segment]:
 def _time_of_a_solve(scene: Scene, rotation: float) -> float:
     """On the second of the three kept meshes, which errs by 0.4 %: about as OpenFOAM's finest does."""
     begin = time.process_time()
-    bent_tube_flow(
+    BentTubeFlow.of(
         segments=path_over_crest(scene, 1.5), cells=SectionMesh(around=2, across=3, wall_ratio=3.0),
         reynolds=REYNOLDS, rotation_reynolds=rotation,
     )  # fmt: skip

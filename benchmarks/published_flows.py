@@ -10,15 +10,14 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.meshes import (
+    Patch,
     geometric_vertices,
     patch_mesh,
-    ruled_patch,
-    tensor_patch,
     with_midpoints,
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
-from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 Field = Callable[[FloatArray], FloatArray]
 
@@ -116,13 +115,13 @@ def kovasznay_flow(
     """
     sides = dict.fromkeys(("west", "east", "south", "north"), "boundary")
     x, y = np.linspace(-0.5, 1.0, 2 * cells + 1), np.linspace(-0.5, 0.5, 2 * cells + 1)
-    mesh = patch_mesh(patches=[tensor_patch(x=x, y=y, sides=sides)], shape=shape)
+    mesh = patch_mesh(patches=[Patch.tensor(x=x, y=y, sides=sides)], shape=shape)
     velocity = kovasznay(reynolds=reynolds)[0]
     conditions = [
         Dirichlet(boundary="boundary", component=0, value=lambda x: velocity(x)[0]),
         Dirichlet(boundary="boundary", component=1, value=lambda x: velocity(x)[1]),
     ]
-    system = flow_system(space=taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
+    system = FlowSystem.of(space=FlowSpace.taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
     return system, solve_flow(system=system, coefficients=Coefficients(viscosity=1 / reynolds))
 
 
@@ -180,11 +179,11 @@ def taylor_couette(
     around[-1] = 0.0
     inner, outer = _arc(inner_radius, around), _arc(outer_radius, around)
     blend = np.linspace(0.0, 1.0, 2 * cells + 1)
-    ring = ruled_patch(inner=inner, outer=outer, blend=blend, sides={"south": "inner", "north": "outer"})
+    ring = Patch.ruled(inner=inner, outer=outer, blend=blend, sides={"south": "inner", "north": "outer"})
     walls = (("inner", inner_speed), ("outer", outer_speed))
     conditions = [Dirichlet(boundary=b, component=c, value=_spinning(w, c)) for b, w in walls for c in (0, 1)]
-    space = taylor_hood(mesh=patch_mesh(patches=[ring], shape="triangle"))
-    system = flow_system(space=space, conditions=conditions, enclosed=True, stress_form=True)
+    space = FlowSpace.taylor_hood(mesh=patch_mesh(patches=[ring], shape="triangle"))
+    system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, stress_form=True)
     solution = solve_flow(system=system, coefficients=Coefficients(viscosity=viscosity))
     gap = outer_radius**2 - inner_radius**2
     solid = (outer_speed * outer_radius**2 - inner_speed * inner_radius**2) / gap
@@ -210,10 +209,10 @@ def cavity_flow(*, cells: int, reynolds: float, wall_ratio: float = 4.0) -> tupl
     half = geometric_vertices(cells=cells // 2, ratio=wall_ratio) / 2
     line = with_midpoints(vertices=np.concatenate([half, 1 - half[-2::-1]]))
     sides = {"west": "wall", "east": "wall", "south": "wall", "north": "lid"}
-    mesh = patch_mesh(patches=[tensor_patch(x=line, y=line, sides=sides)], shape="quad")
+    mesh = patch_mesh(patches=[Patch.tensor(x=line, y=line, sides=sides)], shape="quad")
     conditions = [Dirichlet(boundary="lid", component=0, value=1.0), Dirichlet(boundary="lid", component=1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
-    system = flow_system(space=taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
+    system = FlowSystem.of(space=FlowSpace.taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
     solution = None
     for step in [r for r in (100.0, 400.0, 1000.0, 2000.0) if r < reynolds] + [reynolds]:
         solution = solve_flow(system=system, coefficients=Coefficients(viscosity=1 / step), start=solution)
@@ -247,11 +246,11 @@ def cylinder_mesh(
         outer = (1 - line) * corners[side] + line * corners[side + 1]
         sides = {"south": "cylinder"} | ({"north": name} if name else {})
         patches.append(
-            ruled_patch(inner=_arc(_RADIUS, angles, _CENTRE), outer=outer, blend=blend, sides=sides)
+            Patch.ruled(inner=_arc(_RADIUS, angles, _CENTRE), outer=outer, blend=blend, sides=sides)
         )
     x = with_midpoints(vertices=geometric_vertices(cells=along, ratio=4.0))
     channel = {"east": "outflow", "south": "wall", "north": "wall"}
-    patches.append(tensor_patch(x=_HEIGHT + (_LENGTH - _HEIGHT) * x, y=_HEIGHT * line[:, 0], sides=channel))
+    patches.append(Patch.tensor(x=_HEIGHT + (_LENGTH - _HEIGHT) * x, y=_HEIGHT * line[:, 0], sides=channel))
     return patch_mesh(patches=patches, shape=shape)
 
 
@@ -265,7 +264,7 @@ def cylinder_flow(*, mesh: Any) -> tuple[FlowSystem, FlowSolution]:
     )
     still = [Dirichlet(boundary=b, component=c) for b in ("wall", "cylinder") for c in (0, 1)]
     conditions = [inflow, Dirichlet(boundary="inflow", component=1), *still]
-    system = flow_system(space=taylor_hood(mesh=mesh), conditions=conditions)
+    system = FlowSystem.of(space=FlowSpace.taylor_hood(mesh=mesh), conditions=conditions)
     return system, solve_flow(system=system, coefficients=Coefficients(viscosity=1e-3))
 
 

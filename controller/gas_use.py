@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.plant import Operation
-from ringbalance.physics.gas import compression_work, gas_line, normal_volume, nozzle_flow
+from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.models import Scene
@@ -70,7 +70,7 @@ class GasUse:
         gas = scene.gas
         supply = gas.pressure + gas.ambient_pressure
         through = nozzle_flow(pressure=supply, area=model.tube_area, temperature=gas.temperature)
-        line = gas_line(gas)
+        line = GasLine.of(gas)
         if line is not None:
             # Filled volume over the time constant is the most that the line passes.
             through = min(through, supply / line.time_constant(volume=1.0))

@@ -24,7 +24,7 @@ from ringbalance.controller.simulation import Injection, Outcome, Sample, Simula
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -118,7 +118,7 @@ def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> Balanc
     if model is not None and flow_law is None:
         return model
     if flow_law is not None and model is None:
-        return balancer_model(flow_law)
+        return BalancerModel.of(flow_law)
     raise ValueError("give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Lift
-from ringbalance.physics.gas import VENTED, gas_line
+from ringbalance.physics.gas import VENTED, GasLine
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG, term_estimates
@@ -47,7 +47,7 @@ def dynamics_of(
     """
     if not checked:
         _check(scene, model, modelled)
-    line = gas_line(scene.gas) if FILLING in modelled else None
+    line = GasLine.of(scene.gas) if FILLING in modelled else None
     gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
     column = Column.of(law=model.flow, tube=scene.tube, gas_off=gas_off)
     if not modelled or column is None:

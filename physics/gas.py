@@ -62,6 +62,25 @@ class GasLine:
     """b."""
     process: GasProcess
 
+    @classmethod
+    def of(cls, gas: Gas) -> GasLine | None:
+        """The line of a scene's gas; None where the scene does not give its two numbers."""
+        if gas.conductance is None or gas.critical_ratio is None:
+            return None
+        return GasLine.with_conductance(gas, conductance=gas.conductance, critical_ratio=gas.critical_ratio)
+
+    @classmethod
+    def with_conductance(cls, gas: Gas, *, conductance: float, critical_ratio: float) -> GasLine:
+        """A line with given numbers under a scene's pressures and temperature."""
+        return cls(
+            supply_pressure=gas.pressure + gas.ambient_pressure,
+            ambient_pressure=gas.ambient_pressure,
+            temperature=gas.temperature,
+            conductance=conductance,
+            critical_ratio=critical_ratio,
+            process=gas.process,
+        )
+
     def time_constant(self, *, volume: float) -> float:
         """tau = V/(C p_0) sqrt(T_0/T), s."""
         warm = math.sqrt(REFERENCE_TEMPERATURE / self.temperature)
@@ -109,25 +128,6 @@ def _sine_integral(angle: npt.ArrayLike, b: float) -> FloatArray:
         return np.asarray(2 / root * (np.arctan((b * t + c) / root) - math.atan(c / root)))
     inside = (b * t + c - root) * (c + root) / ((b * t + c + root) * (c - root))
     return np.asarray(np.log(inside) / root)
-
-
-def gas_line(gas: Gas) -> GasLine | None:
-    """The line of a scene's gas; None where the scene does not give its two numbers."""
-    if gas.conductance is None or gas.critical_ratio is None:
-        return None
-    return line_with(gas, conductance=gas.conductance, critical_ratio=gas.critical_ratio)
-
-
-def line_with(gas: Gas, *, conductance: float, critical_ratio: float) -> GasLine:
-    """A line with given numbers under a scene's pressures and temperature."""
-    return GasLine(
-        supply_pressure=gas.pressure + gas.ambient_pressure,
-        ambient_pressure=gas.ambient_pressure,
-        temperature=gas.temperature,
-        conductance=conductance,
-        critical_ratio=critical_ratio,
-        process=gas.process,
-    )
 
 
 def nozzle_flow(*, pressure: float, area: float, temperature: float) -> float:

@@ -14,7 +14,7 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Cu
 from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
 from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state
+from ringbalance.reduced_model.operating.crest_margin import DirectedState
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
@@ -205,7 +205,9 @@ def _flow_parts(scene: Scene, calibration: _Calibrated) -> dict[str, _Parts]:
         found["drag_coefficient"] = (point.k, error * (point.k + 1), point.k_model_uncertainty)
     if point.cavitation_margin is None or point.hump_pressure is None or point.velocity == 0:
         return found
-    state = directed_state(law=law, fills=fills, gas_pressure=point.gas_pressure, reverse=point.velocity < 0)
+    state = DirectedState.of(
+        law=law, fills=fills, gas_pressure=point.gas_pressure, reverse=point.velocity < 0
+    )
     margin = state.margin(law=law)[1] or 0.0
     rounding = error * abs(point.gas_pressure)
     return found | {

@@ -15,19 +15,19 @@ from ringbalance.physics.tube.range import VELOCITIES
 from ringbalance.reduced_model.budget import Budget, budgets
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.chamber.instability import AsynchronousInstability, asynchronous_instability
+from ringbalance.reduced_model.chamber.instability import AsynchronousInstability
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.loading import load_law
-from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law, paper_model
-from ringbalance.reduced_model.operating.point import OperatingPoint, operating_point
-from ringbalance.reduced_model.operating.residual import ResidualLiquid, residual_liquid
-from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid, tube_liquid
+from ringbalance.reduced_model.operating.point import OperatingPoint
+from ringbalance.reduced_model.operating.residual import ResidualLiquid
+from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
 from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
 from ringbalance.reduced_model.selection.tube_terms import with_tube_models
-from ringbalance.reduced_model.tube.heads import tube_heads
+from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
@@ -78,7 +78,7 @@ class Calibration:
     @property
     def model(self) -> BalancerModel:
         """The balancer as the closed loop takes it."""
-        return balancer_model(self.flow_law)
+        return BalancerModel.of(self.flow_law)
 
     def lambda_over_fill(self, *, fill_ratio: FloatArray) -> FloatArray:
         """lambda(x) per transferred mass, [U(x) - U(x_max - x)]/(rho V (x - x_max/2)).
@@ -118,7 +118,7 @@ def calibrate(scene: AnyScene) -> Calibration:
     """
     scene = with_tube_models(liquid_ring_scene(scene))
     chamber, law = chamber_and_law(scene)
-    heads, point = law.heads, operating_point(scene=scene, law=law)
+    heads, point = law.heads, OperatingPoint.of(scene=scene, law=law)
     return Calibration(
         scene=scene,
         chamber=chamber,
@@ -126,10 +126,10 @@ def calibrate(scene: AnyScene) -> Calibration:
         flow_law=law,
         paper_law=paper_law(scene),
         operating_point=point,
-        residual=residual_liquid(scene, law=law),
-        tube_liquid=tube_liquid(scene, law=law),
-        gas_line=line_answers(scene, balancer_model(law)),
-        instability=asynchronous_instability(scene),
+        residual=ResidualLiquid.of(scene, law=law),
+        tube_liquid=TubeLiquid.of(scene, law=law),
+        gas_line=line_answers(scene, BalancerModel.of(law)),
+        instability=AsynchronousInstability.of(scene),
         models_used=models_used(scene),
         identifiability=IDENTIFIABILITY,
         statistics={
@@ -150,7 +150,7 @@ def calibrated_model(scene: Scene) -> BalancerModel:
 
     Raises: SceneError, ValueError: as `calibrate`.
     """
-    return balancer_model(chamber_and_law(with_tube_models(scene))[1])
+    return BalancerModel.of(chamber_and_law(with_tube_models(scene))[1])
 
 
 def law_by_name(scene: Scene, law: str) -> BalancerModel:
@@ -160,7 +160,7 @@ def law_by_name(scene: Scene, law: str) -> BalancerModel:
     """
     if law == "calibrated":
         return calibrated_model(scene)
-    return paper_model(scene) if law == "paper" else balancer_model(load_law(Path(law)))
+    return paper_model(scene) if law == "paper" else BalancerModel.of(load_law(Path(law)))
 
 
 def chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
@@ -170,4 +170,4 @@ def chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
     """
     check_ring(scene)
     chamber = calibrate_chamber(scene)
-    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=tube_heads(scene))
+    return chamber, calibrated_law(scene=scene, chamber=chamber, heads=TubeHeads.of(scene))

@@ -109,7 +109,7 @@ class Device:
         return math.exp(float(np.interp(math.log(velocity), _log_velocities(self.near), self.heads[which])))
 
     def _usable_moment(self) -> float:
-        """Largest moment of a pair that no gas passes through, kg m; as `residual_liquid`."""
+        """Largest moment of a pair that no gas passes through, kg m; as `ResidualLiquid.of`."""
         disc, top = self.scene.disc, self.scene.disc.max_fill_ratio
         area = float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
         acceleration = self.scene.rotor.speed**2 * self.scene.tube.port_radius

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any, Final
 
-from ringbalance.physics.gas import GasLine, line_with
+from ringbalance.physics.gas import GasLine
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.short_injection import Fills, ShortInjection, short_injections
 from ringbalance.scene.loop_models import ControllerSettings
@@ -84,7 +84,7 @@ def line_ends(scene: Scene) -> tuple[LineEnd, ...]:
 
 
 def _end(gas: Gas, name: str, place: int) -> LineEnd:
-    line = line_with(
+    line = GasLine.with_conductance(
         gas,
         conductance=DEFAULT_CONDUCTANCES[place] if gas.conductance is None else gas.conductance,
         critical_ratio=DEFAULT_CRITICAL_RATIO if gas.critical_ratio is None else gas.critical_ratio,

@@ -14,7 +14,7 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.tuning.tune import Tuning
 from ringbalance.controller.tuning.tune import tune as tune_scene
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model
-from ringbalance.reduced_model.law.model import CompleteLaw, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.scene import AnyScene, EccentricScene, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 
@@ -57,7 +57,7 @@ def simulate(
             raise ValueError("eccentric masses have no terms of a tube: leave modelled out")
         return simulate_eccentric(scene)
     law = calibrate(scene).flow_law if flow_law is None else flow_law
-    return run_closed_loop(scene, balancer_model(law), modelled=modelled)
+    return run_closed_loop(scene, BalancerModel.of(law), modelled=modelled)
 
 
 def compare(first: AnyScene, second: AnyScene) -> Comparison:
@@ -76,4 +76,4 @@ def tune(scene: AnyScene, *, flow_law: CompleteLaw | None = None) -> Tuning:
     Raises: SceneError: a scene with eccentric masses, or a rotor too slow for the liquid to form a ring.
     """
     told = liquid_ring_scene(scene)
-    return tune_scene(told, calibrated_model(told) if flow_law is None else balancer_model(flow_law))
+    return tune_scene(told, calibrated_model(told) if flow_law is None else BalancerModel.of(flow_law))

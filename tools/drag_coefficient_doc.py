@@ -18,7 +18,7 @@ from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reports.numbers import number, percent, shown
 from ringbalance.reports.pages.drag_coefficient import SECTION, liquid_cells
 from ringbalance.reports.section import Record, Work
-from ringbalance.reports.studies.drag_map import DragMap, drag_map
+from ringbalance.reports.studies.drag_map import DragMap
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.verification.runner import paper_scene
@@ -55,7 +55,7 @@ def _liquids_table(liquids: list[Record]) -> str:
 
 def _bores_table(calibration: Calibration) -> str:
     """The bore at which k is the paper's, and the bores at which it may be, over the viscosity."""
-    found = drag_map(calibration=calibration, bore=_BORES, kinematic_viscosity=list(_VISCOSITIES))
+    found = DragMap.of(calibration=calibration, bore=_BORES, kinematic_viscosity=list(_VISCOSITIES))
     point = found.point
     columns = [
         _crossings(replace(found, point=replace(point, k=point.k + side * point.k_point_uncertainty)))
@@ -71,7 +71,7 @@ def _bores_table(calibration: Calibration) -> str:
 def rule(calibration: Calibration) -> str:
     """Where k = 50 lies, as one number for laminar flow in this tube."""
     laminar = [nu for nu in _VISCOSITIES if 5e-6 <= nu <= 1e-4]
-    viscosity, bore = drag_map(calibration=calibration, bore=_BORES, kinematic_viscosity=laminar).contour()
+    viscosity, bore = DragMap.of(calibration=calibration, bore=_BORES, kinematic_viscosity=laminar).contour()
     ratio = viscosity / bore**2
     low, high = (number(float(value), digits=2) for value in (ratio.min(), ratio.max()))
     speed = number(float(_velocity_at_fifty(calibration)), digits=2)

@@ -14,7 +14,7 @@ from dataclasses import replace
 from scipy.optimize import brentq
 
 import ringbalance as rb
-from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene import Scene, bundled_scene, liquid_ring_scene, load_scene
 
 RATE = 7.2e-6
@@ -27,7 +27,7 @@ _MOVED = 1e-4
 
 def paper_model(scene: Scene) -> BalancerModel:
     """k = 50 and lambda = 72 mm."""
-    return balancer_model(rb.paper_law(scene))
+    return BalancerModel.of(rb.paper_law(scene))
 
 
 def calibrated_model(scene: Scene) -> BalancerModel:

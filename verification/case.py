@@ -161,6 +161,19 @@ class CaseDefinition(_Record):
     quantity: tuple[Quantity, ...] = Field(min_length=1)
     must_fail: tuple[Mutation, ...] = Field(min_length=1)
 
+    @classmethod
+    def parse(cls, text: str, *, source: str) -> CaseDefinition:
+        """A case.toml as a record. Raises: CaseError: not TOML, or not a case, with all faults at once."""
+        try:
+            return CaseDefinition.model_validate(tomllib.loads(text))
+        except tomllib.TOMLDecodeError as error:
+            raise CaseError(f"{source}: {error}") from error
+        except ValidationError as error:
+            faults = [
+                f"{'.'.join(map(str, fault['loc'])) or 'case'}: {fault['msg']}" for fault in error.errors()
+            ]
+            raise CaseError("\n".join(f"{source}: {fault}" for fault in faults)) from error
+
     @property
     def prose(self) -> tuple[str, ...]:
         """Texts that may hold placeholders."""
@@ -231,14 +244,3 @@ class CaseDefinition(_Record):
 def _unique(what: str, names: list[str]) -> None:
     if len(set(names)) != len(names):
         raise ValueError(f"{what}: a name stands twice in {names}")
-
-
-def parse_case(text: str, *, source: str) -> CaseDefinition:
-    """A case.toml as a record. Raises: CaseError: not TOML, or not a case, with all faults at once."""
-    try:
-        return CaseDefinition.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise CaseError(f"{source}: {error}") from error
-    except ValidationError as error:
-        faults = [f"{'.'.join(map(str, fault['loc'])) or 'case'}: {fault['msg']}" for fault in error.errors()]
-        raise CaseError("\n".join(f"{source}: {fault}" for fault in faults)) from error

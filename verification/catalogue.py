@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any, Final, cast
 
 from ringbalance.verification import cases
-from ringbalance.verification.case import CaseDefinition, Study, parse_case
+from ringbalance.verification.case import CaseDefinition, Study
 from ringbalance.verification.evidence import CaseCode, Evidence, Level
 
 _PAPERS: Final = ("liquid_ring", "eccentric_mass")
@@ -58,7 +58,7 @@ def load_case(case_id: str) -> CaseDefinition:
     """The text and criteria of a case. Raises: UnknownCaseError, or CaseError: its case.toml is not one."""
     _check_known(case_id)
     path = files(cases) / case_id / "case.toml"
-    definition = parse_case(path.read_text(encoding="utf-8"), source=f"{case_id}/case.toml")
+    definition = CaseDefinition.parse(path.read_text(encoding="utf-8"), source=f"{case_id}/case.toml")
     if definition.id != case_id:
         raise ValueError(f'{case_id}/case.toml gives its id as "{definition.id}"')
     return definition

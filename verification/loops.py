@@ -14,7 +14,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.calibration import Calibration, calibrate, chamber_and_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.selection.range_flow import steady
 from ringbalance.scene.loop_models import ControllerKind
@@ -66,7 +66,7 @@ def mistaken_lag(scene: Scene) -> Scene:
 def run_loop(scene: Scene, law: str = "paper") -> Simulation:
     """One closed-loop run. Args: `law`: "paper" or "calibrated"; one calibrated law serves all runs."""
     paper = law == "paper"
-    return simulate(scene, paper_model(scene) if paper else balancer_model(flow_law_of(steady(scene))))
+    return simulate(scene, paper_model(scene) if paper else BalancerModel.of(flow_law_of(steady(scene))))
 
 
 @lru_cache(maxsize=16)

@@ -29,6 +29,23 @@ class OrderStudy:
     order: tuple[float, ...]
     """Of each pair; shorter than the levels by one."""
 
+    @classmethod
+    def of(cls, *, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
+        """Observed orders p = ln(e_i/e_(i+1))/ln(h_i/h_(i+1)) of relative errors, coarse to fine.
+
+        Raises: ValueError: lengths that differ, sizes that do not fall, errors that are negative, not finite
+            or at round-off, where no order can be seen.
+        """
+        h, e = np.asarray(size, dtype=np.float64), np.asarray(error, dtype=np.float64)
+        if h.shape != e.shape or h.size < 2:
+            raise ValueError("an order study needs at least two levels, with one error each")
+        if not (np.all(np.isfinite(h)) and np.all(h > 0) and np.all(np.diff(h) < 0)):
+            raise ValueError("sizes must be positive and fall from level to level")
+        if not (np.all(np.isfinite(e)) and np.all(e > ROUND_OFF)):
+            raise ValueError("errors must be finite and above round-off for an order to be seen")
+        order = np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])
+        return cls(size=tuple(h.tolist()), error=tuple(e.tolist()), order=tuple(order.tolist()))
+
     @property
     def finest_error(self) -> float:
         """Error on the finest level."""
@@ -51,23 +68,6 @@ class OrderStudy:
             geometry=geometry,
             note=note,
         )
-
-
-def order_study(*, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
-    """Observed orders p = ln(e_i/e_(i+1))/ln(h_i/h_(i+1)) of relative errors, coarse to fine.
-
-    Raises: ValueError: lengths that differ, sizes that do not fall, errors that are negative or not finite,
-        or at round-off, where no order can be seen.
-    """
-    h, e = np.asarray(size, dtype=np.float64), np.asarray(error, dtype=np.float64)
-    if h.shape != e.shape or h.size < 2:
-        raise ValueError("an order study needs at least two levels, with one error each")
-    if not (np.all(np.isfinite(h)) and np.all(h > 0) and np.all(np.diff(h) < 0)):
-        raise ValueError("sizes must be positive and fall from level to level")
-    if not (np.all(np.isfinite(e)) and np.all(e > ROUND_OFF)):
-        raise ValueError("errors must be finite and above round-off for an order to be seen")
-    order = np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])
-    return OrderStudy(size=tuple(h.tolist()), error=tuple(e.tolist()), order=tuple(order.tolist()))
 
 
 def orders_found(studies: Mapping[str, OrderStudy]) -> dict[str, Found]:

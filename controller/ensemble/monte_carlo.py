@@ -16,7 +16,7 @@ from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncert
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
@@ -137,7 +137,7 @@ def simulate_ensemble(
     """
     if n < 1 or workers < 1:
         raise ValueError(f"an ensemble needs members and workers, not n={n} and workers={workers}")
-    model = flow_law if isinstance(flow_law, BalancerModel) else balancer_model(flow_law)
+    model = flow_law if isinstance(flow_law, BalancerModel) else BalancerModel.of(flow_law)
     followed = ensemble_transfer(scene, model) if transfer is None else transfer
     widths = MemberUncertainty.of(scene, model) if uncertainty_95 is None else uncertainty_95
     plan = EnsemblePlan.of(scene=scene, model=model, transfer=followed)

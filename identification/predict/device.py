@@ -25,7 +25,7 @@ from ringbalance.identification.data.observations import Observations
 from ringbalance.reduced_model.chamber.range import mean_gravity
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
 from ringbalance.reduced_model.selection.tube_terms import tube_models
 from ringbalance.scene.arrays import FloatArray
@@ -96,7 +96,9 @@ class Device:
         gas = self.scene.gas
         line = gas.conductance is not None and gas.critical_ratio is not None
         terms = [INERTIA, HELD, *([FILLING] if line else []), *([LAG] if gas.valve_lag is not None else [])]
-        dynamics = dynamics_of(scene=self.scene, model=balancer_model(self.law), modelled=terms, checked=True)
+        dynamics = dynamics_of(
+            scene=self.scene, model=BalancerModel.of(self.law), modelled=terms, checked=True
+        )
         if dynamics is None:
             raise ValueError("the calibrated law has a column in the tube")
         return dynamics.plant(total=2 * self.scene.disc.initial_fill, relative_error=RELATIVE_ERROR)

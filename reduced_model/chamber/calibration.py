@@ -11,12 +11,12 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.results import Estimate, Statistics, Status
-from ringbalance.reduced_model.chamber.element_check import ElementCheck, element_check
-from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect, gravity_effect
+from ringbalance.reduced_model.chamber.element_check import ElementCheck
+from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect
 from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
 from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
-from ringbalance.reduced_model.chamber.values import RingValues, ring_values
+from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.reduced_model.tables.fit import table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.scene.arrays import FloatArray
@@ -130,9 +130,9 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     modelled = mean_gravity(scene) > scene.tolerance
     nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio)
     fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
-    effect = gravity_effect(scene, fill_ratio=fills)
-    ring = ring_values(scene, fill_ratio=fills, gravity=modelled)
-    check = element_check(scene, values=ring, gravity=modelled)
+    effect = GravityEffect.of(scene, fill_ratio=fills)
+    ring = RingValues.of(scene, fill_ratio=fills, gravity=modelled)
+    check = ElementCheck.of(scene, values=ring, gravity=modelled)
     unmodelled = unmodelled_fractions(scene, fills)
     effects = input_effects(scene=scene, fill_ratio=fills)
     ring, effect = _as_measured(scene, ring, effect)

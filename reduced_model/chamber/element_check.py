@@ -51,39 +51,39 @@ class ElementCheck:
     """Largest difference beyond what is allowed, relative to the value; zero where they agree."""
     status: Status
 
+    @classmethod
+    def of(cls, scene: Scene, *, values: RingValues, gravity: bool) -> ElementCheck:
+        """Solve the pressure at the thinnest ring of the table and at the largest fill.
+
+        An imported chamber is solved without gravity and compared with the integrals over its walls.
+
+        Args: `values`: by the closed forms. `gravity`: whether these hold gravity.
+        Returns: ElementCheck; its status is NOT_CONVERGED where the two differ by more than both errors, or
+            where the finite elements found no tilted surface.
+        Raises: SceneError: as `scene_ring`, a chamber so narrow that nothing could be checked.
+        """
+        at = _checked_fills(values)
+        if scene.disc.geometry is not None:
+            return _imported(scene, scene.disc.geometry, values.fill_ratio[at])
+        held = gravity and bool(np.any(values.closed[at]))
+        at = at[values.closed[at]] if held else at
+        elements = scene_ring(
+            scene,
+            fill_ratio=values.fill_ratio[at],
+            gravity=held,
+            cells=_meshes(scene, float(values.fill_ratio[at].min()), 3 if _axial(scene, held) else 2),
+        )
+        closed_forms = {name: getattr(values, name) for name in CHECKED}
+        here = {
+            name: Estimate(value=each.value[at], uncertainty=each.uncertainty[at])
+            for name, each in closed_forms.items()
+        }
+        return _compared(here, elements, gravity=held)
+
     @property
     def solves(self) -> int:
         """Meshes times fills that were solved."""
         return len(self.elements.cells) * self.elements.fill_ratio.size
-
-
-def element_check(scene: Scene, *, values: RingValues, gravity: bool) -> ElementCheck:
-    """Solve the pressure at the thinnest ring of the table and at the largest fill.
-
-    An imported chamber is solved without gravity and compared with the integrals over its walls.
-
-    Args: `values`: by the closed forms. `gravity`: whether these hold gravity.
-    Returns: ElementCheck; its status is NOT_CONVERGED where the two differ by more than both errors, or where
-        the finite elements found no tilted surface.
-    Raises: SceneError: as `scene_ring`, a chamber so narrow that nothing could be checked.
-    """
-    at = _checked_fills(values)
-    if scene.disc.geometry is not None:
-        return _imported(scene, scene.disc.geometry, values.fill_ratio[at])
-    held = gravity and bool(np.any(values.closed[at]))
-    at = at[values.closed[at]] if held else at
-    elements = scene_ring(
-        scene,
-        fill_ratio=values.fill_ratio[at],
-        gravity=held,
-        cells=_meshes(scene, float(values.fill_ratio[at].min()), 3 if _axial(scene, held) else 2),
-    )
-    closed_forms = {name: getattr(values, name) for name in CHECKED}
-    here = {
-        name: Estimate(value=each.value[at], uncertainty=each.uncertainty[at])
-        for name, each in closed_forms.items()
-    }
-    return _compared(here, elements, gravity=held)
 
 
 def _imported(scene: Scene, geometry: ChamberGeometry, fills: FloatArray) -> ElementCheck:
@@ -95,7 +95,7 @@ def _imported(scene: Scene, geometry: ChamberGeometry, fills: FloatArray) -> Ele
         "wall_pressure": Estimate(value=pressure, uncertainty=share * pressure),
         "moment": Estimate(value=moment, uncertainty=share * moment),
     }
-    return _compared(closed_forms, imported_elements(scene, geometry, fill_ratio=fills), gravity=False)
+    return _compared(closed_forms, ImportedElements.of(scene, geometry, fill_ratio=fills), gravity=False)
 
 
 def _compared(
@@ -203,35 +203,36 @@ class ImportedElements:
     status: Status
     statistics: Statistics
 
-
-def imported_elements(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> ImportedElements:
-    """Solve the pressure at a few fills; uncertainties hold the elements' error and the drawn volume's."""
-    disc, density = scene.disc, scene.liquid.density
-    rings = [
-        deferred.solved_ring(
-            geometry=geometry,
-            density=density,
-            angular_velocity=scene.rotor.speed,
-            surface_radius=float(radius),
+    @classmethod
+    def of(cls, scene: Scene, geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> ImportedElements:
+        """The pressure solved at a few fills; with the elements' error and the drawn volume's."""
+        disc, density = scene.disc, scene.liquid.density
+        rings = [
+            deferred.solved_ring(
+                geometry=geometry,
+                density=density,
+                angular_velocity=scene.rotor.speed,
+                surface_radius=float(radius),
+            )
+            for radius in surface_radius(disc=disc, fill_ratio=fill_ratio)
+        ]
+        pressure = np.array([float(ring.wall_pressure.value) for ring in rings])
+        moment = np.array([ring.first_moment[0] for ring in rings])
+        volume = np.array([ring.volume for ring in rings])
+        wanted = fill_ratio * chamber_volume(disc=disc)
+        drawn = np.abs(volume / wanted - 1)
+        status = next((ring.status for ring in rings if not ring.status.ok), Status())
+        return cls(
+            fill_ratio=fill_ratio,
+            wall_pressure=Estimate(
+                value=pressure,
+                uncertainty=np.array([float(ring.wall_pressure.uncertainty) for ring in rings])
+                + _CUT * pressure,
+            ),
+            # A free surface drawn by quadratic facets takes liquid off or adds some, all at the surface.
+            moment=Estimate(value=moment, uncertainty=(_CUT + 2 * drawn) * np.abs(moment)),
+            volume=volume,
+            cells=((len(geometry.cells),),),
+            status=status,
+            statistics=rings[-1].statistics,
         )
-        for radius in surface_radius(disc=disc, fill_ratio=fill_ratio)
-    ]
-    pressure = np.array([float(ring.wall_pressure.value) for ring in rings])
-    moment = np.array([ring.first_moment[0] for ring in rings])
-    volume = np.array([ring.volume for ring in rings])
-    wanted = fill_ratio * chamber_volume(disc=disc)
-    drawn = np.abs(volume / wanted - 1)
-    status = next((ring.status for ring in rings if not ring.status.ok), Status())
-    return ImportedElements(
-        fill_ratio=fill_ratio,
-        wall_pressure=Estimate(
-            value=pressure,
-            uncertainty=np.array([float(ring.wall_pressure.uncertainty) for ring in rings]) + _CUT * pressure,
-        ),
-        # A free surface drawn by quadratic facets takes liquid off or adds some, all of it at the surface.
-        moment=Estimate(value=moment, uncertainty=(_CUT + 2 * drawn) * np.abs(moment)),
-        volume=volume,
-        cells=((len(geometry.cells),),),
-        status=status,
-        statistics=rings[-1].statistics,
-    )

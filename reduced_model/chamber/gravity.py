@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
@@ -27,6 +27,16 @@ class GravityEffect:
     """Pa."""
     moment: FloatArray
     """kg m."""
+
+    @classmethod
+    def of(cls, scene: Scene, *, fill_ratio: FloatArray) -> GravityEffect:
+        """Change of the means over a turn, a dry part of the outer wall included; zero where empty."""
+        pressure, moment = np.zeros_like(fill_ratio), np.zeros_like(fill_ratio)
+        wet = fill_ratio > 0
+        still = replace(scene, environment=replace(scene.environment, gravity=0.0))
+        ring, level = (TiltedRing.of(each, fill_ratio[wet]) for each in (scene, still))
+        pressure[wet], moment[wet] = ring.wall_pressure - level.wall_pressure, ring.moment - level.moment
+        return cls(wall_pressure=pressure, moment=moment)
 
 
 def check_ring(scene: Scene) -> None:
@@ -51,21 +61,11 @@ def check_ring(scene: Scene) -> None:
     raise SceneError([fault])
 
 
-def gravity_effect(scene: Scene, *, fill_ratio: FloatArray) -> GravityEffect:
-    """Change of the means over a turn, a dry part of the outer wall included; zero where empty."""
-    pressure, moment = np.zeros_like(fill_ratio), np.zeros_like(fill_ratio)
-    wet = fill_ratio > 0
-    still = replace(scene, environment=replace(scene.environment, gravity=0.0))
-    ring, level = (tilted_ring(each, fill_ratio[wet]) for each in (scene, still))
-    pressure[wet], moment[wet] = ring.wall_pressure - level.wall_pressure, ring.moment - level.moment
-    return GravityEffect(wall_pressure=pressure, moment=moment)
-
-
 def closed_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
     """Whether the liquid still covers the whole outer wall under gravity; an empty chamber counts as closed.
 
-    Source: `tilted_ring`.
+    Source: `TiltedRing.of`.
     """
     closed, wet = np.ones(fill_ratio.shape, dtype=np.bool_), fill_ratio > 0
-    closed[wet] = tilted_ring(scene, fill_ratio[wet]).closed
+    closed[wet] = TiltedRing.of(scene, fill_ratio[wet]).closed
     return closed

@@ -28,6 +28,38 @@ class AsynchronousInstability:
     growth: float
     """Over that critical speed: the damping ratio that would stop it."""
 
+    @classmethod
+    def of(cls, scene: Scene) -> AsynchronousInstability | None:
+        """Estimate at the worst fill; None where every wave is faster than the rotor, s >= 1.
+
+        In the disc's frame the lowest wave of a chamber turns backwards at s omega, s^2 = k T,
+        T = tanh(k ln(R2/a)), k = pi/theta; seen from outside at (1 - s) omega. With its effective mass
+        m = rho B a^2 I^2 s^2/(theta/2), I = int sin(k phi) sin(phi) dphi, n chambers and M = 1/K of the
+        rotor, (w_c^2 - w^2) (s^2 omega^2 - (w - omega)^2) = (n m/2M) w^4, which at w_c = (1 - s) omega
+        grows with Im(w)/w_c = 0.5 ((n m/2M) (1 - s)/s)^(1/2).
+        Range: order of magnitude. No Coriolis force on the wave (s is 3 % higher with it), no damping, equal
+            fills, M from an influence coefficient K taken well above the critical speed.
+        Source: derived; the mechanism after Wolf, J. Appl. Mech. 35 (1968) 676.
+        """
+        disc, omega = scene.disc, abs(scene.rotor.speed)
+        fills = _FILLS * disc.max_fill_ratio
+        k, radius = math.pi / disc.central_angle, surface_radius(disc=disc, fill_ratio=fills)
+        square = k * np.tanh(k * np.log(disc.outer_radius / radius))
+        slow = square < 1
+        if not np.any(slow):
+            return None
+        s = np.sqrt(square[slow])
+        sides = 2 * _overlap(k, disc) ** 2 / disc.central_angle
+        mass = scene.liquid.density * disc.axial_width * radius[slow] ** 2 * sides * s**2
+        ratio = disc.chambers / 2 * mass * scene.rotor.influence_coefficient
+        growth = np.sqrt(ratio * (1 - s) / s) / 2
+        worst = int(np.argmax(growth))
+        return cls(
+            fill_ratio=float(fills[slow][worst]),
+            critical_speed=float((1 - s[worst]) * omega),
+            growth=float(growth[worst]),
+        )
+
     @property
     def warning(self) -> str:
         """One sentence where the growth exceeds what rotors damp; empty elsewhere."""
@@ -38,38 +70,6 @@ class AsynchronousInstability:
             f"whirl with waves in its rings (fill ratio {self.fill_ratio:.2g}): by order of magnitude it "
             f"needs a damping ratio of {self.growth:.1g} there"
         )
-
-
-def asynchronous_instability(scene: Scene) -> AsynchronousInstability | None:
-    """Estimate at the worst fill; None where every wave is faster than the rotor, s >= 1.
-
-    In the disc's frame the lowest wave of a chamber turns backwards at s omega, s^2 = k T,
-    T = tanh(k ln(R2/a)), k = pi/theta; seen from outside at (1 - s) omega. With its effective mass
-    m = rho B a^2 I^2 s^2/(theta/2), I = int sin(k phi) sin(phi) dphi, n chambers and M = 1/K of the rotor,
-    (w_c^2 - w^2) (s^2 omega^2 - (w - omega)^2) = (n m/2M) w^4, which at w_c = (1 - s) omega grows with
-    Im(w)/w_c = 0.5 ((n m/2M) (1 - s)/s)^(1/2).
-    Range: order of magnitude. No Coriolis force on the wave (s is 3 % higher with it), no damping, equal
-        fills, M from an influence coefficient K taken well above the critical speed.
-    Source: derived; the mechanism after Wolf, J. Appl. Mech. 35 (1968) 676.
-    """
-    disc, omega = scene.disc, abs(scene.rotor.speed)
-    fills = _FILLS * disc.max_fill_ratio
-    k, radius = math.pi / disc.central_angle, surface_radius(disc=disc, fill_ratio=fills)
-    square = k * np.tanh(k * np.log(disc.outer_radius / radius))
-    slow = square < 1
-    if not np.any(slow):
-        return None
-    s = np.sqrt(square[slow])
-    sides = 2 * _overlap(k, disc) ** 2 / disc.central_angle
-    mass = scene.liquid.density * disc.axial_width * radius[slow] ** 2 * sides * s**2
-    ratio = disc.chambers / 2 * mass * scene.rotor.influence_coefficient
-    growth = np.sqrt(ratio * (1 - s) / s) / 2
-    worst = int(np.argmax(growth))
-    return AsynchronousInstability(
-        fill_ratio=float(fills[slow][worst]),
-        critical_speed=float((1 - s[worst]) * omega),
-        growth=float(growth[worst]),
-    )
 
 
 def _overlap(k: float, disc: Disc) -> float:

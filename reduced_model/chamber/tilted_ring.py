@@ -65,6 +65,43 @@ class TiltedRing:
     closed: BoolArray
     """Whether the liquid covers the whole outer wall; where not, values of a sector have four digits."""
 
+    @classmethod
+    def of(cls, scene: Scene, fill_ratio: FloatArray) -> TiltedRing:
+        """Wall pressure, moment and dU/dV' of a chamber under gravity, exactly for liquid at rest.
+
+        p = rho omega^2 (|r + g/omega^2|^2 - b^2)/2; dU/dV' = rho int x w / int w on the surface,
+        w = 1/|grad p|.  On a horizontal shaft gravity turns across the chamber.
+        Args: `fill_ratio`: x, shape (n,), above zero.
+        Range: a surface that stays outside the plates' inner edge; the inner radius is not looked at.
+        Source: Eqs. 9 to 11 of the liquid-ring paper with gravity and exact plates; hydrostatics.
+        """
+        disc, density, square = scene.disc, scene.liquid.density, scene.rotor.speed**2
+        length, turn, shaft = scene.environment.gravity / square, turn_samples(scene), scene.environment.shaft
+        table = imported_table(disc)
+
+        def turned(fills: FloatArray, *, cut: bool) -> _Turned:
+            if table is not None:
+                return _imported(disc, table, length, fills, turn if shaft == "horizontal" else 0)
+            if shaft == "vertical":
+                return _along(disc, length, fills, cut)
+            return _across(disc, length, fills, turn, cut)
+
+        found = turned(fill_ratio, cut=False)
+        is_open = ~np.all(found.closed, axis=1)
+        if np.any(is_open) and table is None:
+            parts = turned(fill_ratio[is_open], cut=True)
+            for name in ("wall_pressure", "moment", "moment_per_volume"):
+                getattr(found, name)[is_open] = getattr(parts, name)
+        scale = density * square / 2
+        return cls(
+            wall_pressure=scale * found.wall_pressure.mean(axis=1),
+            moment=density * disc.axial_width * found.moment.mean(axis=1),
+            moment_per_volume=density * found.moment_per_volume.mean(axis=1),
+            wall_pressure_ripple=scale * _first_harmonic(found.wall_pressure),
+            moment_ripple=density * disc.axial_width * _first_harmonic(found.moment),
+            closed=~is_open,
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Turned:
@@ -83,43 +120,6 @@ def turn_samples(scene: Scene) -> int:
         return _TURN[0]
     wanted = np.log(_AVERAGING) / np.log(min(tilt, 0.9))
     return 2 * int(np.clip(np.ceil(wanted / 2), _TURN[0] // 2, _TURN[1] // 2))
-
-
-def tilted_ring(scene: Scene, fill_ratio: FloatArray) -> TiltedRing:
-    """Wall pressure, moment and dU/dV' of a chamber under gravity, exactly for liquid at rest.
-
-    p = rho omega^2 (|r + g/omega^2|^2 - b^2)/2; dU/dV' = rho int x w / int w on the surface, w = 1/|grad p|.
-    On a horizontal shaft gravity turns across the chamber.
-    Args: `fill_ratio`: x, shape (n,), above zero.
-    Range: a surface that stays outside the plates' inner edge; the inner radius is not looked at.
-    Source: Eqs. 9 to 11 of the liquid-ring paper with gravity and exact plates; hydrostatics.
-    """
-    disc, density, square = scene.disc, scene.liquid.density, scene.rotor.speed**2
-    length, turn, shaft = scene.environment.gravity / square, turn_samples(scene), scene.environment.shaft
-    table = imported_table(disc)
-
-    def turned(fills: FloatArray, *, cut: bool) -> _Turned:
-        if table is not None:
-            return _imported(disc, table, length, fills, turn if shaft == "horizontal" else 0)
-        if shaft == "vertical":
-            return _along(disc, length, fills, cut)
-        return _across(disc, length, fills, turn, cut)
-
-    found = turned(fill_ratio, cut=False)
-    is_open = ~np.all(found.closed, axis=1)
-    if np.any(is_open) and table is None:
-        parts = turned(fill_ratio[is_open], cut=True)
-        for name in ("wall_pressure", "moment", "moment_per_volume"):
-            getattr(found, name)[is_open] = getattr(parts, name)
-    scale = density * square / 2
-    return TiltedRing(
-        wall_pressure=scale * found.wall_pressure.mean(axis=1),
-        moment=density * disc.axial_width * found.moment.mean(axis=1),
-        moment_per_volume=density * found.moment_per_volume.mean(axis=1),
-        wall_pressure_ripple=scale * _first_harmonic(found.wall_pressure),
-        moment_ripple=density * disc.axial_width * _first_harmonic(found.moment),
-        closed=~is_open,
-    )
 
 
 def _imported(disc: Disc, table: ChamberTable, length: float, fills: FloatArray, turn: int) -> _Turned:

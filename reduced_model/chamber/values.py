@@ -13,7 +13,7 @@ from ringbalance.physics.pressure.hydrostatics import displaced_by_gravity
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
-from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring, turn_samples
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, turn_samples
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
 
@@ -80,9 +80,9 @@ def by_quadrature(scene: Scene, fill: float) -> ChamberValues:
     """The tilted free surface found, and integrated over, without a mesh.
 
     Returns: ChamberValues, exact for liquid at rest in the rotating frame at every instant.
-    Source: `tilted_ring`.
+    Source: `TiltedRing.of`.
     """
-    found = tilted_ring(scene, np.array([fill]))
+    found = TiltedRing.of(scene, np.array([fill]))
     return ChamberValues(
         wall_pressure=float(found.wall_pressure[0]),
         wall_pressure_ripple=float(found.wall_pressure_ripple[0]),
@@ -109,35 +109,35 @@ class RingValues:
     """Whether gravity, where modelled, leaves a closed ring; where not, values are those without gravity."""
     status: Status
 
+    @classmethod
+    def of(cls, scene: Scene, *, fill_ratio: FloatArray, gravity: bool) -> RingValues:
+        """Evaluate the closed forms of a chamber, or integrate over its tilted ring.
 
-def ring_values(scene: Scene, *, fill_ratio: FloatArray, gravity: bool) -> RingValues:
-    """Evaluate the closed forms of a chamber, or integrate over its tilted ring.
-
-    Args: `fill_ratio`: x, shape (n,). `gravity`: whether gravity is modelled.
-    Returns: RingValues; half-widths hold rounding, the quadrature's error and, where gravity leaves no closed
-        ring, all that it could do to the liquid there.
-    Source: `chamber_closed_forms`, `tilted_ring`.
-    """
-    disc, surface = scene.disc, surface_radius(disc=scene.disc, fill_ratio=fill_ratio)
-    pressure, moment, ratio = chamber_closed_forms(scene=scene, fill_ratio=fill_ratio)
-    values = np.array([pressure, moment, scene.liquid.density * ratio / 2])
-    closed, extra = np.ones(fill_ratio.shape, dtype=np.bool_), np.zeros_like(values)
-    if gravity:
-        values, closed, extra = _under_gravity(scene, fill_ratio, values)
-    # The square of the surface's radius is known to a few eps of R2^2, which counts against the depth.
-    depth = np.where(fill_ratio > 0, disc.outer_radius - surface, disc.outer_radius)
-    widths = _EPSILON * (4 + 4 * disc.outer_radius / depth) * np.abs(values) + extra
-    status = _status(scene, fill_ratio, closed)
-    parts = [Estimate(value=v, uncertainty=w, status=status) for v, w in zip(values, widths, strict=True)]
-    return RingValues(
-        fill_ratio=fill_ratio,
-        surface_radius=surface,
-        wall_pressure=parts[0],
-        moment=parts[1],
-        moment_per_volume=parts[2],
-        closed=closed,
-        status=status,
-    )
+        Args: `fill_ratio`: x, shape (n,). `gravity`: whether gravity is modelled.
+        Returns: RingValues; half-widths hold rounding, the quadrature's error and, where gravity leaves no
+            closed ring, all that it could do to the liquid there.
+        Source: `chamber_closed_forms`, `TiltedRing.of`.
+        """
+        disc, surface = scene.disc, surface_radius(disc=scene.disc, fill_ratio=fill_ratio)
+        pressure, moment, ratio = chamber_closed_forms(scene=scene, fill_ratio=fill_ratio)
+        values = np.array([pressure, moment, scene.liquid.density * ratio / 2])
+        closed, extra = np.ones(fill_ratio.shape, dtype=np.bool_), np.zeros_like(values)
+        if gravity:
+            values, closed, extra = _under_gravity(scene, fill_ratio, values)
+        # The square of the surface's radius is known to a few eps of R2^2, which counts against the depth.
+        depth = np.where(fill_ratio > 0, disc.outer_radius - surface, disc.outer_radius)
+        widths = _EPSILON * (4 + 4 * disc.outer_radius / depth) * np.abs(values) + extra
+        status = _status(scene, fill_ratio, closed)
+        parts = [Estimate(value=v, uncertainty=w, status=status) for v, w in zip(values, widths, strict=True)]
+        return cls(
+            fill_ratio=fill_ratio,
+            surface_radius=surface,
+            wall_pressure=parts[0],
+            moment=parts[1],
+            moment_per_volume=parts[2],
+            closed=closed,
+            status=status,
+        )
 
 
 def _under_gravity(
@@ -145,7 +145,7 @@ def _under_gravity(
 ) -> tuple[FloatArray, BoolArray, FloatArray]:
     """Values, whether the ring is closed, and half-widths of the quadrature or of what gravity could do."""
     gravity, wet = scene.environment.gravity, fills > 0
-    ring = tilted_ring(scene, fills[wet])
+    ring = TiltedRing.of(scene, fills[wet])
     found = plain.copy()
     found[:, wet] = [ring.wall_pressure, ring.moment, ring.moment_per_volume]
     closed = ~_spilling_ring(scene, fills) | ~wet

@@ -12,12 +12,12 @@ from ringbalance.physics.gas import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
 from ringbalance.reduced_model.chamber.imported_walls import share_across
-from ringbalance.reduced_model.chamber.values import ring_values
+from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.tables.fit import flat_table, table_from_samples
 from ringbalance.reduced_model.tables.hermite import HermiteTable
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
-from ringbalance.reduced_model.tube.heads import TubeHeads, nominal_heads
+from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -59,15 +59,15 @@ def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
     zero.  For the many scenes that differ from a calibrated one in their values, such as those of a fit.
     Args: `gravity`: whether the chamber's values hold gravity, as `calibrate` decides for the scene.
     Raises: ValueError: bends that do not fit into the tube.
-    Source: Eqs. 13 to 18 of the liquid-ring paper; `ring_values`, `nominal_heads`.
+    Source: Eqs. 13 to 18 of the liquid-ring paper; `RingValues.of`, `TubeHeads.nominal`.
     """
     fills = fill_nodes(largest=scene.disc.max_fill_ratio)[0]
     ends = {"start": 0.0, "stop": float(fills[-1])}
-    ring = ring_values(scene, fill_ratio=fills, gravity=gravity)
+    ring = RingValues.of(scene, fill_ratio=fills, gravity=gravity)
     exact = flat_table(**ends)
     return _put_together(
         scene,
-        heads=nominal_heads(scene),
+        heads=TubeHeads.nominal(scene),
         wall_pressure=table_from_samples(value=ring.wall_pressure.value, **ends),
         wall_pressure_uncertainty=exact,
         inputs=DriveUncertainty(),

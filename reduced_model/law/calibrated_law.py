@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, checked_conditions
+from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime
 from ringbalance.reduced_model.law.storage import save_record
 from ringbalance.reduced_model.tables.hermite import HermiteTable
-from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty, directed_flow
+from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import TubeEnds, TubePath
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
@@ -93,7 +93,7 @@ class CalibratedLaw:
         gas_pressure: npt.ArrayLike,
         primed: npt.ArrayLike = False,
     ) -> Flow:
-        asked = checked_conditions(
+        asked = Conditions.checked(
             max_fill_ratio=self.max_fill_ratio,
             ambient_pressure=self.ambient_pressure,
             fill_ratio=fill_ratio,
@@ -146,7 +146,7 @@ class CalibratedLaw:
         )
 
     def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:
-        return directed_flow(
+        return DirectedFlow.of(
             path=self.path,
             heads=self.heads,
             hump_head=self.heads.to_crest(reverse=reverse),

@@ -43,6 +43,18 @@ class BalancerModel:
     density: float
     """kg/m^3."""
 
+    @classmethod
+    def of(cls, law: CompleteLaw) -> BalancerModel:
+        """The balancer that a complete law describes. Returns: BalancerModel with the law's name."""
+        return cls(
+            name=law.name,
+            flow=law,
+            moment=law.moment,
+            chamber_volume=law.chamber_volume,
+            tube_area=law.tube_area,
+            density=law.density,
+        )
+
 
 class CompleteLaw(FlowLaw, Protocol):
     """A flow law that carries all else that the closed loop needs; what `load_law` returns."""
@@ -70,15 +82,3 @@ class CompleteLaw(FlowLaw, Protocol):
     def save(self, path: Path | str) -> Path:
         """Write the law to a file that `load_law` reads back bit for bit."""
         ...
-
-
-def balancer_model(law: CompleteLaw) -> BalancerModel:
-    """The balancer that a complete law describes. Returns: BalancerModel with the law's name."""
-    return BalancerModel(
-        name=law.name,
-        flow=law,
-        moment=law.moment,
-        chamber_volume=law.chamber_volume,
-        tube_area=law.tube_area,
-        density=law.density,
-    )

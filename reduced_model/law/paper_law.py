@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.law.flow_law import Flow, Regime, checked_conditions
-from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.storage import save_record
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
@@ -99,7 +99,7 @@ class PaperLaw:
         primed: npt.ArrayLike = False,
     ) -> Flow:
         """Flow by Eq. 19; blocked at and below the stall pressure and with the gas off."""
-        asked = checked_conditions(
+        asked = Conditions.checked(
             max_fill_ratio=self.max_fill_ratio,
             ambient_pressure=self.ambient_pressure,
             fill_ratio=fill_ratio,
@@ -163,4 +163,4 @@ def paper_model(scene: Scene) -> BalancerModel:
 
     Source: sections 3 and 5 of the liquid-ring paper.
     """
-    return balancer_model(paper_law(scene))
+    return BalancerModel.of(paper_law(scene))

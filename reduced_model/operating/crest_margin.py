@@ -23,6 +23,15 @@ class DirectedState:
     drive: Drive
     """What acts on the tube in that direction, arrays of shape ()."""
 
+    @classmethod
+    def of(
+        cls, *, law: CalibratedLaw, fills: tuple[float, float], gas_pressure: float, reverse: bool
+    ) -> DirectedState:
+        """Take a state in one direction of flow."""
+        x, y, p = (np.asarray(v, dtype=np.float64) for v in (*fills, gas_pressure))
+        asked = Conditions(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=np.asarray(True))
+        return cls(reverse=reverse, drive=law.drive(asked, reverse=reverse))
+
     @property
     def ends(self) -> TubeEnds[Any]:
         """Pressures at the tube's ends."""
@@ -48,12 +57,3 @@ class DirectedState:
             velocity=velocity_of(table=law.heads.head, head=driving / law.density, where=driving > 0),
         )
         return float(margin), float(width)
-
-
-def directed_state(
-    *, law: CalibratedLaw, fills: tuple[float, float], gas_pressure: float, reverse: bool
-) -> DirectedState:
-    """Take a state in one direction of flow."""
-    x, y, p = (np.asarray(v, dtype=np.float64) for v in (*fills, gas_pressure))
-    asked = Conditions(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=np.asarray(True))
-    return DirectedState(reverse=reverse, drive=law.drive(asked, reverse=reverse))

@@ -14,7 +14,7 @@ from ringbalance.physics.tube.uncertainty import INPUT_PART
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import hump_profile
+from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import HumpGas, Scene
 
@@ -58,41 +58,41 @@ class OperatingPoint:
     cavitation_margin_uncertainty: float | None
     """Expanded uncertainty (95 %), Pa."""
 
+    @classmethod
+    def of(cls, *, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
+        """Evaluate the law at equal fills under the scene's gas pressure.
 
-def operating_point(*, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
-    """Evaluate the law at equal fills under the scene's gas pressure.
-
-    Source: the law itself; thresholds by hydrostatics.
-    """
-    x, pressure = law.max_fill_ratio / 2, scene.gas.pressure
-    flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
-    full = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
-    u = abs(float(flow.velocity)) or abs(float(full.velocity))
-    loss = tube_loss(scene, u) if u > 0 else None
-    hump = hump_profile(scene=scene, law=law, fill_ratio=x, opposite_fill_ratio=x, points=2)
-    vented = priming_pressure(law=law, fill_ratio=0.0, hump_gas="vented")
-    trapped = priming_pressure(law=law, fill_ratio=x, opposite_fill_ratio=x, hump_gas="trapped")
-    return OperatingPoint(
-        fill_ratio=x,
-        gas_pressure=pressure,
-        regime=Regime(int(flow.regime)),
-        velocity=float(flow.velocity),
-        velocity_uncertainty=float(flow.uncertainty),
-        loss_velocity=u,
-        k=None if loss is None else float(loss.k.value),
-        k_uncertainty=None if loss is None else float(loss.k.uncertainty),
-        k_model_uncertainty=None if loss is None else _model_part(loss.uncertainty_parts),
-        priming_vented=None if vented is None else float(vented),
-        priming_trapped=None if trapped is None else float(trapped),
-        stall=max(float(law.ends(fill_ratio=0.0).stall_pressure()) / law.gas_factor, 0.0),
-        stall_paper=paper.stall_pressure(
-            disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
-        ),
-        hump_pressure=hump.hump_pressure,
-        cavity_pressure=hump.cavity_pressure,
-        cavitation_margin=hump.cavitation_margin,
-        cavitation_margin_uncertainty=hump.cavitation_margin_uncertainty,
-    )
+        Source: the law itself; thresholds by hydrostatics.
+        """
+        x, pressure = law.max_fill_ratio / 2, scene.gas.pressure
+        flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
+        full = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
+        u = abs(float(flow.velocity)) or abs(float(full.velocity))
+        loss = tube_loss(scene, u) if u > 0 else None
+        hump = HumpProfile.of(scene=scene, law=law, fill_ratio=x, opposite_fill_ratio=x, points=2)
+        vented = priming_pressure(law=law, fill_ratio=0.0, hump_gas="vented")
+        trapped = priming_pressure(law=law, fill_ratio=x, opposite_fill_ratio=x, hump_gas="trapped")
+        return cls(
+            fill_ratio=x,
+            gas_pressure=pressure,
+            regime=Regime(int(flow.regime)),
+            velocity=float(flow.velocity),
+            velocity_uncertainty=float(flow.uncertainty),
+            loss_velocity=u,
+            k=None if loss is None else float(loss.k.value),
+            k_uncertainty=None if loss is None else float(loss.k.uncertainty),
+            k_model_uncertainty=None if loss is None else _model_part(loss.uncertainty_parts),
+            priming_vented=None if vented is None else float(vented),
+            priming_trapped=None if trapped is None else float(trapped),
+            stall=max(float(law.ends(fill_ratio=0.0).stall_pressure()) / law.gas_factor, 0.0),
+            stall_paper=paper.stall_pressure(
+                disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
+            ),
+            hump_pressure=hump.hump_pressure,
+            cavity_pressure=hump.cavity_pressure,
+            cavitation_margin=hump.cavitation_margin,
+            cavitation_margin_uncertainty=hump.cavitation_margin_uncertainty,
+        )
 
 
 def priming_pressure(

@@ -18,13 +18,12 @@ from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
-from ringbalance.reduced_model.operating.crest_margin import DirectedState, directed_state
+from ringbalance.reduced_model.operating.crest_margin import DirectedState
 from ringbalance.reduced_model.tube.path import (
     Places,
     crest_span,
     lowest_place,
     path_radius,
-    places,
     reversed_tube,
     share_at_radius,
 )
@@ -67,53 +66,55 @@ class HumpProfile:
     cavitation_margin_uncertainty: float | None
     """Expanded uncertainty (95 %), Pa."""
 
+    @classmethod
+    def of(
+        cls,
+        *,
+        scene: Scene,
+        law: CalibratedLaw,
+        fill_ratio: float,
+        opposite_fill_ratio: float | None = None,
+        gas_pressure: float | None = None,
+        primed: bool = False,
+        points: int = 401,
+    ) -> HumpProfile:
+        """Follow the pressure along the path at one operating state.
 
-def hump_profile(
-    *,
-    scene: Scene,
-    law: CalibratedLaw,
-    fill_ratio: float,
-    opposite_fill_ratio: float | None = None,
-    gas_pressure: float | None = None,
-    primed: bool = False,
-    points: int = 401,
-) -> HumpProfile:
-    """Follow the pressure along the path at one operating state.
+        p(s) = p_A + P_A - rho omega^2 (R2^2 - r^2)/2 - K(s) rho u^2/2, with K the loss up to there and alpha
 
-    p(s) = p_A + P_A - rho omega^2 (R2^2 - r^2)/2 - K(s) rho u^2/2, with K the loss up to there and alpha
-
-    Where the column is separated the cavity reaches from the crest to the column that the opposite chamber
-    supports; the momentum of what falls onto it is left out.
-    Args:
-        fill_ratio: x of the driven chamber.
-        opposite_fill_ratio: default max_fill_ratio - fill_ratio.
-        gas_pressure: gauge, Pa, in the driven chamber; default the scene's.
-        primed: whether the tube holds a continuous column beforehand.
-        points: number of even places along the path; more stand where something changes.
-    Raises: ValueError: a fill ratio outside the range, a NaN, a negative absolute pressure, or under 2
-        points.
-    Range: legs as in `path`; the scene does not give where the bends lie: evenly over both legs.
-    Source: Eqs. 13 to 18 of the liquid-ring paper, taken along the path.
-    """
-    if points < 2:
-        raise ValueError("points must be at least 2")
-    gas = scene.gas.pressure if gas_pressure is None else gas_pressure
-    other = law.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
-    flow = law.evaluate(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas, primed=primed)
-    forward, backward = (
-        directed_state(law=law, fills=(fill_ratio, other), gas_pressure=gas, reverse=r) for r in (False, True)
-    )
-    state = backward if forward.ends.driving_pressure() < 0 else forward
-    tube = reversed_tube(scene.tube) if state.reverse else scene.tube
-    margin = state.margin(law=law)
-    if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
-        line = _blocked(scene, law, forward, primed, points)
-    else:
-        cavity = _pressure_over_crest(law, state, abs(float(flow.velocity)))
-        line = _flowing(scene, tube, abs(float(flow.velocity)), state.ends, cavity, points)
-        if state.reverse:
-            line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
-    return _profile(scene, law, flow, state, margin, line)
+        Where the column is separated the cavity reaches from the crest to the column that the opposite
+        chamber supports; the momentum of what falls onto it is left out.
+        Args:
+            fill_ratio: x of the driven chamber.
+            opposite_fill_ratio: default max_fill_ratio - fill_ratio.
+            gas_pressure: gauge, Pa, in the driven chamber; default the scene's.
+            primed: whether the tube holds a continuous column beforehand.
+            points: number of even places along the path; more stand where something changes.
+        Raises: ValueError: a fill ratio outside the range, a NaN, a negative absolute pressure, or under 2
+            points.
+        Range: legs as in `path`; the scene does not give where the bends lie: evenly over both legs.
+        Source: Eqs. 13 to 18 of the liquid-ring paper, taken along the path.
+        """
+        if points < 2:
+            raise ValueError("points must be at least 2")
+        gas = scene.gas.pressure if gas_pressure is None else gas_pressure
+        other = law.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
+        flow = law.evaluate(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas, primed=primed)
+        forward, backward = (
+            DirectedState.of(law=law, fills=(fill_ratio, other), gas_pressure=gas, reverse=r)
+            for r in (False, True)
+        )
+        state = backward if forward.ends.driving_pressure() < 0 else forward
+        tube = reversed_tube(scene.tube) if state.reverse else scene.tube
+        margin = state.margin(law=law)
+        if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
+            line = _blocked(scene, law, forward, primed, points)
+        else:
+            cavity = _pressure_over_crest(law, state, abs(float(flow.velocity)))
+            line = _flowing(scene, tube, abs(float(flow.velocity)), state.ends, cavity, points)
+            if state.reverse:
+                line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
+        return _profile(scene, law, flow, state, margin, line)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -176,7 +177,7 @@ def _flowing(
     head = scene.liquid.density * velocity**2 / 2
     if cavity is not None and terms is not None:
         return _separated(scene, tube, terms, ends, cavity, head, points)
-    at = places(tube=tube, points=points)
+    at = Places.along(tube=tube, points=points)
     lost = 0.0 if terms is None else head * at.loss_before(tube=tube, state=terms)
     hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share))
     return _Line(
@@ -205,10 +206,10 @@ def _separated(
             top - column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share)) + head * lost
         )
 
-    first = places(tube=tube, points=points)
+    first = Places.along(tube=tube, points=points)
     crest = lowest_place(tube, float(terms.along) * head / scene.liquid.density, scene.rotor.speed**2)
     again = 1.0 if ends.downstream_open() else _full_again(first, behind, cavity, crest)
-    at = places(tube=tube, points=points, doubled=(crest, again))
+    at = Places.along(tube=tube, points=points, doubled=(crest, again))
     from_top = ends.upstream_pressure() - column_pressure(
         scene=scene, radius=path_radius(tube=tube, share=at.share)
     )
@@ -244,13 +245,13 @@ def _blocked(scene: Scene, law: CalibratedLaw, state: DirectedState, primed: boo
     ends, crest = state.ends, law.path.crest
     near, far = ends.upstream_pressure(), ends.downstream_pressure()
     if crest is None:
-        at = places(tube=scene.tube, points=points, doubled=(0.5,))
+        at = Places.along(tube=scene.tube, points=points, doubled=(0.5,))
         first = (at.share < 0.5) | ((at.share == 0.5) & ~at.after)
         pressure = np.where(first, near, far) - ends.port_pressure
         return _Line(share=at.share, pressure=pressure, full=np.ones(first.shape, dtype=np.bool_))
     cavity = crest.cavity_pressure(ends) if primed and ends.upstream_covered() else None
     stop = _rest(scene=scene, ends=ends, cavity=cavity, crest_pressure=crest.column_pressure)
-    at = places(tube=scene.tube, points=points, doubled=(stop.near, stop.far))
+    at = Places.along(tube=scene.tube, points=points, doubled=(stop.near, stop.far))
     hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=scene.tube, share=at.share))
     in_near = ((at.share < stop.near) | ((at.share == stop.near) & ~at.after)) & ends.upstream_covered()
     in_far = ((at.share > stop.far) | ((at.share == stop.far) & at.after)) & (not ends.downstream_open())

@@ -50,6 +50,41 @@ class ResidualLiquid:
     """Largest moment of a pair that no gas passes through, kg m."""
     usable_pair_moment_uncertainty: float
 
+    @classmethod
+    def of(cls, scene: Scene, *, law: CalibratedLaw) -> ResidualLiquid:
+        """Residual fill with its uncertainty, and the volume and the moment that it leaves to a pair.
+
+        Uncertainty: that of the depth's correlation, and of the velocity to the power 2/5.
+        """
+        x, top = residual_fill_ratio(scene, law=law), scene.disc.max_fill_ratio
+        rate, width = _flow_rate(scene, law, np.array([x]))
+        relative = _depth_uncertainty(rate, width)
+        change = min(relative, 0.99)
+        low, high = (float(v) for v in _residual(scene, law, np.array([1 - change, 1 + change])))
+        volume = chamber_volume(disc=scene.disc)
+
+        def moment(fill: float) -> float:
+            return float(law.moment.pair_moment(fill_ratio=max(top - fill, fill), opposite_fill_ratio=fill))
+
+        ends = law.moment.half_width(np.array([x, top - x]))
+        half = min(x, top / 2)
+        depth = float(draw_down_depth(flow_rate=rate[0], acceleration=_acceleration(scene)))
+        return cls(
+            fill_ratio=x,
+            fill_ratio_uncertainty=(high - low) / 2,
+            depth=depth,
+            depth_uncertainty=relative * depth,
+            flow_rate=float(rate[0]),
+            largest_fill_ratio=top - half,
+            usable_volume=(top - 2 * half) * volume,
+            usable_volume_uncertainty=(high - low) * volume,
+            pair_moment=moment(0.0),
+            usable_pair_moment=moment(half),
+            usable_pair_moment_uncertainty=math.hypot(
+                (moment(min(low, top / 2)) - moment(min(high, top / 2))) / 2, *ends
+            ),
+        )
+
     def usable_moment_uncertainty(self, scene: Scene, *, law: CalibratedLaw) -> float:
         """Of the usable pair moment, with the law's own uncertainties in place of those it was found with."""
         top, x = scene.disc.max_fill_ratio, self.fill_ratio
@@ -76,41 +111,6 @@ def residual_by_velocity(scene: Scene, *, law: FlowLaw) -> tuple[FloatArray, Flo
     """Factors of a law's velocity from 0 to 2, and the same with each: the depth goes with its power 2/5."""
     factors = np.linspace(0.0, 2.0, _FACTORS)
     return factors, _residual(scene, law, factors**0.4)
-
-
-def residual_liquid(scene: Scene, *, law: CalibratedLaw) -> ResidualLiquid:
-    """Residual fill with its uncertainty, and the volume and the moment that it leaves to a pair.
-
-    Uncertainty: that of the depth's correlation, and of the velocity to the power 2/5.
-    """
-    x, top = residual_fill_ratio(scene, law=law), scene.disc.max_fill_ratio
-    rate, width = _flow_rate(scene, law, np.array([x]))
-    relative = _depth_uncertainty(rate, width)
-    change = min(relative, 0.99)
-    low, high = (float(v) for v in _residual(scene, law, np.array([1 - change, 1 + change])))
-    volume = chamber_volume(disc=scene.disc)
-
-    def moment(fill: float) -> float:
-        return float(law.moment.pair_moment(fill_ratio=max(top - fill, fill), opposite_fill_ratio=fill))
-
-    ends = law.moment.half_width(np.array([x, top - x]))
-    half = min(x, top / 2)
-    depth = float(draw_down_depth(flow_rate=rate[0], acceleration=_acceleration(scene)))
-    return ResidualLiquid(
-        fill_ratio=x,
-        fill_ratio_uncertainty=(high - low) / 2,
-        depth=depth,
-        depth_uncertainty=relative * depth,
-        flow_rate=float(rate[0]),
-        largest_fill_ratio=top - half,
-        usable_volume=(top - 2 * half) * volume,
-        usable_volume_uncertainty=(high - low) * volume,
-        pair_moment=moment(0.0),
-        usable_pair_moment=moment(half),
-        usable_pair_moment_uncertainty=math.hypot(
-            (moment(min(low, top / 2)) - moment(min(high, top / 2))) / 2, *ends
-        ),
-    )
 
 
 def _depth_uncertainty(rate: FloatArray, width: FloatArray) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.operating.pressure_profile import HumpProfile, hump_profile
+from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.path import crest_middle, path_angle
 from ringbalance.scene.models import Scene
 
@@ -58,37 +58,39 @@ class TubeLiquid:
     """Liquid that each injection lifts to the middle of the crest and that falls back when the gas is vented,
     m^3; runs lift it from the level, where gas lies over the crest."""
 
+    @classmethod
+    def of(cls, scene: Scene, *, law: CalibratedLaw) -> TubeLiquid:
+        """Follow the liquid in the tube through an injection at equal fills.
+
+        M = rho S int r e^(i phi) ds over the part of the path that is full, where pressure at rest or in flow
+        puts the ends of the columns.  The chambers' levels change too little in one injection to matter.
+        Source: first moment; `HumpProfile.of`.
+        """
+        fill, gas = law.max_fill_ratio / 2, scene.gas.pressure
+
+        def state(gas_pressure: float, *, primed: bool) -> HumpProfile:
+            return HumpProfile.of(
+                scene=scene, law=law, fill_ratio=fill, gas_pressure=gas_pressure, primed=primed
+            )
+
+        primes = law.evaluate(fill_ratio=fill, gas_pressure=gas).primed
+        profiles = state(0.0, primed=False), state(gas, primed=False), state(0.0, primed=bool(primes))
+        before, flowing, after = (_held(scene, profile) for profile in profiles)
+        influence = scene.rotor.influence_coefficient
+        return cls(
+            before=before,
+            flowing=flowing,
+            after=after,
+            flowing_vibration=influence * flowing.change_from(before),
+            lasting_vibration=influence * after.change_from(before),
+            limit=scene.controller.limit,
+            returned_volume=_returned(scene, flowing=profiles[1], after=profiles[2]),
+        )
+
     @property
     def above_limit(self) -> bool:
         """Whether what stays in the tube changes the vibration by more than the controller's limit."""
         return self.lasting_vibration > self.limit
-
-
-def tube_liquid(scene: Scene, *, law: CalibratedLaw) -> TubeLiquid:
-    """Follow the liquid in the tube through an injection at equal fills.
-
-    M = rho S int r e^(i phi) ds over the part of the path that is full, where pressure at rest or in flow
-    puts the ends of the columns.  The chambers' levels change too little in one injection to matter.
-    Source: first moment; `hump_profile`.
-    """
-    fill, gas = law.max_fill_ratio / 2, scene.gas.pressure
-
-    def state(gas_pressure: float, *, primed: bool) -> HumpProfile:
-        return hump_profile(scene=scene, law=law, fill_ratio=fill, gas_pressure=gas_pressure, primed=primed)
-
-    primes = law.evaluate(fill_ratio=fill, gas_pressure=gas).primed
-    profiles = state(0.0, primed=False), state(gas, primed=False), state(0.0, primed=bool(primes))
-    before, flowing, after = (_held(scene, profile) for profile in profiles)
-    influence = scene.rotor.influence_coefficient
-    return TubeLiquid(
-        before=before,
-        flowing=flowing,
-        after=after,
-        flowing_vibration=influence * flowing.change_from(before),
-        lasting_vibration=influence * after.change_from(before),
-        limit=scene.controller.limit,
-        returned_volume=_returned(scene, flowing=profiles[1], after=profiles[2]),
-    )
 
 
 def _held(scene: Scene, profile: HumpProfile) -> _HeldLiquid:

@@ -69,65 +69,68 @@ class DirectedFlow:
     half_width: FloatArray
     """Expanded uncertainty (95 %) of the velocity, m/s."""
 
+    @classmethod
+    def of(
+        cls,
+        *,
+        path: TubePath,
+        heads: TubeHeads,
+        hump_head: HermiteTable | None,
+        inputs: DriveUncertainty,
+        drive: Drive,
+    ) -> DirectedFlow:
+        """Flow from the upstream to the downstream chamber.
 
-def directed_flow(
-    *,
-    path: TubePath,
-    heads: TubeHeads,
-    hump_head: HermiteTable | None,
-    inputs: DriveUncertainty,
-    drive: Drive,
-) -> DirectedFlow:
-    """Flow from the upstream to the downstream chamber.
+        Source: `column_flow`; half-widths by linear propagation.
+        """
 
-    Source: `column_flow`; half-widths by linear propagation.
-    """
+        def velocity(table: HermiteTable, pressure: FloatArray, where: Truth) -> FloatArray:
+            return velocity_of(table=table, head=pressure / path.density, where=np.asarray(where))
 
-    def velocity(table: HermiteTable, pressure: FloatArray, where: Truth) -> FloatArray:
-        return velocity_of(table=table, head=pressure / path.density, where=np.asarray(where))
-
-    crest = path.crest if hump_head is not None else None
-    separation = partial(velocity, hump_head or heads.head)
-    flow = column_flow(
-        ends=drive.ends,
-        crest=crest,
-        primed=drive.primed,
-        allowed=drive.allowed,
-        siphon=partial(velocity, heads.head),
-        separation=separation,
-    )
-    width = _siphon_width(heads, inputs, drive, flow.siphon_velocity)
-    undecided = np.zeros_like(drive.primed)
-    if crest is not None and hump_head is not None:
-        broken = _separated_width(hump_head, heads.hump_uncertainty, path.density, inputs, drive, crest, flow)
-        margins = _separation_margins(
-            ends=drive.ends, crest=crest, primed=drive.primed, spill=flow.spill_velocity
+        crest = path.crest if hump_head is not None else None
+        separation = partial(velocity, hump_head or heads.head)
+        flow = column_flow(
+            ends=drive.ends,
+            crest=crest,
+            primed=drive.primed,
+            allowed=drive.allowed,
+            siphon=partial(velocity, heads.head),
+            separation=separation,
         )
-        flows, full = flow.velocity > 0, flow.siphon_velocity
-        slowest, fastest = (separation(margin, flows & (margin > 0)) for margin in margins)
-        held = _head_at(hump_head, flow.separation_velocity) * path.density
-        margin, open_by = siphon_margin(
-            path=path,
-            heads=heads,
-            hump_head=hump_head,
-            inputs=inputs,
-            drive=drive,
-            at_rest=held,
-            spread=np.maximum(held - margins[0], margins[1] - held),
-            velocity=full,
+        width = _siphon_width(heads, inputs, drive, flow.siphon_velocity)
+        undecided = np.zeros_like(drive.primed)
+        if crest is not None and hump_head is not None:
+            broken = _separated_width(
+                hump_head, heads.hump_uncertainty, path.density, inputs, drive, crest, flow
+            )
+            margins = _separation_margins(
+                ends=drive.ends, crest=crest, primed=drive.primed, spill=flow.spill_velocity
+            )
+            flows, full = flow.velocity > 0, flow.siphon_velocity
+            slowest, fastest = (separation(margin, flows & (margin > 0)) for margin in margins)
+            held = _head_at(hump_head, flow.separation_velocity) * path.density
+            margin, open_by = siphon_margin(
+                path=path,
+                heads=heads,
+                hump_head=hump_head,
+                inputs=inputs,
+                drive=drive,
+                at_rest=held,
+                spread=np.maximum(held - margins[0], margins[1] - held),
+                velocity=full,
+            )
+            undecided = flows & (np.abs(margin) < open_by)
+            spread = np.maximum(
+                flow.velocity - np.minimum(slowest, full), np.minimum(fastest, full) - flow.velocity
+            )
+            width = np.hypot(np.where(flow.separated, broken, width), np.where(flows, spread, 0.0))
+        return cls(
+            velocity=flow.velocity,
+            separated=np.asarray(flow.separated),
+            undecided=undecided,
+            primed=np.asarray(flow.primed),
+            half_width=width,
         )
-        undecided = flows & (np.abs(margin) < open_by)
-        spread = np.maximum(
-            flow.velocity - np.minimum(slowest, full), np.minimum(fastest, full) - flow.velocity
-        )
-        width = np.hypot(np.where(flow.separated, broken, width), np.where(flows, spread, 0.0))
-    return DirectedFlow(
-        velocity=flow.velocity,
-        separated=np.asarray(flow.separated),
-        undecided=undecided,
-        primed=np.asarray(flow.primed),
-        half_width=width,
-    )
 
 
 def _siphon_width(

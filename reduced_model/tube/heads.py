@@ -56,6 +56,54 @@ class TubeHeads:
     interpolation_error: float
     """Largest relative error of the head tables found between their nodes."""
 
+    @classmethod
+    def exact(cls, scene: Scene, *, tolerance: float = _TABLE_ERROR, first: int = _FIRST_NODES) -> TubeHeads:
+        """The heads without uncertainties, on some nodes at first and on more up to an error between them.
+
+        Raises: ValueError: as `TubeHeads.of`.
+        """
+        start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
+        found = [
+            refined_table(function=head, start=start, stop=stop, tolerance=tolerance, first=first)
+            for head in log_heads(scene)[:3]
+        ]
+        if any(np.any(np.diff(table.value) <= 0) for table, _ in found):
+            raise ValueError(
+                "the tube's head does not grow with the velocity: its loss terms are inconsistent"
+            )
+        between, *to_crest = (table for table, _ in found)
+        exact = flat_table(start=start, stop=stop)
+        return cls(
+            head=between,
+            hump_head=to_crest[0] if to_crest else None,
+            return_hump_head=to_crest[1] if to_crest else None,
+            uncertainty=exact,
+            hump_uncertainty=exact,
+            fraction_uncertainty=exact,
+            interpolation_error=max(error for _, error in found),
+        )
+
+    @classmethod
+    def nominal(cls, scene: Scene) -> TubeHeads:
+        """The heads on few nodes and without uncertainties, in a tenth of the time of `TubeHeads.of`.
+
+        The nodes do not depend on the scene: the error, below 1e-4 of a head, is smooth in its values.
+        Raises: ValueError: as `TubeHeads.of`.
+        """
+        return TubeHeads.exact(scene, tolerance=math.inf, first=_NOMINAL_NODES)
+
+    @classmethod
+    def of(cls, scene: Scene) -> TubeHeads:
+        """Tabulate the heads of a scene's tube.
+
+        Raises: ValueError: arcs of bends longer than the tube.
+        Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
+        """
+        place = crest_end_uncertainty(scene.tube, half_widths(scene).get("hump_position", 0.0))
+        start, stop = np.log(TABLE_VELOCITIES)
+        widths = _widths(scene, np.linspace(start, stop, _UNCERTAINTY_NODES), place=place)
+        return replace(TubeHeads.exact(scene), **widths)  # type: ignore[arg-type]
+
     def to_crest(self, *, reverse: bool) -> HermiteTable | None:
         """From the chamber that gives liquid; None without a crest."""
         return self.return_hump_head if reverse else self.hump_head
@@ -75,52 +123,6 @@ def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -
     """
     safe = np.where(where, head, 1.0)
     return np.where(where, np.exp(table.inverse(np.log(safe))), 0.0)
-
-
-def tube_heads(scene: Scene) -> TubeHeads:
-    """Tabulate the heads of a scene's tube.
-
-    Raises: ValueError: arcs of bends longer than the tube.
-    Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
-    """
-    place = crest_end_uncertainty(scene.tube, half_widths(scene).get("hump_position", 0.0))
-    start, stop = np.log(TABLE_VELOCITIES)
-    widths = _widths(scene, np.linspace(start, stop, _UNCERTAINTY_NODES), place=place)
-    return replace(exact_heads(scene), **widths)  # type: ignore[arg-type]
-
-
-def nominal_heads(scene: Scene) -> TubeHeads:
-    """The heads on few nodes and without uncertainties, in a tenth of the time of `tube_heads`.
-
-    The nodes do not depend on the scene, so that the error, below 1e-4 of a head, is smooth in its values.
-    Raises: ValueError: as `tube_heads`.
-    """
-    return exact_heads(scene, tolerance=math.inf, first=_NOMINAL_NODES)
-
-
-def exact_heads(scene: Scene, *, tolerance: float = _TABLE_ERROR, first: int = _FIRST_NODES) -> TubeHeads:
-    """The heads without uncertainties, on a number of nodes at first and on more up to an error between them.
-
-    Raises: ValueError: as `tube_heads`.
-    """
-    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-    found = [
-        refined_table(function=head, start=start, stop=stop, tolerance=tolerance, first=first)
-        for head in log_heads(scene)[:3]
-    ]
-    if any(np.any(np.diff(table.value) <= 0) for table, _ in found):
-        raise ValueError("the tube's head does not grow with the velocity: its loss terms are inconsistent")
-    between, *to_crest = (table for table, _ in found)
-    exact = flat_table(start=start, stop=stop)
-    return TubeHeads(
-        head=between,
-        hump_head=to_crest[0] if to_crest else None,
-        return_hump_head=to_crest[1] if to_crest else None,
-        uncertainty=exact,
-        hump_uncertainty=exact,
-        fraction_uncertainty=exact,
-        interpolation_error=max(error for _, error in found),
-    )
 
 
 def _widths(

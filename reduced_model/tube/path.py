@@ -31,6 +31,24 @@ class Places:
     after: BoolArray
     """At a doubled share: whether this entry lies behind what is lumped there."""
 
+    @classmethod
+    def along(cls, *, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Places:
+        """Even places along the path, with its crest, and doubled at both ends, at the bends and where asked.
+
+        Args: `points`: number of even places. `doubled`: further shares at which something changes at once.
+        """
+        twice = distinct(np.concatenate([[0.0, 1.0], *_bend_shares(tube), doubled]))
+        crest = () if tube.hump_radius is None else crest_span(tube)
+        kept = np.append(twice, crest)
+        even = np.linspace(0.0, 1.0, points)
+        # An even place that differs from another by rounding only would stand for nothing.
+        even = even[np.min(np.abs(even[:, None] - kept), axis=1) > _SAME]
+        once = np.concatenate([even, distinct([share for share in crest if share not in twice])])
+        share = np.concatenate([once, twice, twice])
+        after = np.concatenate([np.zeros(once.size + twice.size), np.ones(twice.size)]).astype(np.bool_)
+        order = np.lexsort((after, share))
+        return cls(share=share[order], after=after[order])
+
     def loss_before(self, *, tube: Tube, state: TubeState) -> FloatArray:
         """Fall of pressure from the giving chamber to each place, over rho u^2/2, but for the radius.
 
@@ -134,24 +152,6 @@ def _bend_shares(tube: Tube) -> tuple[FloatArray, FloatArray]:
     start, end = crest_span(tube)
     near, far = 2 * even * start, end + (2 * even - 1) * (1 - end)
     return np.where(even <= 0.5, near, far), np.where(even < 0.5, near, far)
-
-
-def places(*, tube: Tube, points: int, doubled: tuple[float, ...] = ()) -> Places:
-    """Even places along the path, with its crest, and doubled at both ends, at the bends and where asked.
-
-    Args: `points`: number of even places. `doubled`: further shares at which something changes at once.
-    """
-    twice = distinct(np.concatenate([[0.0, 1.0], *_bend_shares(tube), doubled]))
-    crest = () if tube.hump_radius is None else crest_span(tube)
-    kept = np.append(twice, crest)
-    even = np.linspace(0.0, 1.0, points)
-    # An even place that differs from another by rounding only would stand for nothing.
-    even = even[np.min(np.abs(even[:, None] - kept), axis=1) > _SAME]
-    once = np.concatenate([even, distinct([share for share in crest if share not in twice])])
-    share = np.concatenate([once, twice, twice])
-    after = np.concatenate([np.zeros(once.size + twice.size), np.ones(twice.size)]).astype(np.bool_)
-    order = np.lexsort((after, share))
-    return Places(share=share[order], after=after[order])
 
 
 def path_radius(*, tube: Tube, share: npt.ArrayLike) -> FloatArray:

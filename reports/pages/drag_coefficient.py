@@ -15,14 +15,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reports.figures.drag_coefficient import drag_figures
 from ringbalance.reports.numbers import MISSING, given, measured, percent, shown
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
-from ringbalance.reports.studies.drag_map import (
-    BORES,
-    DragMap,
-    LiquidVerdicts,
-    apparent_drag,
-    drag_map,
-    liquid_verdicts,
-)
+from ringbalance.reports.studies.drag_map import BORES, ApparentDrag, DragMap, LiquidVerdicts
 from ringbalance.reports.studies.drag_point import DragPoint
 
 _SAME_POINT: Final = 1e-6
@@ -33,8 +26,8 @@ _READINGS: Final = 60
 
 def _collect(work: Work) -> Record:
     """The map, its contours, the liquids, and Eq. 18's reading of a separated column, as plain numbers."""
-    found = drag_map(calibration=work.calibration)
-    verdicts = liquid_verdicts(calibration=work.calibration)
+    found = DragMap.of(calibration=work.calibration)
+    verdicts = LiquidVerdicts.of(calibration=work.calibration)
     return {
         "bore_m": work.scene.tube.bore,
         "decreed_k": work.scene.tube.drag_coefficient,
@@ -145,7 +138,7 @@ def _apparent(calibration: Calibration) -> Record | None:
     speed = np.geomspace(
         max(VELOCITIES[0], point.loss_velocity / 15), max(VELOCITIES[1], 2 * point.loss_velocity), _READINGS
     )
-    read = apparent_drag(law=law, velocity=speed, opposite_fill_ratio=law.max_fill_ratio / 2)
+    read = ApparentDrag.of(law=law, velocity=speed, opposite_fill_ratio=law.max_fill_ratio / 2)
     fifty = float(np.interp(-paper.PAPER_DRAG_COEFFICIENT, -read.separated, speed))
     return {
         "velocity_m_s": _rounded(speed),

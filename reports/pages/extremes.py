@@ -16,7 +16,7 @@ from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import number
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.extremes.axes import MAP_PREFIX, Axis, axis_of, places_of
+from ringbalance.verification.extremes.axes import MAP_PREFIX, Axis, places_of
 from ringbalance.verification.extremes.point import GAS_TIME, PERIODS, Ending
 from ringbalance.verification.runner import paper_scene
 
@@ -111,7 +111,7 @@ def _shortened(message: str) -> str:
 
 
 def _map(name: str, columns: Record, places: Mapping[str, float]) -> Drawing:
-    x, y = (axis_of(part) for part in name.removeprefix(MAP_PREFIX).split(" and "))
+    x, y = (Axis.of(part) for part in name.removeprefix(MAP_PREFIX).split(" and "))
     xs, ys = (np.unique(np.asarray(columns[axis.name], dtype=np.float64)) for axis in (x, y))
     told = [_sign(*cell) for cell in zip(columns["ending"], columns["loop"], strict=True)]
     kinds = dict.fromkeys(kind for kind, _ in told)

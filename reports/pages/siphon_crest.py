@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import HumpProfile, hump_profile
+from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import MISSING, given, shown
@@ -126,7 +126,7 @@ def _state_in(regime: Regime, scene: Scene, law: CalibratedLaw) -> tuple[float, 
 
 
 def _record(scene: Scene, law: CalibratedLaw, fill: float, pressure: float, primed: bool) -> Record:
-    found: HumpProfile = hump_profile(
+    found: HumpProfile = HumpProfile.of(
         scene=scene, law=law, fill_ratio=fill, gas_pressure=pressure, primed=primed, points=_POINTS
     )
     return {

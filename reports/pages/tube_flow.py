@@ -18,13 +18,7 @@ from ringbalance.reports.numbers import number, percent
 from ringbalance.reports.pages.cases import anchor, case_view
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.navier_stokes.flow_fields import (
-    EndFlow,
-    SectionFlow,
-    entrance_flow,
-    exit_flow,
-    section_flow,
-)
+from ringbalance.verification.navier_stokes.flow_fields import EndFlow, SectionFlow
 
 _LARGEST: Final = 500.0
 """Re up to which a flow is drawn: beyond, a laminar one is thin layers that no picture shows."""
@@ -191,9 +185,9 @@ def _collect(work: Work) -> Record | None:
         "reynolds": reynolds,
         "rotation_reynolds": loss.rotation_reynolds,
         "laminar": bool(loss.flow_state == FlowState.LAMINAR),
-        "section": _section_record(section_flow(reynolds=drawn, rotation_reynolds=rotation)),
-        "entrance": _end_record(entrance_flow(reynolds=drawn)),
-        "exit": _end_record(exit_flow(reynolds=drawn)),
+        "section": _section_record(SectionFlow.of(reynolds=drawn, rotation_reynolds=rotation)),
+        "entrance": _end_record(EndFlow.entrance(reynolds=drawn)),
+        "exit": _end_record(EndFlow.exit(reynolds=drawn)),
     }
 
 

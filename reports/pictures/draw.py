@@ -26,7 +26,7 @@ from PIL import Image
 
 from ringbalance.reports.pictures.disc_shapes import chamber_outline, ring, split_cells, web
 from ringbalance.reports.pictures.draw_tube import draw_tube
-from ringbalance.reports.pictures.style import PICTURE, THEMES, Bar, Label, Theme, bar, label_at, letter, look
+from ringbalance.reports.pictures.style import PICTURE, THEMES, Bar, Label, Theme, label_at, letter, look
 from ringbalance.reports.pictures.tube_path import tube_path
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.processes import end_with
@@ -132,7 +132,7 @@ def _draw_pressure(
         label_at("outer wall", _polar(outer, 0.45 * half, 0.1 * width), shift=(60, -110)),
         label_at("free surface", _polar(shallow, 0.55 * half, width / 2), shift=(-125, 150)),
         label_at("gas", _polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
-    ], bar("pressure in MPa", _VIRIDIS, (0.0, high))
+    ], Bar.of("pressure in MPa", _VIRIDIS, (0.0, high))
 
 
 def _outline(job: Record, half: float) -> list[Any]:
@@ -214,7 +214,7 @@ def _draw_disc(
         angle = 2 * math.pi * (index / count) - 0.22 * job["central_angle"]
         # Beside the middle of the chamber, where the tube does not run.
         labels.append(label_at(name, _polar(0.62 * inner + 0.38 * outer, angle, 0.0), size=54))
-    return labels, bar("depth in mm", _WATER, (0.0, high))
+    return labels, Bar.of("depth in mm", _WATER, (0.0, high))
 
 
 def _add_metal(plotter: Any, job: Record, theme: Theme) -> None:

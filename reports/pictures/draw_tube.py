@@ -10,7 +10,7 @@ import pyvista as pv
 from matplotlib import colormaps
 
 from ringbalance.reports.pictures.disc_shapes import ring
-from ringbalance.reports.pictures.style import Bar, Label, Theme, bar, label_at, look
+from ringbalance.reports.pictures.style import Bar, Label, Theme, label_at, look
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
 Record = dict[str, Any]
@@ -42,7 +42,7 @@ def draw_tube(
         bounds=(-edge, edge, -0.35 * outer, edge, 0.0, 2 * _THICK * outer),
         lift=0.17,
     )
-    return _labels(points, full, job, told), bar("pressure in MPa", _VIRIDIS, (low, high))
+    return _labels(points, full, job, told), Bar.of("pressure in MPa", _VIRIDIS, (low, high))
 
 
 def _runs(full: BoolArray) -> list[tuple[bool, slice]]:

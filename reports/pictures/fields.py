@@ -20,7 +20,7 @@ from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid,
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import hump_profile
+from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.reports.numbers import given
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
@@ -248,7 +248,7 @@ def tube_field(scene: Scene) -> Record | None:
     calibration = calibration_of(scene)
     scene, law = calibration.scene, calibration.flow_law
     equal = law.max_fill_ratio / 2
-    found = hump_profile(scene=scene, law=law, fill_ratio=equal, opposite_fill_ratio=equal, points=_POINTS)
+    found = HumpProfile.of(scene=scene, law=law, fill_ratio=equal, opposite_fill_ratio=equal, points=_POINTS)
     # Where a step stands twice, the later entry is kept: a line may not stand still.
     last = np.append(np.diff(found.path) > 0, True)
     share = found.path[last] / scene.tube.length

@@ -81,13 +81,15 @@ class Bar:
     ticks: tuple[float, ...]
     labels: tuple[str, ...]
 
-
-def bar(title: str, colours: Colormap, limits: tuple[float, float]) -> Bar:
-    """A colour bar with about five round ticks within its limits."""
-    low, high = limits
-    ticks = [float(t) for t in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high) if low <= t <= high]
-    labels = tuple(f"{tick:g}".replace("-", "\N{MINUS SIGN}") for tick in ticks)
-    return Bar(title=title, colours=colours, low=low, high=high, ticks=tuple(ticks), labels=labels)
+    @classmethod
+    def of(cls, title: str, colours: Colormap, limits: tuple[float, float]) -> Bar:
+        """A colour bar with about five round ticks within its limits."""
+        low, high = limits
+        ticks = [
+            float(t) for t in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high) if low <= t <= high
+        ]
+        labels = tuple(f"{tick:g}".replace("-", "\N{MINUS SIGN}") for tick in ticks)
+        return cls(title=title, colours=colours, low=low, high=high, ticks=tuple(ticks), labels=labels)
 
 
 def _font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:

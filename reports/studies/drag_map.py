@@ -22,7 +22,7 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.operating.point import priming_pressure
-from ringbalance.reports.studies.drag_point import DragPoint, LiquidBatch, drag_point
+from ringbalance.reports.studies.drag_point import DragPoint, LiquidBatch
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.liquids import known_liquids, liquid_at
 from ringbalance.scene.models import HumpGas, Liquid, Scene, Tube
@@ -53,6 +53,53 @@ class DragMap:
     """Arrays of shape (n, m)."""
     velocity_paper: float
     """Eq. 19 with k = 50 at equal fills, m/s: the same everywhere."""
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        calibration: Calibration,
+        bore: npt.ArrayLike | None = None,
+        kinematic_viscosity: npt.ArrayLike | None = None,
+    ) -> DragMap:
+        """Map k over bore and viscosity, each point at the device's own operating point.
+
+        Every point solves the flow at equal fills under the scene's gas pressure: siphon or separated, and,
+        where that gas does not prime the tube, the flow of a primed one.
+        Args: `bore`: d, m, rising, shape (n,); default 41 from 0.2 to 5 mm. `kinematic_viscosity`: nu, m^2/s,
+        rising, shape (m,); default 49 from 0.2 to 500 mm^2/s.
+        Raises: ValueError: values that are not positive, finite and rising, or arcs of bends longer than the
+        tube.
+        Range: as `tube_loss`; `point.in_range` says where a correlation is stretched.
+        Source: `DragPoint.of` at every point.
+        """
+        scene = calibration.scene
+        d = _axis(bore, "bore", BORES, BORE_POINTS, scene.tube.bore)
+        nu = _axis(
+            kinematic_viscosity,
+            "kinematic_viscosity",
+            VISCOSITIES,
+            VISCOSITY_POINTS,
+            scene.liquid.kinematic_viscosity,
+        )
+        rho = scene.liquid.density
+        batch = LiquidBatch(
+            kinematic_viscosity=nu,
+            density=np.full(nu.shape, rho),
+            gas_pressure=np.full(nu.shape, scene.gas.pressure),
+            vapour_pressure=np.full(nu.shape, calibration.flow_law.path.vapour_pressure),
+            relative_density=np.full(nu.shape, calibration.flow_law.inputs.relative_density),
+            relative_viscosity=np.zeros(nu.shape),
+        )
+        rows = _rows(calibration, d, batch)
+        return cls(
+            bore=d,
+            kinematic_viscosity=nu,
+            density=rho,
+            gas_pressure=scene.gas.pressure,
+            point=_stacked(rows),
+            velocity_paper=float(_velocity_paper(rho, scene.gas.pressure)),
+        )
 
     @property
     def velocity_error(self) -> FloatArray:
@@ -103,6 +150,49 @@ class LiquidVerdicts:
     bore_for_paper: FloatArray
     """Bore at which k is the paper's at equal heads, m; zero where there is none between BORES."""
 
+    @classmethod
+    def of(cls, *, calibration: Calibration, liquids: Sequence[Liquid] | None = None) -> LiquidVerdicts:
+        """Hold k = 50 against liquids in the scene's own tube.
+
+        Args: `liquids`: those to ask; default the known ones at 20 degC or the next temperature with data.
+        Returns: LiquidVerdicts; the scene's own liquid stands first, another of its name is left out.
+        Source: `DragPoint.of` for each liquid, its density and the spread of its properties included.
+        """
+        scene, law = calibration.scene, calibration.flow_law
+        asked = _default_liquids() if liquids is None else tuple(liquids)
+        chosen = (scene.liquid, *(q for q in asked if q.name != scene.liquid.name))
+        rho = np.array([q.density for q in chosen])
+        tube = replace(scene.tube, drag_coefficient=None)
+        equal = scene.gas.pressure * rho / scene.liquid.density
+
+        def batch(pressure: FloatArray) -> LiquidBatch:
+            own = np.array([q.density_uncertainty for q in chosen])
+            own[0] = law.inputs.relative_density
+            return LiquidBatch(
+                kinematic_viscosity=np.array([q.kinematic_viscosity for q in chosen]),
+                density=rho,
+                gas_pressure=pressure,
+                vapour_pressure=np.array([q.vapour_pressure for q in chosen]) - vented_pressure(scene),
+                relative_density=own,
+                relative_viscosity=_viscosity_uncertainty(scene, chosen),
+            )
+
+        def points(pressure: FloatArray) -> DragPoint:
+            return DragPoint.of(scene=scene, law=law, tube=tube, batch=batch(pressure))
+
+        share = rho / law.density
+        bores = np.geomspace(*BORES, BORE_POINTS)
+        return cls(
+            liquids=chosen,
+            at_scene=points(np.full(rho.shape, scene.gas.pressure)),
+            at_equal_head=points(equal),
+            equal_head_pressure=equal,
+            starting_pressure=share * _starting_pressure(calibration),
+            velocity_paper_at_scene=_velocity_paper(rho, scene.gas.pressure),
+            velocity_paper_at_equal_head=_velocity_paper(rho, equal),
+            bore_for_paper=_bore_for_paper(bores, _stacked(_rows(calibration, bores, batch(equal)))),
+        )
+
     def velocity_errors(self) -> tuple[FloatArray, FloatArray]:
         """How far Eq. 19 with k = 50 is off for each liquid, relative to the operating point's velocity.
 
@@ -121,99 +211,10 @@ def _over(paper_velocity: npt.ArrayLike, point: DragPoint) -> FloatArray:
     return np.where(point.runs, np.asarray(paper_velocity, dtype=np.float64) / speed - 1, 0.0)
 
 
-def drag_map(
-    *,
-    calibration: Calibration,
-    bore: npt.ArrayLike | None = None,
-    kinematic_viscosity: npt.ArrayLike | None = None,
-) -> DragMap:
-    """Map k over bore and viscosity, each point at the device's own operating point.
-
-    Every point solves the flow at equal fills under the scene's gas pressure: siphon or separated, and, where
-    that gas does not prime the tube, the flow of a primed one.
-    Args: `bore`: d, m, rising, shape (n,); default 41 from 0.2 to 5 mm. `kinematic_viscosity`: nu, m^2/s,
-    rising, shape (m,); default 49 from 0.2 to 500 mm^2/s.
-    Raises: ValueError: values that are not positive, finite and rising, or arcs of bends longer than the
-    tube.
-    Range: as `tube_loss`; `point.in_range` says where a correlation is stretched.
-    Source: `drag_point` at every point.
-    """
-    scene = calibration.scene
-    d = _axis(bore, "bore", BORES, BORE_POINTS, scene.tube.bore)
-    nu = _axis(
-        kinematic_viscosity,
-        "kinematic_viscosity",
-        VISCOSITIES,
-        VISCOSITY_POINTS,
-        scene.liquid.kinematic_viscosity,
-    )
-    rho = scene.liquid.density
-    batch = LiquidBatch(
-        kinematic_viscosity=nu,
-        density=np.full(nu.shape, rho),
-        gas_pressure=np.full(nu.shape, scene.gas.pressure),
-        vapour_pressure=np.full(nu.shape, calibration.flow_law.path.vapour_pressure),
-        relative_density=np.full(nu.shape, calibration.flow_law.inputs.relative_density),
-        relative_viscosity=np.zeros(nu.shape),
-    )
-    rows = _rows(calibration, d, batch)
-    return DragMap(
-        bore=d,
-        kinematic_viscosity=nu,
-        density=rho,
-        gas_pressure=scene.gas.pressure,
-        point=_stacked(rows),
-        velocity_paper=float(_velocity_paper(rho, scene.gas.pressure)),
-    )
-
-
 def _roots(bore: FloatArray, k: FloatArray, wanted: float) -> FloatArray:
     table = PchipInterpolator(np.log(bore), np.log(k), extrapolate=False)
     found = np.asarray(table.solve(np.log(wanted), extrapolate=False), dtype=np.float64)
     return found[np.isfinite(found)]
-
-
-def liquid_verdicts(*, calibration: Calibration, liquids: Sequence[Liquid] | None = None) -> LiquidVerdicts:
-    """Hold k = 50 against liquids in the scene's own tube.
-
-    Args: `liquids`: those to ask; default the known ones at 20 degC or the next temperature with data.
-    Returns: LiquidVerdicts; the scene's own liquid stands first, another of its name is left out.
-    Source: `drag_point` for each liquid, its density and the spread of its properties included.
-    """
-    scene, law = calibration.scene, calibration.flow_law
-    asked = _default_liquids() if liquids is None else tuple(liquids)
-    chosen = (scene.liquid, *(q for q in asked if q.name != scene.liquid.name))
-    rho = np.array([q.density for q in chosen])
-    tube = replace(scene.tube, drag_coefficient=None)
-    equal = scene.gas.pressure * rho / scene.liquid.density
-
-    def batch(pressure: FloatArray) -> LiquidBatch:
-        own = np.array([q.density_uncertainty for q in chosen])
-        own[0] = law.inputs.relative_density
-        return LiquidBatch(
-            kinematic_viscosity=np.array([q.kinematic_viscosity for q in chosen]),
-            density=rho,
-            gas_pressure=pressure,
-            vapour_pressure=np.array([q.vapour_pressure for q in chosen]) - vented_pressure(scene),
-            relative_density=own,
-            relative_viscosity=_viscosity_uncertainty(scene, chosen),
-        )
-
-    def points(pressure: FloatArray) -> DragPoint:
-        return drag_point(scene=scene, law=law, tube=tube, batch=batch(pressure))
-
-    share = rho / law.density
-    bores = np.geomspace(*BORES, BORE_POINTS)
-    return LiquidVerdicts(
-        liquids=chosen,
-        at_scene=points(np.full(rho.shape, scene.gas.pressure)),
-        at_equal_head=points(equal),
-        equal_head_pressure=equal,
-        starting_pressure=share * _starting_pressure(calibration),
-        velocity_paper_at_scene=_velocity_paper(rho, scene.gas.pressure),
-        velocity_paper_at_equal_head=_velocity_paper(rho, equal),
-        bore_for_paper=_bore_for_paper(bores, _stacked(_rows(calibration, bores, batch(equal)))),
-    )
 
 
 def _viscosity_uncertainty(scene: Scene, liquids: tuple[Liquid, ...]) -> FloatArray:
@@ -259,7 +260,7 @@ def _rows(calibration: Calibration, bore: FloatArray, batch: LiquidBatch) -> lis
 
     def row(d: float) -> DragPoint:
         tube: Tube = replace(calibration.scene.tube, bore=d, drag_coefficient=None)
-        return drag_point(scene=calibration.scene, law=calibration.flow_law, tube=tube, batch=batch)
+        return DragPoint.of(scene=calibration.scene, law=calibration.flow_law, tube=tube, batch=batch)
 
     return [row(float(d)) for d in bore]
 
@@ -309,33 +310,35 @@ class ApparentDrag:
     excess_head: float
     """C, m^2/s^2, in separated = lower_bound + 2 C/u^2; not above zero, the siphon never separates."""
 
+    @classmethod
+    def of(cls, *, law: CalibratedLaw, velocity: npt.ArrayLike, opposite_fill_ratio: float) -> ApparentDrag:
+        """Read Eq. 18 off a separated siphon.
 
-def apparent_drag(*, law: CalibratedLaw, velocity: npt.ArrayLike, opposite_fill_ratio: float) -> ApparentDrag:
-    """Read Eq. 18 off a separated siphon.
-
-    Separated, (alpha + k_up) u^2/2 = (p_A - p_c + P_A - D_m)/rho, while Eq. 18 counts the head H_A - H_C =
-    (p_A - p_C + P_A - P_C)/rho. Their difference C = (D_m + p_c - P_C - p_C)/rho does not depend on what
-    drives the flow, so k = alpha + k_up - 1 + 2 C/u^2: at one fill of the opposite chamber the excess falls
-    exactly as 1/u^2, whatever the gas pressure and the driven chamber's fill.
-    Args: `velocity`: u, m/s, any shape, positive.
-    Raises: ValueError: a law without a crest, or a velocity that is not positive and finite.
-    Source: Eq. 18 of the liquid-ring paper and the crest's energy balance.
-    """
-    crest, crest_head = law.path.crest, law.heads.hump_head
-    if crest is None or crest_head is None:
-        raise ValueError("a tube without a siphon crest does not separate: give tube.hump_radius")
-    u = np.asarray(velocity, dtype=np.float64)
-    if not np.all(np.isfinite(u) & (u > 0)):
-        raise ValueError("velocity must be positive and finite")
-    ends = law.ends(fill_ratio=0.0, opposite_fill_ratio=opposite_fill_ratio)
-    excess = float(ends.driving_pressure() - crest.separation_margin(ends)) / law.density
-    siphon, lower_bound = (2 * np.exp(table(np.log(u))) / u**2 - 1 for table in (law.heads.head, crest_head))
-    separated = lower_bound + 2 * excess / u**2
-    return ApparentDrag(
-        velocity=u,
-        siphon=siphon,
-        separated=separated,
-        read=np.maximum(siphon, separated),
-        lower_bound=lower_bound,
-        excess_head=excess,
-    )
+        Separated, (alpha + k_up) u^2/2 = (p_A - p_c + P_A - D_m)/rho, while Eq. 18 counts the head
+        H_A - H_C = (p_A - p_C + P_A - P_C)/rho. Their difference C = (D_m + p_c - P_C - p_C)/rho does not
+        depend on what drives the flow, so k = alpha + k_up - 1 + 2 C/u^2: at one fill of the opposite chamber
+        the excess falls exactly as 1/u^2, whatever the gas pressure and the driven chamber's fill.
+        Args: `velocity`: u, m/s, any shape, positive.
+        Raises: ValueError: a law without a crest, or a velocity that is not positive and finite.
+        Source: Eq. 18 of the liquid-ring paper and the crest's energy balance.
+        """
+        crest, crest_head = law.path.crest, law.heads.hump_head
+        if crest is None or crest_head is None:
+            raise ValueError("a tube without a siphon crest does not separate: give tube.hump_radius")
+        u = np.asarray(velocity, dtype=np.float64)
+        if not np.all(np.isfinite(u) & (u > 0)):
+            raise ValueError("velocity must be positive and finite")
+        ends = law.ends(fill_ratio=0.0, opposite_fill_ratio=opposite_fill_ratio)
+        excess = float(ends.driving_pressure() - crest.separation_margin(ends)) / law.density
+        siphon, lower_bound = (
+            2 * np.exp(table(np.log(u))) / u**2 - 1 for table in (law.heads.head, crest_head)
+        )
+        separated = lower_bound + 2 * excess / u**2
+        return cls(
+            velocity=u,
+            siphon=siphon,
+            separated=separated,
+            read=np.maximum(siphon, separated),
+            lower_bound=lower_bound,
+            excess_head=excess,
+        )

@@ -84,6 +84,49 @@ class DragPoint:
     in_range: BoolArray
     """False where a correlation is stretched, as in `TubeLoss`."""
 
+    @classmethod
+    def of(cls, *, scene: Scene, law: CalibratedLaw, tube: Tube, batch: LiquidBatch) -> DragPoint:
+        """Find the tube's operating point at equal fills for each liquid.
+
+        siphon: (k + 1) u^2/2 = p/rho; separated: (alpha + k_up) u^2/2 = (p - p_c + P - D_m)/rho; of both the
+        smaller u.
+        Args: `tube`: the tube, which need not be the scene's. `batch`: liquids and gas pressures, shape (m,).
+        Returns: DragPoint, arrays of shape (m,).
+        Raises: ValueError: arcs of bends longer than the tube.
+        Source: Eqs. 13 to 18 of the liquid-ring paper, extended to the tube's crest; as `column_flow`.
+        """
+        drive = _drive(law, batch)
+        speed, excess = _velocity(scene, tube, batch, drive)
+        separated = np.asarray(drive.runs & (excess > 0))
+        shown = np.where(drive.runs, speed, 1.0)
+        state = _state(scene, tube, batch, shown)
+        parts = _parts(scene, tube, batch, shown, state)
+        width = np.sqrt(np.asarray(sum(p**2 for p in parts.values()), dtype=np.float64))
+        k = state.k
+        of_velocity, of_k = _half_widths(scene, tube, batch, drive, state, shown, separated, width)
+        notes = range_notes(tube=tube, state=state, velocity=shown)
+        outside = np.any(np.array([np.zeros(k.shape, dtype=np.bool_), *notes.values()]), axis=0)
+        flows = np.where(separated, Regime.SEPARATED, Regime.SIPHON)
+
+        def kept(values: FloatArray) -> FloatArray:
+            return np.where(drive.runs, values, 0.0)
+
+        return cls(
+            regime=np.asarray(np.where(drive.starts, flows, Regime.BLOCKED), dtype=np.int64),
+            runs=drive.runs,
+            separated=separated,
+            separation_excess=kept(excess),
+            velocity=kept(speed),
+            velocity_uncertainty=kept(of_velocity),
+            k=kept(k),
+            k_uncertainty=kept(width),
+            k_point_uncertainty=kept(of_k),
+            apparent_k=kept(2 * batch.gas_pressure / (batch.density * shown**2) - 1),
+            reynolds=kept(state.reynolds),
+            flow_state=flow_states(state),
+            in_range=np.asarray(~outside),
+        )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Drive:
@@ -97,48 +140,6 @@ class _Drive:
     separation_uncertainty: FloatArray
     runs: BoolArray
     starts: BoolArray
-
-
-def drag_point(*, scene: Scene, law: CalibratedLaw, tube: Tube, batch: LiquidBatch) -> DragPoint:
-    """Find the tube's operating point at equal fills for each liquid.
-
-    siphon: (k + 1) u^2/2 = p/rho; separated: (alpha + k_up) u^2/2 = (p - p_c + P - D_m)/rho, the smaller u.
-    Args: `tube`: the tube, which need not be the scene's. `batch`: liquids and gas pressures, shape (m,).
-    Returns: DragPoint, arrays of shape (m,).
-    Raises: ValueError: arcs of bends longer than the tube.
-    Source: Eqs. 13 to 18 of the liquid-ring paper, extended to the tube's crest; as `column_flow`.
-    """
-    drive = _drive(law, batch)
-    speed, excess = _velocity(scene, tube, batch, drive)
-    separated = np.asarray(drive.runs & (excess > 0))
-    shown = np.where(drive.runs, speed, 1.0)
-    state = _state(scene, tube, batch, shown)
-    parts = _parts(scene, tube, batch, shown, state)
-    width = np.sqrt(np.asarray(sum(p**2 for p in parts.values()), dtype=np.float64))
-    k = state.k
-    of_velocity, of_k = _half_widths(scene, tube, batch, drive, state, shown, separated, width)
-    notes = range_notes(tube=tube, state=state, velocity=shown)
-    outside = np.any(np.array([np.zeros(k.shape, dtype=np.bool_), *notes.values()]), axis=0)
-    flows = np.where(separated, Regime.SEPARATED, Regime.SIPHON)
-
-    def kept(values: FloatArray) -> FloatArray:
-        return np.where(drive.runs, values, 0.0)
-
-    return DragPoint(
-        regime=np.asarray(np.where(drive.starts, flows, Regime.BLOCKED), dtype=np.int64),
-        runs=drive.runs,
-        separated=separated,
-        separation_excess=kept(excess),
-        velocity=kept(speed),
-        velocity_uncertainty=kept(of_velocity),
-        k=kept(k),
-        k_uncertainty=kept(width),
-        k_point_uncertainty=kept(of_k),
-        apparent_k=kept(2 * batch.gas_pressure / (batch.density * shown**2) - 1),
-        reynolds=kept(state.reynolds),
-        flow_state=flow_states(state),
-        in_range=np.asarray(~outside),
-    )
 
 
 def _drive(law: CalibratedLaw, batch: LiquidBatch) -> _Drive:

@@ -14,7 +14,7 @@ from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.loop import simulate
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.law.building import nominal_law
-from ringbalance.reduced_model.law.model import BalancerModel, MomentCurve, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel, MomentCurve
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
@@ -53,7 +53,7 @@ def test_chambers_beside_their_middles_act_as_a_rotor_with_less_lag(exact: Scene
     beside = replace(exact, disc=turned(exact.disc, angle=ANGLE))
     less = replace(exact.rotor, lag_angle=exact.rotor.lag_angle - ANGLE)
     alike = replace(exact, disc=imported(exact.disc), rotor=less)
-    runs = [simulate(s, balancer_model(nominal_law(s, gravity=False))) for s in (beside, alike)]
+    runs = [simulate(s, BalancerModel.of(nominal_law(s, gravity=False))) for s in (beside, alike)]
     assert runs[0].amplitude.size == runs[1].amplitude.size
     np.testing.assert_allclose(runs[0].amplitude, runs[1].amplitude, rtol=1e-5, atol=1e-11)
 

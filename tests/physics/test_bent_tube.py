@@ -8,19 +8,14 @@ import pytest
 from ringbalance.mesh.bent_tube import Segment
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
-from ringbalance.verification.reference.bent_tube import (
-    BentTubeFlow,
-    bend_shift,
-    bent_tube_flow,
-    rotation_with_curvature,
-)
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, bend_shift, rotation_with_curvature
 
 COARSE = SectionMesh(around=2, across=2, wall_ratio=3.0)
 STRAIGHT = (Segment(length=2.0, cells=2),)
 
 
 def _straight(rotation: float, factor: float = 1.0) -> BentTubeFlow:
-    return bent_tube_flow(
+    return BentTubeFlow.of(
         segments=STRAIGHT,
         cells=COARSE,
         reynolds=200.0,
@@ -60,7 +55,7 @@ def test_half_the_coriolis_force_is_found_out() -> None:
 def test_the_mirrored_bend_has_the_same_loss_at_rest() -> None:
     losses = [
         _loss(
-            bent_tube_flow(
+            BentTubeFlow.of(
                 segments=(Segment(length=2.0, turn=turn, cells=4),),
                 cells=COARSE,
                 reynolds=20.0,
@@ -76,7 +71,7 @@ def test_the_mirrored_bend_has_the_same_loss_at_rest() -> None:
 def _excess_in_a_bend(dean: float, radius: float) -> float:
     """Developed gradient in a long bend over that of the straight tube on the same cells, less one."""
     re, length = float(np.sqrt(dean * radius)), 0.3 * radius + 10
-    flow = bent_tube_flow(
+    flow = BentTubeFlow.of(
         segments=(Segment(length=length, turn=length / radius, cells=int(length / 0.75)),),
         cells=COARSE,
         reynolds=re,
@@ -105,7 +100,7 @@ def test_gentle_bends_at_rest_tend_to_deans_series(dean: float) -> None:
 @pytest.mark.parametrize("turn", [np.pi / 2, -np.pi / 2])
 def test_a_turning_bend_is_curvature_added_to_rotation(turn: float) -> None:
     re, rotation, radius = 200.0, 117.8, 2.0
-    flow = bent_tube_flow(
+    flow = BentTubeFlow.of(
         segments=(
             Segment(length=2.0, cells=5, ratio=0.3),
             Segment(length=radius * abs(turn), turn=turn, cells=8),
@@ -144,4 +139,4 @@ def test_curvature_counts_as_rotation() -> None:
 )
 def test_bad_numbers_are_refused(re: float, rotation: float) -> None:
     with pytest.raises(ValueError, match="reynolds"):
-        bent_tube_flow(segments=STRAIGHT, cells=COARSE, reynolds=re, rotation_reynolds=rotation)
+        BentTubeFlow.of(segments=STRAIGHT, cells=COARSE, reynolds=re, rotation_reynolds=rotation)

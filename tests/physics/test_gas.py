@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.gas import GasLine, compression_work, gas_line, normal_volume, pressure_factor
+from ringbalance.physics.gas import GasLine, compression_work, normal_volume, pressure_factor
 from ringbalance.scene.models import Scene
 
 AMBIENT = 101325.0
@@ -72,9 +72,9 @@ def test_choked_to_the_end_filling_takes_its_lower_bound(conductance: float, by_
 
 def test_a_line_needs_both_of_its_numbers(paper_scene: Scene) -> None:
     gas = dataclasses.replace(paper_scene.gas, conductance=None, critical_ratio=None)
-    assert gas_line(gas) is None
-    assert gas_line(dataclasses.replace(gas, conductance=1e-8)) is None
-    own = gas_line(dataclasses.replace(gas, conductance=1e-8, critical_ratio=0.3))
+    assert GasLine.of(gas) is None
+    assert GasLine.of(dataclasses.replace(gas, conductance=1e-8)) is None
+    own = GasLine.of(dataclasses.replace(gas, conductance=1e-8, critical_ratio=0.3))
     assert own is not None
     assert own.supply_pressure == gas.pressure + gas.ambient_pressure
 

@@ -23,7 +23,7 @@ from ringbalance.physics.sloshing.projection import Fields
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.scene.models import Disc
 from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber, sector_chamber
-from ringbalance.verification.reference.sloshing_exact import cosine_waves
+from ringbalance.verification.reference.sloshing_exact import CosineWaves
 
 _FILL, _NU, _OMEGA = 0.25, 1e-6, 1000.0
 
@@ -112,7 +112,7 @@ def test_straight_cells_on_a_round_wall_are_in_the_uncertainty(
 ) -> None:
     geometry = sector_chamber(cells, radii=(0.5, 1.0), angle=np.pi / 2, width=0.3, kind="hexahedron")
     lowest = ring_waves(geometry=geometry, surface_radius=0.8, modes=4).frequency_ratio
-    exact = cosine_waves(central_angle=np.pi / 2, depth=float(np.log(1 / 0.8))).frequencies(modes=2)
+    exact = CosineWaves.of(central_angle=np.pi / 2, depth=float(np.log(1 / 0.8))).frequencies(modes=2)
     assert np.all(np.abs(lowest.value[:2] - exact) <= lowest.uncertainty[:2])
     assert lowest.uncertainty[0] <= widest * exact[0]
 
@@ -155,7 +155,7 @@ def test_no_wave_of_a_short_chamber_is_missing(width: float) -> None:
     radius, angle = 0.76, np.pi / 2
     geometry = sector_chamber((8, 16, 6), radii=(0.5, 1.0), angle=angle, width=width)
     waves = ring_waves(geometry=geometry, surface_radius=radius, modes=7).frequency_ratio
-    plane = cosine_waves(central_angle=angle, depth=float(np.log(1 / radius))).frequencies(modes=6)
+    plane = CosineWaves.of(central_angle=angle, depth=float(np.log(1 / radius))).frequencies(modes=6)
     exact = np.sort(np.concatenate([plane, _waves_along(radius, angle, width)]))[:7]
     assert np.all(np.abs(waves.value - exact) <= waves.uncertainty)
     # A wave along this chamber is resolved by six cells.

@@ -23,10 +23,10 @@ from published_flows import (
 from skfem import MeshHex, MeshTet
 
 from ringbalance.physics.results import StatusCode
-from ringbalance.verification.navier_stokes.meshes import patch_mesh, tensor_patch
+from ringbalance.verification.navier_stokes.meshes import Patch, patch_mesh
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
-from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 DATA = Path(__file__).parent / "data"
 
@@ -34,7 +34,7 @@ DATA = Path(__file__).parent / "data"
 def _square(cells: int, shape: str = "triangle") -> object:
     line = np.linspace(0.0, 1.0, 2 * cells + 1)
     sides = dict.fromkeys(("west", "east", "south", "north"), "wall")
-    return patch_mesh(patches=[tensor_patch(x=line, y=line, sides=sides)], shape=shape)
+    return patch_mesh(patches=[Patch.tensor(x=line, y=line, sides=sides)], shape=shape)
 
 
 def _orders(coarse: FieldErrors, fine: FieldErrors) -> list[float]:
@@ -182,8 +182,8 @@ def test_three_components_with_coriolis_converge_at_third_order() -> None:
     errors = []
     for cells in (4, 8):
         conditions = [Dirichlet(boundary="wall", component=c, value=partial(_component, c)) for c in range(3)]
-        space = taylor_hood(mesh=_square(cells), components=3)
-        system = flow_system(
+        space = FlowSpace.taylor_hood(mesh=_square(cells), components=3)
+        system = FlowSystem.of(
             space=space,
             conditions=conditions,
             enclosed=True,
@@ -201,8 +201,8 @@ def test_three_components_with_coriolis_converge_at_third_order() -> None:
 
 def _random_system() -> tuple[FlowSystem, np.ndarray]:
     conditions = [Dirichlet(boundary="wall", component=c) for c in range(3)]
-    space = taylor_hood(mesh=_square(2), components=3)
-    system = flow_system(space=space, conditions=conditions, enclosed=True, coriolis=CORIOLIS)
+    space = FlowSpace.taylor_hood(mesh=_square(2), components=3)
+    system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, coriolis=CORIOLIS)
     return system, np.random.default_rng(0).normal(size=space.unknowns)
 
 
@@ -242,8 +242,8 @@ def test_a_flow_inside_the_space_is_exact_in_three_dimensions(kind: Any) -> None
     conditions = [
         Dirichlet(boundary="wall", component=c, value=partial(_square_of_next, c)) for c in range(3)
     ]
-    space = taylor_hood(mesh=mesh)
-    system = flow_system(space=space, conditions=conditions, enclosed=True, body_force=_solid_force)
+    space = FlowSpace.taylor_hood(mesh=mesh)
+    system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, body_force=_solid_force)
     solution = solve_flow(system=system, coefficients=Coefficients(viscosity=0.5))
     assert solution.status.ok
     at = space.node_coordinates()
@@ -256,7 +256,7 @@ def test_a_flow_inside_the_space_is_exact_in_three_dimensions(kind: Any) -> None
 def test_a_failed_solve_says_what_to_do() -> None:
     conditions = [Dirichlet(boundary="wall", component=0, value=lambda x: np.where(x[1] == 1, 1.0, 0.0))]
     conditions += [Dirichlet(boundary="wall", component=1)]
-    system = flow_system(space=taylor_hood(mesh=_square(4)), conditions=conditions, enclosed=True)
+    system = FlowSystem.of(space=FlowSpace.taylor_hood(mesh=_square(4)), conditions=conditions, enclosed=True)
     solution = solve_flow(
         system=system, coefficients=Coefficients(viscosity=1e-5), settings=NewtonSettings(max_iterations=4)
     )
@@ -270,9 +270,9 @@ def test_bad_arguments_are_refused() -> None:
     with pytest.raises(ValueError, match="viscosity"):
         solve_flow(system=system, coefficients=Coefficients(viscosity=0.0))
     with pytest.raises(ValueError, match="no boundary 'lid'"):
-        flow_system(space=system.space, conditions=[Dirichlet(boundary="lid", component=0)])
+        FlowSystem.of(space=system.space, conditions=[Dirichlet(boundary="lid", component=0)])
     with pytest.raises(ValueError, match="coriolis"):
-        flow_system(space=system.space, conditions=[], coriolis=np.eye(2))
+        FlowSystem.of(space=system.space, conditions=[], coriolis=np.eye(2))
     other = kovasznay_flow(cells=2)[1]
     with pytest.raises(ValueError, match="start"):
         solve_flow(system=system, coefficients=Coefficients(), start=other)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from ringbalance.verification.navier_stokes.linear import factorize, factorize_layers, layers_of
+from ringbalance.verification.navier_stokes.linear import Factors, factorize_layers, layers_of
 
 
 def _matrix(slabs: int, seed: int) -> tuple[sparse.csc_matrix, np.ndarray]:
@@ -35,7 +35,7 @@ def test_the_solution_is_that_of_dense_algebra(slabs: int) -> None:
     right = np.random.default_rng(0).normal(size=matrix.shape[0])
     x = factorize_layers(matrix=matrix, layers=layers).solve(right)
     assert np.allclose(x, np.linalg.solve(matrix.toarray(), right), rtol=1e-9, atol=1e-10)
-    refined = factorize(matrix=matrix, along_diagonal=False, layers=layers).solve(right)
+    refined = Factors.of(matrix=matrix, along_diagonal=False, layers=layers).solve(right)
     assert np.abs(matrix @ refined - right).max() < 1e-12
 
 

@@ -21,9 +21,7 @@ from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.reference.sloshing_exact import (
-    cosine_waves,
-)
+from ringbalance.verification.reference.sloshing_exact import CosineWaves
 
 OMEGA = 10_000 * np.pi / 30
 
@@ -44,7 +42,7 @@ def test_frequencies_match_an_independent_spectral_solution(disc: Disc, angle: f
     chamber = bare(disc, np.radians(angle))
     found = sloshing_modes(disc=chamber, fill_ratio=fill, modes=4)
     depth = float(np.log(disc.outer_radius / found.surface_radius[0]))
-    exact = cosine_waves(central_angle=np.radians(angle), depth=depth).frequencies(modes=4)
+    exact = CosineWaves.of(central_angle=np.radians(angle), depth=depth).frequencies(modes=4)
     assert found.frequency_ratio.value[0] == pytest.approx(exact, rel=1e-4)
     assert np.all(
         np.abs(found.frequency_ratio.value[0] - exact) < found.frequency_ratio.uncertainty[0] + 2e-6
@@ -125,7 +123,7 @@ def test_forced_swing_matches_the_spectral_one(disc: Disc, s: float) -> None:
         frequency_ratio=s,
     )
     depth = float(np.log(disc.outer_radius / found.surface_radius[0]))
-    waves = cosine_waves(central_angle=np.pi / 2, depth=depth)
+    waves = CosineWaves.of(central_angle=np.pi / 2, depth=depth)
     exact = waves.amplification(frequency_ratio=s)
     assert found.amplification.value[0] == pytest.approx(exact, rel=1e-4)
     assert found.damped_share[0] == 1.0

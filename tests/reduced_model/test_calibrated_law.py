@@ -17,9 +17,9 @@ from ringbalance.reduced_model.law.building import calibrated_law, column_pressu
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.point import priming_pressure
-from ringbalance.reduced_model.operating.pressure_profile import hump_profile
+from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.reduced_model.selection.range_flow import range_flow
-from ringbalance.reduced_model.tube.heads import tube_heads
+from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.models import HumpGas, Scene
 
 AMBIENT = 101325.0
@@ -34,7 +34,7 @@ def variant(scene: Scene, *, speed: float | None = None, **tube: object) -> Cali
     """Law of the paper's disc with another tube or speed."""
     rotor = dataclasses.replace(scene.rotor, speed=speed or scene.rotor.speed)
     changed = dataclasses.replace(scene, tube=dataclasses.replace(scene.tube, **tube), rotor=rotor)  # type: ignore[arg-type]
-    return calibrated_law(scene=changed, chamber=calibrate_chamber(changed), heads=tube_heads(changed))
+    return calibrated_law(scene=changed, chamber=calibrate_chamber(changed), heads=TubeHeads.of(changed))
 
 
 @pytest.fixture(scope="module")
@@ -251,7 +251,7 @@ def test_pressures_on_the_shaft_are_those_on_the_liquid_times_the_columns_ratio(
         np.testing.assert_allclose(one.velocity, other.velocity, rtol=1e-9)
         assert np.array_equal(one.regime, other.regime)
         lines = [
-            hump_profile(scene=each, law=law, fill_ratio=0.25, gas_pressure=f * p).pressure
+            HumpProfile.of(scene=each, law=law, fill_ratio=0.25, gas_pressure=f * p).pressure
             for each, law, f in zip((on_shaft, on_liquid), laws, (1.0, ratio), strict=True)
         ]
         np.testing.assert_allclose(lines[0], lines[1], rtol=1e-9, atol=1e-3)
@@ -299,7 +299,7 @@ def test_spread_of_the_heads_never_falls_below_that_of_k(
         liquid=dataclasses.replace(point_scene.liquid, kinematic_viscosity=viscosity),
         rotor=dataclasses.replace(point_scene.rotor, speed=speed),
     )
-    heads = tube_heads(scene)
+    heads = TubeHeads.of(scene)
     u = np.geomspace(2e-5, 5e2, 20001)
     loss = tube_loss(scene, u)
     exact = loss.k.uncertainty / (loss.k.value + 1)

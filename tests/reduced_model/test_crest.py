@@ -18,8 +18,8 @@ from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import hump_profile
-from ringbalance.reduced_model.tube.heads import tube_heads
+from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
+from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.path import crest_span, path_radius, share_at_radius
 from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.models import InputUncertainty, Scene
@@ -43,7 +43,7 @@ def changed(scene: Scene, *, viscosity: float | None = None, **tube: Any) -> Sce
 
 
 def law_of(scene: Scene) -> CalibratedLaw:
-    return calibrated_law(scene=scene, chamber=calibrate_chamber(scene), heads=tube_heads(scene))
+    return calibrated_law(scene=scene, chamber=calibrate_chamber(scene), heads=TubeHeads.of(scene))
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +142,7 @@ def test_a_short_arc_tends_to_the_point(point_scene: Scene) -> None:
 
 
 def test_pressure_along_the_path_falls_over_the_arc(table_1_scene: Scene, law: CalibratedLaw) -> None:
-    found = hump_profile(scene=table_1_scene, law=law, fill_ratio=0.1, gas_pressure=1.5e6)
+    found = HumpProfile.of(scene=table_1_scene, law=law, fill_ratio=0.1, gas_pressure=1.5e6)
     start, end = (share * LENGTH for share in crest_span(table_1_scene.tube))
     on_arc = (found.path > start) & (found.path < end)
     assert np.all(found.radius[on_arc] == CREST)
@@ -205,7 +205,7 @@ def test_the_regime_cannot_be_told_within_its_uncertainty(table_1_scene: Scene, 
     assert [r for r in order if r in FLOWS] == [Regime.SEPARATED, Regime.UNDECIDED, Regime.SIPHON]
     assert Regime.UNDECIDED.label == "cannot be told"
     for i in np.linspace(0, p.size - 1, 60).astype(int):
-        found = hump_profile(
+        found = HumpProfile.of(
             scene=table_1_scene, law=law, fill_ratio=0.25, gas_pressure=float(p[i]), primed=True, points=3
         )
         margin, width = found.cavitation_margin, found.cavitation_margin_uncertainty

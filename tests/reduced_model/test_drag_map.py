@@ -10,12 +10,8 @@ import pytest
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.reports.studies.drag_map import (
-    LiquidVerdicts,
-    drag_map,
-    liquid_verdicts,
-)
+from ringbalance.reduced_model.tube.heads import TubeHeads
+from ringbalance.reports.studies.drag_map import DragMap, LiquidVerdicts
 from ringbalance.scene.liquids import liquid_at
 from ringbalance.scene.models import InputUncertainty, Scene
 
@@ -43,9 +39,9 @@ def moved(scene: Scene, bore: float, viscosity: float) -> Scene:
 def test_a_point_is_what_law_and_tube_loss_say(
     calibration: Calibration, bore: float, viscosity: float
 ) -> None:
-    found = drag_map(calibration=calibration, bore=[bore], kinematic_viscosity=[viscosity]).point
+    found = DragMap.of(calibration=calibration, bore=[bore], kinematic_viscosity=[viscosity]).point
     scene = moved(calibration.scene, bore, viscosity)
-    law = replace(calibration.flow_law, heads=tube_heads(scene))
+    law = replace(calibration.flow_law, heads=TubeHeads.of(scene))
     x = law.max_fill_ratio / 2
     flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=True)
     loss = tube_loss(scene, flow.velocity)
@@ -65,8 +61,8 @@ def test_a_point_holds_the_gas_column_as_the_law_does(calibration: Calibration) 
     on_shaft = calibrate(replace(calibration.scene, gas=gas))
     law, (bore, viscosity) = on_shaft.flow_law, POINTS[0]
     scene = moved(on_shaft.scene, bore, viscosity)
-    point = drag_map(calibration=on_shaft, bore=[bore], kinematic_viscosity=[viscosity]).point
-    flow = replace(law, heads=tube_heads(scene)).evaluate(
+    point = DragMap.of(calibration=on_shaft, bore=[bore], kinematic_viscosity=[viscosity]).point
+    flow = replace(law, heads=TubeHeads.of(scene)).evaluate(
         fill_ratio=0.25, opposite_fill_ratio=0.25, gas_pressure=scene.gas.pressure, primed=True
     )
     assert point.velocity[0, 0] == pytest.approx(float(flow.velocity), rel=1e-8)
@@ -78,7 +74,7 @@ def test_stated_inputs_spread_k_as_they_do_in_tube_loss(calibration: Calibration
         for name in ("length", "speed", "roughness", "bore")
     )
     scene = replace(calibration.scene, uncertainty=stated)
-    found = drag_map(
+    found = DragMap.of(
         calibration=with_scene(calibration, scene), bore=[1.2e-3], kinematic_viscosity=[2e-6]
     ).point
     # The bore is a coordinate of the map.
@@ -88,17 +84,17 @@ def test_stated_inputs_spread_k_as_they_do_in_tube_loss(calibration: Calibration
 
 
 def test_the_contour_is_really_at_fifty(calibration: Calibration) -> None:
-    nu, bore = drag_map(calibration=calibration).contour()
+    nu, bore = DragMap.of(calibration=calibration).contour()
     assert nu.size > 20
     for one, d in zip(nu[::7], bore[::7], strict=True):
-        point = drag_map(calibration=calibration, bore=[d], kinematic_viscosity=[one]).point
+        point = DragMap.of(calibration=calibration, bore=[d], kinematic_viscosity=[one]).point
         assert point.k[0, 0] == pytest.approx(50, rel=2e-3)
 
 
 def test_where_the_apparent_k_is_fifty_eq_19_has_the_velocity(calibration: Calibration) -> None:
-    found = drag_map(calibration=calibration)
+    found = DragMap.of(calibration=calibration)
     nu, bore = found.contour(apparent=True)
-    one = drag_map(calibration=calibration, bore=[bore[10]], kinematic_viscosity=[nu[10]])
+    one = DragMap.of(calibration=calibration, bore=[bore[10]], kinematic_viscosity=[nu[10]])
     assert one.velocity_error[0, 0] == pytest.approx(0, abs=2e-3)
     np.testing.assert_allclose(
         found.velocity_error, np.sqrt((found.point.apparent_k + 1) / 51) - 1, rtol=1e-10, atol=1e-12
@@ -106,7 +102,7 @@ def test_where_the_apparent_k_is_fifty_eq_19_has_the_velocity(calibration: Calib
 
 
 def test_separated_columns_look_like_more_drag(calibration: Calibration) -> None:
-    point = drag_map(calibration=calibration).point
+    point = DragMap.of(calibration=calibration).point
     separated = point.regime == Regime.SEPARATED
     assert np.any(separated)
     assert np.any(~separated)
@@ -123,7 +119,7 @@ def test_a_wrong_loss_moves_the_operating_point_as_the_half_width_says(
         tube = replace(calibration.scene.tube, extra_loss=extra)
         calm = replace(calibration.scene, tube=tube)
         law = replace(calibration.flow_law, inputs=replace(calibration.flow_law.inputs, relative_density=0.0))
-        point = drag_map(
+        point = DragMap.of(
             calibration=replace(calibration, scene=calm, flow_law=law),
             bore=[bore],
             kinematic_viscosity=[viscosity],
@@ -135,7 +131,7 @@ def test_a_wrong_loss_moves_the_operating_point_as_the_half_width_says(
 
 
 def test_the_default_map_holds_the_scene(calibration: Calibration) -> None:
-    found = drag_map(calibration=calibration)
+    found = DragMap.of(calibration=calibration)
     tube, liquid = calibration.scene.tube, calibration.scene.liquid
     assert found.bore[0] < tube.bore < found.bore[-1]
     assert found.kinematic_viscosity[0] < liquid.kinematic_viscosity < found.kinematic_viscosity[-1]
@@ -147,22 +143,22 @@ def test_prescribed_k_is_lifted(calibration: Calibration) -> None:
     scene = calibration.scene
     prescribed = replace(scene, tube=replace(scene.tube, drag_coefficient=50.0))
     grid = {"bore": [1e-3, 2e-3], "kinematic_viscosity": [1e-6, 1e-4]}
-    plain = drag_map(calibration=calibration, **grid)
-    lifted = drag_map(calibration=with_scene(calibration, prescribed), **grid)
+    plain = DragMap.of(calibration=calibration, **grid)
+    lifted = DragMap.of(calibration=with_scene(calibration, prescribed), **grid)
     np.testing.assert_array_equal(plain.point.k, lifted.point.k)
 
 
 def test_without_a_hump_every_point_is_a_siphon(calibration: Calibration) -> None:
     law = calibration.flow_law
     straight = replace(calibration, flow_law=replace(law, path=replace(law.path, hump_pressure=None)))
-    point = drag_map(calibration=straight).point
+    point = DragMap.of(calibration=straight).point
     assert np.all(point.regime == Regime.SIPHON)
     np.testing.assert_allclose(point.apparent_k, point.k, rtol=1e-9)
 
 
 def test_a_gas_that_drives_nothing_maps_nothing(calibration: Calibration) -> None:
     scene = replace(calibration.scene, gas=replace(calibration.scene.gas, pressure=0.0))
-    found = drag_map(calibration=with_scene(calibration, scene))
+    found = DragMap.of(calibration=with_scene(calibration, scene))
     assert not np.any(found.point.runs)
     assert np.all(found.point.regime == Regime.BLOCKED)
     assert np.all(found.point.k == 0)
@@ -183,19 +179,19 @@ BAD = [
 @pytest.mark.parametrize(("given", "told"), BAD)
 def test_bad_axes_are_refused(calibration: Calibration, given: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):
-        drag_map(calibration=calibration, **given)  # type: ignore[arg-type]
+        DragMap.of(calibration=calibration, **given)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("k", [0.0, -1.0, np.nan, np.inf])
 def test_a_contour_of_no_k_is_refused(calibration: Calibration, k: float) -> None:
-    found = drag_map(calibration=calibration, bore=[1e-3], kinematic_viscosity=[1e-6])
+    found = DragMap.of(calibration=calibration, bore=[1e-3], kinematic_viscosity=[1e-6])
     with pytest.raises(ValueError, match="k must be positive"):
         found.contour(k=k)
 
 
 @pytest.fixture(scope="module")
 def verdicts(calibration: Calibration) -> LiquidVerdicts:
-    return liquid_verdicts(calibration=calibration)
+    return LiquidVerdicts.of(calibration=calibration)
 
 
 def test_the_scenes_liquid_comes_first_and_agrees_with_the_calibration(
@@ -225,7 +221,7 @@ def test_a_dense_liquid_starts_at_just_its_starting_pressure(
     for factor, flows in ((0.999, False), (1.001, True)):
         gas = replace(calibration.scene.gas, pressure=factor * start)
         asked = with_scene(calibration, replace(calibration.scene, gas=gas))
-        found = liquid_verdicts(calibration=asked, liquids=[gallium])
+        found = LiquidVerdicts.of(calibration=asked, liquids=[gallium])
         assert bool(found.at_scene.regime[1] != Regime.BLOCKED) is flows
 
 
@@ -237,7 +233,7 @@ def test_equal_heads_make_equal_flow_whatever_the_density(calibration: Calibrati
         density=own.density / 2,
         vapour_pressure=(own.vapour_pressure - ambient) / 2 + ambient,
     )
-    found = liquid_verdicts(calibration=calibration, liquids=[light]).at_equal_head
+    found = LiquidVerdicts.of(calibration=calibration, liquids=[light]).at_equal_head
     for values in (found.velocity, found.k, found.apparent_k):
         assert values[1] == pytest.approx(values[0], rel=1e-9)
 
@@ -246,7 +242,7 @@ def test_the_bore_for_fifty_has_fifty(calibration: Calibration, verdicts: Liquid
     index = [liquid.name for liquid in verdicts.liquids].index("silicone oil 50 cSt")
     tube = replace(calibration.scene.tube, bore=float(verdicts.bore_for_paper[index]))
     asked = with_scene(calibration, replace(calibration.scene, tube=tube))
-    found = liquid_verdicts(calibration=asked, liquids=[verdicts.liquids[index]])
+    found = LiquidVerdicts.of(calibration=asked, liquids=[verdicts.liquids[index]])
     assert found.at_equal_head.k[1] == pytest.approx(50, rel=2e-3)
 
 

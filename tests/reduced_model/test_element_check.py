@@ -9,8 +9,8 @@ import pytest
 
 from ringbalance.physics.results import StatusCode
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reduced_model.chamber.element_check import element_check
-from ringbalance.reduced_model.chamber.values import ring_values
+from ringbalance.reduced_model.chamber.element_check import ElementCheck
+from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Scene
 
@@ -29,10 +29,10 @@ def test_the_closed_forms_are_checked_at_both_ends_of_the_range(table_1_calibrat
 @pytest.mark.parametrize("quantity", ["wall_pressure", "moment", "moment_per_volume"])
 def test_a_wrong_closed_form_is_noticed(table_1_scene: Scene, quantity: str) -> None:
     fills = np.linspace(0.0, table_1_scene.disc.max_fill_ratio, 11)
-    values = ring_values(table_1_scene, fill_ratio=fills, gravity=False)
+    values = RingValues.of(table_1_scene, fill_ratio=fills, gravity=False)
     right = getattr(values, quantity)
     wrong = dataclasses.replace(right, value=right.value * (1 + 1e-4))
-    check = element_check(
+    check = ElementCheck.of(
         table_1_scene, values=dataclasses.replace(values, **{quantity: wrong}), gravity=False
     )
     assert check.status.code is StatusCode.NOT_CONVERGED
@@ -42,9 +42,9 @@ def test_a_wrong_closed_form_is_noticed(table_1_scene: Scene, quantity: str) -> 
 
 def test_a_tighter_tolerance_takes_a_finer_mesh(table_1_scene: Scene) -> None:
     fills = np.linspace(0.0, table_1_scene.disc.max_fill_ratio, 11)
-    values = ring_values(table_1_scene, fill_ratio=fills, gravity=False)
-    tight = element_check(dataclasses.replace(table_1_scene, tolerance=1e-5), values=values, gravity=False)
-    loose = element_check(table_1_scene, values=values, gravity=False)
+    values = RingValues.of(table_1_scene, fill_ratio=fills, gravity=False)
+    tight = ElementCheck.of(dataclasses.replace(table_1_scene, tolerance=1e-5), values=values, gravity=False)
+    loose = ElementCheck.of(table_1_scene, values=values, gravity=False)
     assert tight.elements.cells[0] > loose.elements.cells[0]
     assert np.all(tight.allowed["wall_pressure"] < loose.allowed["wall_pressure"] / 20)
 

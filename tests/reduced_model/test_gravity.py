@@ -11,8 +11,8 @@ import pytest
 
 from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.physics.pressure.ring import ring_quantities
-from ringbalance.reduced_model.chamber.gravity import GravityEffect, check_ring, closed_ring, gravity_effect
-from ringbalance.reduced_model.chamber.tilted_ring import tilted_ring
+from ringbalance.reduced_model.chamber.gravity import GravityEffect, check_ring, closed_ring
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing
 from ringbalance.scene import SceneError
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Shaft
@@ -66,7 +66,7 @@ def test_the_effect_agrees_with_finite_elements(table_1_scene: Scene, shaft: Sha
         "fill_ratio": x,
     }
     plain, heavy = ring_quantities(**common), ring_quantities(**common, gravity=9.80665, shaft=shaft)
-    effect = gravity_effect(scene, fill_ratio=x)
+    effect = GravityEffect.of(scene, fill_ratio=x)
     for found, values in (
         (heavy.wall_pressure.value - plain.wall_pressure.value, effect.wall_pressure),
         (heavy.moment.value - plain.moment.value, effect.moment),
@@ -127,7 +127,7 @@ def test_the_quadrature_meets_the_series(table_1_scene: Scene, shaft: Shaft) -> 
     errors = []
     for omega in (150.0, 300.0):
         scene = turning(table_1_scene, omega, shaft, plates=0.0)
-        series, found = by_series(scene, fills), gravity_effect(scene, fill_ratio=fills)
+        series, found = by_series(scene, fills), GravityEffect.of(scene, fill_ratio=fills)
         errors.append(np.abs(found.moment / series.moment - 1))
         np.testing.assert_allclose(found.wall_pressure, series.wall_pressure, rtol=4e-3, atol=1e-8)
     assert np.all(errors[0] < 4e-3)
@@ -136,7 +136,7 @@ def test_the_quadrature_meets_the_series(table_1_scene: Scene, shaft: Shaft) -> 
 
 def test_an_open_ring_loses_less_than_the_series_says(table_1_scene: Scene) -> None:
     scene, fills = turning(table_1_scene, 50.0, plates=0.0), np.array([0.0, 0.005, 0.02])
-    series, found = by_series(scene, fills), gravity_effect(scene, fill_ratio=fills)
+    series, found = by_series(scene, fills), GravityEffect.of(scene, fill_ratio=fills)
     assert found.wall_pressure[0] == 0.0
     assert np.all(found.wall_pressure[1:] < series.wall_pressure[1:])
     whole = 1000.0 * 50.0**2 * (0.0445**2 - 0.0442**2) / 2
@@ -171,7 +171,7 @@ def test_an_open_ring_against_a_grid(table_1_scene: Scene, shaft: Shaft) -> None
         pressures.append(np.mean(np.maximum(wall - level, 0.0)))
         cosine = np.cos(alpha * middle) if shaft == "horizontal" else np.sin(alpha) / alpha
         moments.append(np.mean((outer**3 - surface**1.5) * cosine))
-    found = tilted_ring(scene, np.array([fill]))
+    found = TiltedRing.of(scene, np.array([fill]))
     assert not found.closed[0]
     assert found.wall_pressure[0] == pytest.approx(1000 * 45.0**2 / 2 * np.mean(pressures), rel=1e-3)
     assert found.moment[0] == pytest.approx(

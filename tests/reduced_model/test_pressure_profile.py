@@ -16,9 +16,9 @@ from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, ca
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import HumpProfile, hump_profile
-from ringbalance.reduced_model.tube.heads import tube_heads
-from ringbalance.reports.studies.drag_map import apparent_drag
+from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
+from ringbalance.reduced_model.tube.heads import TubeHeads
+from ringbalance.reports.studies.drag_map import ApparentDrag
 from ringbalance.scene.models import InputUncertainty, Scene
 
 AMBIENT, VAPOUR, DENSITY = 101325.0, 2339.0, 1000.0
@@ -32,7 +32,7 @@ def law(point_calibration: Calibration) -> CalibratedLaw:
 def variant(scene: Scene, **tube: object) -> tuple[Scene, CalibratedLaw]:
     """The paper's disc with another tube; the chamber is the same."""
     changed = dataclasses.replace(scene, tube=dataclasses.replace(scene.tube, **tube))  # type: ignore[arg-type]
-    return changed, calibrated_law(scene=changed, chamber=_chamber(scene), heads=tube_heads(changed))
+    return changed, calibrated_law(scene=changed, chamber=_chamber(scene), heads=TubeHeads.of(changed))
 
 
 _CHAMBERS: dict[str, ChamberCalibration] = {}
@@ -50,7 +50,7 @@ def column(scene: Scene, inner: float, outer: float) -> float:
 def test_siphon_agrees_with_the_energy_balance_at_hump_and_ends(
     point_scene: Scene, law: CalibratedLaw
 ) -> None:
-    found = hump_profile(scene=point_scene, law=law, fill_ratio=0.1, gas_pressure=0.9e6)
+    found = HumpProfile.of(scene=point_scene, law=law, fill_ratio=0.1, gas_pressure=0.9e6)
     assert found.regime is Regime.SIPHON
     assert np.all(found.full)
     loss = tube_loss(point_scene, found.velocity)
@@ -67,7 +67,7 @@ def test_siphon_agrees_with_the_energy_balance_at_hump_and_ends(
 
 
 def test_drops_at_ends_and_bends_and_the_even_slope_between(point_scene: Scene, law: CalibratedLaw) -> None:
-    found = hump_profile(scene=point_scene, law=law, fill_ratio=0.1, gas_pressure=0.9e6)
+    found = HumpProfile.of(scene=point_scene, law=law, fill_ratio=0.1, gas_pressure=0.9e6)
     loss = tube_loss(point_scene, found.velocity)
     terms = {name: float(term) for name, term in loss.terms.items()}
     alpha = float(loss.state.kinetic_factor)
@@ -89,7 +89,7 @@ def test_drops_at_ends_and_bends_and_the_even_slope_between(point_scene: Scene, 
 def test_separated_tube_is_full_again_where_the_opposite_chamber_holds_the_column(
     point_scene: Scene, law: CalibratedLaw
 ) -> None:
-    found = hump_profile(scene=point_scene, law=law, fill_ratio=0.4, gas_pressure=0.7e6)
+    found = HumpProfile.of(scene=point_scene, law=law, fill_ratio=0.4, gas_pressure=0.7e6)
     assert found.regime is Regime.SEPARATED
     assert found.hump_pressure == pytest.approx(VAPOUR - AMBIENT, rel=1e-6)
     assert found.cavitation_margin is not None
@@ -113,7 +113,7 @@ def test_separated_tube_is_full_again_where_the_opposite_chamber_holds_the_colum
 
 
 def test_blocked_legs_stand_at_the_chambers_levels(point_scene: Scene, law: CalibratedLaw) -> None:
-    found = hump_profile(scene=point_scene, law=law, fill_ratio=0.25, gas_pressure=0.0)
+    found = HumpProfile.of(scene=point_scene, law=law, fill_ratio=0.25, gas_pressure=0.0)
     assert found.regime is Regime.BLOCKED
     first, second = np.flatnonzero(np.diff(found.full))
     surface = np.sqrt(44.5e-3**2 - 2 * float(law.wall_pressure(0.25)) / DENSITY / point_scene.rotor.speed**2)
@@ -125,14 +125,14 @@ def test_blocked_legs_stand_at_the_chambers_levels(point_scene: Scene, law: Cali
 def test_trapped_gas_obeys_boyle_or_leaves_at_the_port(point_scene: Scene) -> None:
     scene, law = variant(point_scene, hump_gas="trapped")
     before, after = (
-        hump_profile(scene=scene, law=law, fill_ratio=0.25, gas_pressure=p) for p in (0.0, 0.1e6)
+        HumpProfile.of(scene=scene, law=law, fill_ratio=0.25, gas_pressure=p) for p in (0.0, 0.1e6)
     )
     length = [float(np.ptp(each.path[~each.full])) for each in (before, after)]
     pressure = [float(each.pressure[~each.full][0]) + AMBIENT for each in (before, after)]
     assert pressure[1] > pressure[0] == AMBIENT
     assert pressure[0] * length[0] == pytest.approx(pressure[1] * length[1], rel=1e-8)
     # A column that would stand above the crest is held just below it.
-    pressed = hump_profile(scene=scene, law=law, fill_ratio=0.25, gas_pressure=0.5e6)
+    pressed = HumpProfile.of(scene=scene, law=law, fill_ratio=0.25, gas_pressure=0.5e6)
     assert pressed.regime is Regime.BLOCKED
     assert pressed.path[~pressed.full][0] == pytest.approx(0.06)
     assert pressed.hump_pressure is not None
@@ -144,17 +144,17 @@ def test_reverse_flow_is_the_mirror_image(point_scene: Scene) -> None:
         point_scene, rotor=dataclasses.replace(point_scene.rotor, speed=314.0), sha256="slow"
     )
     near, far = (variant(slow, hump_position=s, bends=slow.tube.bends[:1]) for s in (0.2, 0.8))
-    ahead = hump_profile(
+    ahead = HumpProfile.of(
         scene=near[0], law=near[1], fill_ratio=0.4, opposite_fill_ratio=0.1, gas_pressure=0.0, primed=True
     )
-    back = hump_profile(
+    back = HumpProfile.of(
         scene=far[0], law=far[1], fill_ratio=0.1, opposite_fill_ratio=0.4, gas_pressure=0.0, primed=True
     )
     assert (ahead.regime, back.regime) == (Regime.SIPHON, Regime.REVERSE)
     np.testing.assert_allclose(back.pressure[::-1], ahead.pressure, rtol=1e-9)
     np.testing.assert_allclose(back.path[::-1], 0.12 - ahead.path, atol=1e-15)
     assert back.cavitation_margin == pytest.approx(ahead.cavitation_margin)
-    resting = hump_profile(scene=near[0], law=near[1], fill_ratio=0.25, gas_pressure=0.0, primed=True)
+    resting = HumpProfile.of(scene=near[0], law=near[1], fill_ratio=0.25, gas_pressure=0.0, primed=True)
     assert resting.velocity == 0
     assert np.all(resting.full)
     assert resting.pressure[0] == resting.pressure[-1]
@@ -169,7 +169,7 @@ def test_reverse_flow_is_the_mirror_image(point_scene: Scene) -> None:
 def test_any_state_has_a_profile_that_fits_its_regime(
     point_scene: Scene, law: CalibratedLaw, x: float, y: float, p: float, primed: bool
 ) -> None:
-    found = hump_profile(
+    found = HumpProfile.of(
         scene=point_scene,
         law=law,
         fill_ratio=x,
@@ -213,14 +213,14 @@ def test_margin_moves_with_an_input_by_what_its_half_width_says(point_scene: Sce
     for quantity, width in (("hump_radius", 0.05e-3), ("extra_loss", 0.5)):
         entry = InputUncertainty(quantity=quantity, half_width=width, relative=False)
         stated = dataclasses.replace(point_scene, uncertainty=(entry,))
-        plain = hump_profile(scene=point_scene, law=variant(point_scene)[1], fill_ratio=0.1)
-        told = hump_profile(
+        plain = HumpProfile.of(scene=point_scene, law=variant(point_scene)[1], fill_ratio=0.1)
+        told = HumpProfile.of(
             scene=stated,
-            law=calibrated_law(scene=stated, chamber=_chamber(point_scene), heads=tube_heads(stated)),
+            law=calibrated_law(scene=stated, chamber=_chamber(point_scene), heads=TubeHeads.of(stated)),
             fill_ratio=0.1,
         )
         scene, law = variant(point_scene, **{quantity: getattr(point_scene.tube, quantity) + width})
-        moved = hump_profile(scene=scene, law=law, fill_ratio=0.1)
+        moved = HumpProfile.of(scene=scene, law=law, fill_ratio=0.1)
         assert None not in (plain.cavitation_margin, told.cavitation_margin_uncertainty)
         added = np.sqrt(
             told.cavitation_margin_uncertainty**2 - plain.cavitation_margin_uncertainty**2  # type: ignore[operator]
@@ -232,7 +232,7 @@ def test_margin_moves_with_an_input_by_what_its_half_width_says(point_scene: Sce
 def test_eq_18_read_off_a_separated_siphon_falls_as_the_square_of_the_velocity(
     point_scene: Scene, law: CalibratedLaw
 ) -> None:
-    found = apparent_drag(law=law, velocity=np.geomspace(0.5, 15, 20), opposite_fill_ratio=0.1)
+    found = ApparentDrag.of(law=law, velocity=np.geomspace(0.5, 15, 20), opposite_fill_ratio=0.1)
     excess = found.separated - found.lower_bound
     slopes = np.diff(np.log(excess)) / np.diff(np.log(found.velocity))
     np.testing.assert_allclose(slopes, -2.0, rtol=1e-12)
@@ -250,7 +250,7 @@ def test_what_eq_18_reads_is_what_the_law_does(law: CalibratedLaw) -> None:
             continue
         surplus = p + float(law.wall_pressure(x) - law.wall_pressure(other))
         k = 2 * surplus / DENSITY / float(flow.velocity) ** 2 - 1
-        found = apparent_drag(law=law, velocity=flow.velocity, opposite_fill_ratio=other)
+        found = ApparentDrag.of(law=law, velocity=flow.velocity, opposite_fill_ratio=other)
         assert float(found.read) == pytest.approx(k, rel=1e-7)
         if flow.regime != Regime.UNDECIDED:
             assert (found.separated > found.siphon) == (flow.regime == Regime.SEPARATED)
@@ -258,15 +258,15 @@ def test_what_eq_18_reads_is_what_the_law_does(law: CalibratedLaw) -> None:
 
 def test_what_cannot_be_drawn_is_refused(point_scene: Scene, law: CalibratedLaw) -> None:
     with pytest.raises(ValueError, match="points"):
-        hump_profile(scene=point_scene, law=law, fill_ratio=0.2, points=1)
+        HumpProfile.of(scene=point_scene, law=law, fill_ratio=0.2, points=1)
     with pytest.raises(ValueError, match="fill_ratio"):
-        hump_profile(scene=point_scene, law=law, fill_ratio=0.7)
+        HumpProfile.of(scene=point_scene, law=law, fill_ratio=0.7)
     with pytest.raises(ValueError, match="velocity"):
-        apparent_drag(law=law, velocity=[0.0], opposite_fill_ratio=0.1)
+        ApparentDrag.of(law=law, velocity=[0.0], opposite_fill_ratio=0.1)
     scene, straight = variant(point_scene, hump_radius=None)
     with pytest.raises(ValueError, match="hump"):
-        apparent_drag(law=straight, velocity=1.0, opposite_fill_ratio=0.1)
+        ApparentDrag.of(law=straight, velocity=1.0, opposite_fill_ratio=0.1)
     for gas in (0.0, 0.3e6):
-        found = hump_profile(scene=scene, law=straight, fill_ratio=0.2, gas_pressure=gas)
+        found = HumpProfile.of(scene=scene, law=straight, fill_ratio=0.2, gas_pressure=gas)
         assert found.cavitation_margin is None
         assert np.all(found.full)

@@ -12,7 +12,7 @@ import pytest
 
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.loading import load_law
-from ringbalance.reduced_model.law.model import balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Scene
@@ -50,13 +50,13 @@ def test_paper_law_comes_back_whole(table_1_scene: Scene, tmp_path: Path) -> Non
     law = paper_law(table_1_scene)
     path = law.save(tmp_path / "paper.json")
     assert load_law(path) == law
-    assert balancer_model(load_law(path)) == paper_model(table_1_scene)
+    assert BalancerModel.of(load_law(path)) == paper_model(table_1_scene)
 
 
 def test_load_model_carries_moment_volumes_and_density(
     table_1_calibration: Calibration, tmp_path: Path
 ) -> None:
-    model = balancer_model(load_law(table_1_calibration.flow_law.save(tmp_path / "law.json")))
+    model = BalancerModel.of(load_law(table_1_calibration.flow_law.save(tmp_path / "law.json")))
     assert model.name == "calibrated"
     assert model.chamber_volume == table_1_calibration.chamber.volume
     assert model.density == 1000.0

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
-from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, tilted_ring
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing
 from ringbalance.scene import loop_models, models
 from ringbalance.verification.reference.block_chambers import imported
 
@@ -56,7 +56,7 @@ def ring(
     environment = loop_models.Environment(gravity=100.0 * tilt, shaft=shaft)
     rotor = dataclasses.replace(scene.rotor, speed=10.0)
     turning = dataclasses.replace(scene, disc=disc, environment=environment, rotor=rotor)
-    return tilted_ring(turning, np.array(fills))
+    return TiltedRing.of(turning, np.array(fills))
 
 
 def test_the_tilted_circle_against_a_grid(table_1_scene: models.Scene) -> None:

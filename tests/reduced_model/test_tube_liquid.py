@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reduced_model.operating.tube_liquid import tube_liquid
+from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
 from ringbalance.reduced_model.tube.path import path_angle, path_radius
 from ringbalance.scene.models import Scene
 
@@ -92,7 +92,7 @@ def test_a_slow_rotor_keeps_its_tube_full(table_1_scene: Scene) -> None:
     """At 3000 rpm the ambient pressure holds the column over the crest: half the string's moment is new."""
     rotor = dataclasses.replace(table_1_scene.rotor, speed=3000 * math.pi / 30)
     calibration = calibrate(dataclasses.replace(table_1_scene, rotor=rotor))
-    found = tube_liquid(calibration.scene, law=calibration.flow_law)
+    found = TubeLiquid.of(calibration.scene, law=calibration.flow_law)
     assert found.after.state == "full"
     assert found.returned_volume == 0.0
     length, moment = string(31.5e-3, 44.5e-3)

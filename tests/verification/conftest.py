@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.case import CaseDefinition, parse_case
+from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 
 CLAIM = """
@@ -83,12 +83,12 @@ class MadeUpCode:
 
 @pytest.fixture
 def claim() -> CaseDefinition:
-    return parse_case(CLAIM, source="made_up/case.toml")
+    return CaseDefinition.parse(CLAIM, source="made_up/case.toml")
 
 
 @pytest.fixture
 def verification() -> CaseDefinition:
-    return parse_case(VERIFICATION, source="made_up/case.toml")
+    return CaseDefinition.parse(VERIFICATION, source="made_up/case.toml")
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ringbalance.scene.models import InputUncertainty, Scene
 from ringbalance.verification.assumptions import assumptions_of
-from ringbalance.verification.case import CaseDefinition, RestsOn, parse_case
+from ringbalance.verification.case import CaseDefinition, RestsOn
 from ringbalance.verification.catalogue import case_code, load_case
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 from ringbalance.verification.judging import references
@@ -102,7 +102,7 @@ def test_a_claim_is_decided_where_it_is_so_over_the_whole_range(
     claim_text: str, paper_scene: Scene, per_mm: float, offset: float, shared: bool, expected: str
 ) -> None:
     """Over 0.2 mm either way; a departure of 5 % of ten is what the case lets pass."""
-    definition = parse_case(claim_text.replace("[[quantity]]", RESTS, 1), source="x")
+    definition = CaseDefinition.parse(claim_text.replace("[[quantity]]", RESTS, 1), source="x")
     code: Any = Thick(per_mm=per_mm, offset=offset, shared=shared)
     code.reference = lambda scene: {"answer": Reference(value=code.reference_of(scene))}
     result = run_definition(definition, code, scene=paper_scene)

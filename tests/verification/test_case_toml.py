@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ringbalance.verification.case import CaseDefinition, CaseError, parse_case
+from ringbalance.verification.case import CaseDefinition, CaseError
 from ringbalance.verification.verdicts import Verdict
 
 
@@ -45,18 +45,18 @@ def test_a_whole_case_is_read(claim: CaseDefinition, verification: CaseDefinitio
 def test_what_is_no_case_is_refused(claim_text: str, old: str, new: str, message: str) -> None:
     assert old in claim_text
     with pytest.raises(CaseError, match=message):
-        parse_case(claim_text.replace(old, new, 1), source="made_up/case.toml")
+        CaseDefinition.parse(claim_text.replace(old, new, 1), source="made_up/case.toml")
 
 
 def test_a_case_without_mutations_is_refused(claim_text: str) -> None:
     with pytest.raises(CaseError, match="must_fail"):
-        parse_case(claim_text.split("[[must_fail]]")[0], source="made_up/case.toml")
+        CaseDefinition.parse(claim_text.split("[[must_fail]]")[0], source="made_up/case.toml")
 
 
 def test_all_faults_are_named_at_once(claim_text: str) -> None:
     broken = claim_text.replace('title = "A made-up claim"', "").replace('why = "because"', "")
     with pytest.raises(CaseError) as caught:
-        parse_case(broken, source="made_up/case.toml")
+        CaseDefinition.parse(broken, source="made_up/case.toml")
     lines = str(caught.value).splitlines()
     assert [line for line in lines if "title" in line]
     assert [line for line in lines if "quantity.0.why" in line]
@@ -68,4 +68,4 @@ def test_a_verification_must_fail_with_a_defect(claim_text: str) -> None:
         'kind = "claim"', 'kind = "code_verification"', 1
     )
     with pytest.raises(CaseError, match=r"metric|come out"):
-        parse_case(text, source="made_up/case.toml")
+        CaseDefinition.parse(text, source="made_up/case.toml")

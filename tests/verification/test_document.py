@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.case import CaseDefinition, parse_case
+from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.document import case_document, definition_document, merge_saved
 from ringbalance.verification.evidence import (
     Axis,
@@ -57,7 +57,7 @@ def test_a_case_that_was_not_run_is_still_listed(
 
 def test_a_bound_without_uncertainty_has_none(claim_text: str, made_up_code: Any, paper_scene: Scene) -> None:
     text = claim_text.replace('metric = "validation"', 'metric = "at_most"')
-    bound = parse_case(text, source="x")
+    bound = CaseDefinition.parse(text, source="x")
     document = case_document(run_definition(bound, made_up_code(), scene=paper_scene))
     assert document["quantities"][0]["uncertainty"] == 0.0
 

@@ -22,7 +22,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.verification.extremes import design as extremes_design
 from ringbalance.verification.extremes import point as extremes_point
-from ringbalance.verification.extremes.axes import AXES, axis_of, fitted, varied
+from ringbalance.verification.extremes.axes import AXES, Axis, fitted, varied
 from ringbalance.verification.extremes.design import CHUNK, Base, Point, design
 from ringbalance.verification.extremes.maps import Sweep, at_aspect, at_step
 from ringbalance.verification.extremes.point import Defect, Ending, Judgement, judge_point
@@ -157,7 +157,7 @@ def test_a_scene_of_little_more_than_a_disc_can_be_varied_along_every_axis(
         document={**kept, "tube": tube, "gas": {"pressure": "0.7 MPa"}, "rotor": {"speed": "10000 rpm"}},
         file="short.toml",
     )
-    found = short.judge({name: float(axis_of(name).at(0.5))})
+    found = short.judge({name: float(Axis.of(name).at(0.5))})
     assert found.violations == ()
     assert found.loop
 
@@ -338,7 +338,7 @@ def test_a_sweep_finds_where_answers_end(base: Base) -> None:
 def sweep_of(*texts: str) -> Sweep:
     ends = [Ending.REFUSED if text else Ending.SOLVED for text in texts]
     found = tuple(Judgement(ending=end, text=text) for end, text in zip(ends, texts, strict=True))
-    return Sweep(axis=axis_of("speed"), values=np.arange(1.0, len(texts) + 1), judgements=found)
+    return Sweep(axis=Axis.of("speed"), values=np.arange(1.0, len(texts) + 1), judgements=found)
 
 
 def test_a_stretch_tells_what_is_said_next_to_the_answers() -> None:

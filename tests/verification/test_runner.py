@@ -15,7 +15,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import runner
 from ringbalance.verification.assumptions import overridden
-from ringbalance.verification.case import CaseDefinition, parse_case
+from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference
 from ringbalance.verification.reference.block_chambers import imported
 from ringbalance.verification.runner import mutate_definition, run_case, run_cases, run_definition
@@ -134,7 +134,9 @@ def test_evidence_must_name_what_is_judged(claim: CaseDefinition, paper_scene: S
 
 
 def test_a_heavy_case_waits_for_its_level(claim_text: str, made_up_code: Any, paper_scene: Scene) -> None:
-    heavy = parse_case(claim_text.replace("[consequence]", 'cost = "heavy"\n[consequence]', 1), source="x")
+    heavy = CaseDefinition.parse(
+        claim_text.replace("[consequence]", 'cost = "heavy"\n[consequence]', 1), source="x"
+    )
     code = made_up_code()
     assert run_definition(heavy, code, scene=paper_scene).verdict is Verdict.NOT_RUN
     assert mutate_definition(heavy, code, scene=paper_scene) == ()

@@ -26,7 +26,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
 from ringbalance.verification.validation import tube_at_rest
 from ringbalance.verification.validation.comparison import KINDS, compare, friction
 from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.model_bias import ModelStatistics, model_statistics
+from ringbalance.verification.validation.model_bias import ModelStatistics
 from ringbalance.verification.validation.tube_friction import laminar_ratio
 from ringbalance.verification.validation.wave_frequency import tank_frequency
 
@@ -53,7 +53,7 @@ def _synthetic(
     series = np.repeat(np.array([f"rig {i}" for i in range(20)]), count // 20)
     measured = true * np.exp(0.01 * rng.standard_normal(count))
     predicted = true * (1 + bias) * np.exp(scatter * rng.standard_normal(count))
-    return model_statistics(
+    return ModelStatistics.of(
         predicted=predicted,
         measured=measured,
         series=series,
@@ -88,7 +88,7 @@ def test_the_interval_of_the_bias_covers_when_rigs_differ() -> None:
     series = np.repeat(np.array([f"rig {i}" for i in range(8)]), 50)
     for _ in range(400):
         measured = np.exp(np.repeat(0.02 * rng.standard_normal(8), 50) + 0.005 * rng.standard_normal(400))
-        found = model_statistics(
+        found = ModelStatistics.of(
             predicted=np.ones(400),
             measured=measured,
             series=series,

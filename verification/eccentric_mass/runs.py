@@ -34,21 +34,21 @@ class BalancingFigure:
     after: tuple[float, ...]
     """Mean amplitude in the last second of the run, m."""
 
+    @classmethod
+    def eight(cls, scene: EccentricScene, *, time_limit: float = 400.0) -> BalancingFigure:
+        """The same with masses that stop 10 degrees beside their targets, then fine tuning: Fig. 8."""
+        level = at_constant_speed(scene, time_limit=time_limit)
+        return _balanced(changed(level, "supervisor", target_error=(_PAPER_ERROR, _PAPER_ERROR)))
+
+    @classmethod
+    def seven(cls, scene: EccentricScene, *, time_limit: float = 30.0) -> BalancingFigure:
+        """Balance the two imbalances of the paper's Fig. 7 at constant speed."""
+        return _balanced(at_constant_speed(scene, time_limit=time_limit))
+
     def amplitudes(self, *, until: float = math.inf) -> Series:
         """Amplitude over time of every run."""
         names = [f"imbalance at {phase:.0f} degrees" for phase in self.phases]
         return _amplitude_figure("amplitude", dict(zip(names, self.runs, strict=True)), until=until)
-
-
-def figure_seven(scene: EccentricScene, *, time_limit: float = 30.0) -> BalancingFigure:
-    """Balance the two imbalances of the paper's Fig. 7 at constant speed."""
-    return _balanced(at_constant_speed(scene, time_limit=time_limit))
-
-
-def figure_eight(scene: EccentricScene, *, time_limit: float = 400.0) -> BalancingFigure:
-    """The same with masses that stop 10 degrees beside their targets, and fine tuning: the paper's Fig. 8."""
-    level = at_constant_speed(scene, time_limit=time_limit)
-    return _balanced(changed(level, "supervisor", target_error=(_PAPER_ERROR, _PAPER_ERROR)))
 
 
 def _balanced(scene: EccentricScene) -> BalancingFigure:

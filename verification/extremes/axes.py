@@ -38,6 +38,11 @@ class Axis:
     """Ends of the range where most discs are; the rest of the axis lies beyond it on one or both sides."""
     spacing: Literal["log", "linear"] = "log"
 
+    @classmethod
+    def of(cls, name: str) -> Axis:
+        """An axis by its name. Raises: KeyError: no axis of that name."""
+        return {axis.name: axis for axis in AXES}[name]
+
     def share(self, value: float) -> float:
         """How far along the axis a value in `unit` stands, within [0, 1]."""
         if self.spacing == "linear":
@@ -70,11 +75,6 @@ AXES: Final = (
     Axis("gravity", "gravity over standard gravity", "1", 0.0, 2.0, usual=(0.0, 0.0), spacing="linear"),
 )
 """What a designed set varies together, each after those that it hangs on."""
-
-
-def axis_of(name: str) -> Axis:
-    """An axis by its name. Raises: KeyError: no axis of that name."""
-    return {axis.name: axis for axis in AXES}[name]
 
 
 def places_of(scene: Scene) -> dict[str, float]:

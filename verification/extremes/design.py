@@ -30,7 +30,6 @@ from ringbalance.verification.extremes.point import (
     Ending,
     Judgement,
     judge_point,
-    refusal,
 )
 
 Point = Mapping[str, float]
@@ -67,7 +66,7 @@ class Base:
         try:
             document = fitted(document, scene=scene, made=_made(document, self.file), values=point)
         except SceneError as error:
-            return refusal(error)
+            return Judgement.refused(error)
         return judge_point(document, file=self.file, defect=self.defect)
 
     def judged(

@@ -18,7 +18,7 @@ from ringbalance.physics.pressure.ring import ring_quantities
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.extremes.axes import AXES, Axis, axis_of
+from ringbalance.verification.extremes.axes import AXES, Axis
 from ringbalance.verification.extremes.design import Base, Point
 from ringbalance.verification.extremes.point import ROUND_OFF, Ending, Judgement
 from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
@@ -197,17 +197,17 @@ def stability_maps(
     points: list[Point] = [
         {x: float(vx), y: float(vy)}
         for x, y in _PAIRS
-        for vy in axis_of(y).at(grid)
-        for vx in axis_of(x).at(grid)
+        for vy in Axis.of(y).at(grid)
+        for vx in Axis.of(x).at(grid)
     ]
     found = base.judged(points, workers=workers, progress=progress)
     size = count**2
     return tuple(
         StabilityMap(
-            x=axis_of(x),
-            y=axis_of(y),
-            x_values=axis_of(x).at(grid),
-            y_values=axis_of(y).at(grid),
+            x=Axis.of(x),
+            y=Axis.of(y),
+            x_values=Axis.of(x).at(grid),
+            y_values=Axis.of(y).at(grid),
             judgements=found[k * size : (k + 1) * size],
         )
         for k, (x, y) in enumerate(_PAIRS)

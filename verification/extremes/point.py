@@ -60,6 +60,11 @@ class Judgement:
     loop: str = ""
     """Outcome of its closed loop."""
 
+    @classmethod
+    def refused(cls, error: SceneError) -> Judgement:
+        """Judge a refusal: it has to name what is wrong. Args: `error`: as a user meets it."""
+        return cls(ending=Ending.REFUSED, text=str(error), violations=tuple(_unclear(error)))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Defect:
@@ -86,7 +91,7 @@ def judge_point(
         calibration = calibrate(scene)
         run = simulate(scene, calibration.model)
     except SceneError as error:
-        return refusal(error)
+        return Judgement.refused(error)
     except Exception as error:
         # Whatever it is: finding it is what this is for.
         text = f"{type(error).__name__}: {error}"
@@ -102,11 +107,6 @@ def judge_point(
         worst_ratio=ratio,
         loop=str(run.outcome),
     )
-
-
-def refusal(error: SceneError) -> Judgement:
-    """Judge a refusal: it has to name what is wrong. Args: `error`: as a user meets it."""
-    return Judgement(ending=Ending.REFUSED, text=str(error), violations=tuple(_unclear(error)))
 
 
 def _unclear(error: SceneError) -> Iterator[str]:

@@ -23,10 +23,10 @@ from typing import Any, Literal
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.navier_stokes.meshes import patch_mesh, tensor_patch, with_midpoints
+from ringbalance.verification.navier_stokes.meshes import Patch, patch_mesh, with_midpoints
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
-from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 End = Literal["entrance", "exit"]
 
@@ -64,22 +64,22 @@ class EndMesh:
         core[0] = 0.0
         around = 0.5 + _line(self.reservoir, longest, self)
         patches = [
-            tensor_patch(x=outside, y=core, sides={"east": "far", "south": "axis"}),
-            tensor_patch(x=outside, y=around, sides={"east": "far", "west": "wall", "north": "side"}),
-            tensor_patch(x=inside, y=core, sides={"east": "deep", "south": "axis", "north": "wall"}),
+            Patch.tensor(x=outside, y=core, sides={"east": "far", "south": "axis"}),
+            Patch.tensor(x=outside, y=around, sides={"east": "far", "west": "wall", "north": "side"}),
+            Patch.tensor(x=inside, y=core, sides={"east": "deep", "south": "axis", "north": "wall"}),
         ]
         return patch_mesh(patches=patches, shape="quad")
 
     def system(self, *, end: End) -> FlowSystem:
         """Discrete equations of an end: developed flow deep in the tube, no force on the far reservoir."""
-        space = taylor_hood(mesh=self.mesh(end=end), axisymmetric=True)
+        space = FlowSpace.taylor_hood(mesh=self.mesh(end=end), axisymmetric=True)
         conditions = [Dirichlet(boundary="deep", component=0, value=lambda x: 2 * (1 - 4 * x[1] ** 2))]
         conditions += [Dirichlet(boundary=name, component=1) for name in ("deep", "wall", "axis")]
         conditions.append(Dirichlet(boundary="wall", component=0))
         if end == "exit":
             # The jet draws liquid in through the side; left free along it, that goes unstable near Re 1950.
             conditions.append(Dirichlet(boundary="side", component=0))
-        return flow_system(space=space, conditions=conditions)
+        return FlowSystem.of(space=space, conditions=conditions)
 
 
 def _graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:

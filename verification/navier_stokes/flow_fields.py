@@ -24,8 +24,8 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
     friction_ratio,
 )
-from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
-from ringbalance.verification.navier_stokes.system import Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Dirichlet, FlowSystem
 
 LARGEST_KL: Final = 1e6
 """R Re up to which the section is drawn; near it further steady flows appear."""
@@ -61,6 +61,24 @@ class SectionFlow:
     """F of the flow given, on this coarse mesh."""
     status: Status
 
+    @classmethod
+    def of(cls, *, reynolds: float, rotation_reynolds: float) -> SectionFlow:
+        """Developed laminar flow over the section of a tube that turns about an axis across it.
+
+        Beyond R Re = 1e6 or R = 1e4 it is the nearest flow of the same R/Re, its status OUT_OF_RANGE.
+        Raises: ValueError: an argument that is not finite or out of its bounds.
+        Raises: ArithmeticError: the flow was not found.
+        """
+        _check(reynolds, "reynolds", above=True)
+        _check(rotation_reynolds, "rotation_reynolds", above=False)
+        kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
+        drawn = min(kl, LARGEST_KL, LARGEST_ROTATION * (LARGEST_ROTATION / s)) if s > 0.0 else 0.0
+        system = _SECTION.system()
+        settings = NewtonSettings(max_iterations=10, tolerance=1e-6)
+        flow = developed_section(system=system, kl=drawn, s=s, settings=settings)
+        re = reynolds if drawn == kl else float(np.sqrt(drawn / s))
+        return _whole_section(system, flow, re, re * s, _section_status(drawn < kl))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EndFlow:
@@ -81,6 +99,26 @@ class EndFlow:
     reynolds: float
     """Re of the flow given."""
     status: Status
+
+    @classmethod
+    def exit(cls, *, reynolds: float) -> EndFlow:
+        """Laminar developed flow from a sharp-edged tube into a reservoir; else as `EndFlow.entrance`."""
+        _check(reynolds, "reynolds", above=True)
+        cells = EndMesh(cells_per_fold=1.3, edge_cell=1e-2, reservoir=15.0, tube=2.0, jet_cell=1.0)
+        return _end_flow("exit", cells.system(end="exit"), reynolds, 1.2)
+
+    @classmethod
+    def entrance(cls, *, reynolds: float) -> EndFlow:
+        """Laminar flow near the mouth from a large reservoir into a sharp-edged tube, see `end_losses`.
+
+        Beyond Re = 2000 it is the one there, its status OUT_OF_RANGE.
+        Raises: ValueError: an argument that is not finite or not above zero.
+        Raises: ArithmeticError: the flow was not found.
+        """
+        _check(reynolds, "reynolds", above=True)
+        length = 10.0 + 0.1 * min(reynolds, LARGEST_END_REYNOLDS)
+        cells = EndMesh(cells_per_fold=1.8, edge_cell=1e-2, reservoir=10.0, tube=length)
+        return _end_flow("entrance", _entrance_system(cells), reynolds, 3.0)
 
 
 def _quarter_cells(*, space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
@@ -131,24 +169,6 @@ def _in_plane_stream_function(system: FlowSystem, flow: FlowSolution) -> FloatAr
     return _potential(space, np.stack([-v, u]), np.unique(edge).astype(np.int64), np.zeros(1))
 
 
-def section_flow(*, reynolds: float, rotation_reynolds: float) -> SectionFlow:
-    """Developed laminar flow over the section of a tube that turns about an axis across it.
-
-    Beyond R Re = 1e6 or R = 1e4 it is the nearest flow of the same R/Re, its status OUT_OF_RANGE.
-    Raises: ValueError: an argument that is not finite or out of its bounds.
-    Raises: ArithmeticError: the flow was not found.
-    """
-    _check(reynolds, "reynolds", above=True)
-    _check(rotation_reynolds, "rotation_reynolds", above=False)
-    kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
-    drawn = min(kl, LARGEST_KL, LARGEST_ROTATION * (LARGEST_ROTATION / s)) if s > 0.0 else 0.0
-    system = _SECTION.system()
-    settings = NewtonSettings(max_iterations=10, tolerance=1e-6)
-    flow = developed_section(system=system, kl=drawn, s=s, settings=settings)
-    re = reynolds if drawn == kl else float(np.sqrt(drawn / s))
-    return _whole_section(system, flow, re, re * s, _section_status(drawn < kl))
-
-
 def _whole_section(
     system: FlowSystem, flow: FlowSolution, re: float, rotation: float, status: Status
 ) -> SectionFlow:
@@ -185,26 +205,6 @@ def _check(value: float, name: str, *, above: bool) -> None:
         raise ValueError(f"{name} must be finite and {'above zero' if above else 'not negative'}")
 
 
-def entrance_flow(*, reynolds: float) -> EndFlow:
-    """Laminar flow near the mouth from a large reservoir into a sharp-edged tube, see `end_losses`.
-
-    Beyond Re = 2000 it is the one there, its status OUT_OF_RANGE.
-    Raises: ValueError: an argument that is not finite or not above zero.
-    Raises: ArithmeticError: the flow was not found.
-    """
-    _check(reynolds, "reynolds", above=True)
-    length = 10.0 + 0.1 * min(reynolds, LARGEST_END_REYNOLDS)
-    cells = EndMesh(cells_per_fold=1.8, edge_cell=1e-2, reservoir=10.0, tube=length)
-    return _end_flow("entrance", _entrance_system(cells), reynolds, 3.0)
-
-
-def exit_flow(*, reynolds: float) -> EndFlow:
-    """Laminar developed flow from a sharp-edged tube into a large reservoir; otherwise as `entrance_flow`."""
-    _check(reynolds, "reynolds", above=True)
-    cells = EndMesh(cells_per_fold=1.3, edge_cell=1e-2, reservoir=15.0, tube=2.0, jet_cell=1.0)
-    return _end_flow("exit", cells.system(end="exit"), reynolds, 1.2)
-
-
 def _sink(component: int) -> Callable[[FloatArray], FloatArray]:
     """Velocity of a half-space that drains U pi d^2/4 at the origin."""
 
@@ -217,11 +217,11 @@ def _sink(component: int) -> Callable[[FloatArray], FloatArray]:
 
 def _entrance_system(cells: EndMesh) -> FlowSystem:
     """An entrance fed by a sink's flow: let in freely so near, liquid at high Re makes the solve unstable."""
-    space = taylor_hood(mesh=cells.mesh(end="entrance"), axisymmetric=True)
+    space = FlowSpace.taylor_hood(mesh=cells.mesh(end="entrance"), axisymmetric=True)
     conditions = [Dirichlet(boundary=b, component=c, value=_sink(c)) for b in ("far", "side") for c in (0, 1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
     conditions += [Dirichlet(boundary="deep", component=1), Dirichlet(boundary="axis", component=1)]
-    return flow_system(space=space, conditions=conditions)
+    return FlowSystem.of(space=space, conditions=conditions)
 
 
 def _reservoir_pressure(space: FlowSpace, pressure: FloatArray) -> float:

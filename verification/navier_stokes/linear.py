@@ -29,11 +29,29 @@ _GOOD, _USABLE, _REFINEMENTS = 1e-12, 1e-8, 3
 
 @dataclass(eq=False)
 class Factors:
-    """A matrix with its factors; made by `factorize`."""
+    """A matrix with its factors; made by `Factors.of`."""
 
     matrix: Any
     factors: Any
     pivoted: bool
+
+    @classmethod
+    def of(cls, *, matrix: Any, along_diagonal: bool, layers: IntArray | None = None) -> Factors:
+        """Factors of a square CSC matrix of symmetric pattern. Raises: RuntimeError: it is singular.
+
+        Args: `along_diagonal`: try without pivoting first. `layers`: of the unknowns on a long, thin mesh,
+            from `layers_of`; None for a mesh of any shape.
+        """
+        if layers is not None:
+            return cls(matrix=matrix, factors=factorize_layers(matrix=matrix, layers=layers), pivoted=True)
+        if not along_diagonal:
+            return cls(matrix=matrix, factors=_with_pivoting(matrix), pivoted=True)
+        try:
+            symmetric = {"SymmetricMode": True}
+            factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
+        except RuntimeError:
+            return cls(matrix=matrix, factors=_with_pivoting(matrix), pivoted=True)
+        return cls(matrix=matrix, factors=factors, pivoted=False)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solution of A x = b, refined, with pivots if need be. Raises: RuntimeError: A is singular."""
@@ -60,24 +78,6 @@ def _refined(matrix: Any, factors: Any, right: FloatArray) -> tuple[FloatArray, 
 
 def _with_pivoting(matrix: Any) -> Any:
     return splu(matrix, permc_spec="COLAMD")
-
-
-def factorize(*, matrix: Any, along_diagonal: bool, layers: IntArray | None = None) -> Factors:
-    """Factors of a square CSC matrix of symmetric pattern. Raises: RuntimeError: it is singular.
-
-    Args: `along_diagonal`: try without pivoting first. `layers`: of the unknowns on a long, thin mesh, from
-        `layers_of`; None for a mesh of any shape.
-    """
-    if layers is not None:
-        return Factors(matrix=matrix, factors=factorize_layers(matrix=matrix, layers=layers), pivoted=True)
-    if not along_diagonal:
-        return Factors(matrix=matrix, factors=_with_pivoting(matrix), pivoted=True)
-    try:
-        symmetric = {"SymmetricMode": True}
-        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
-    except RuntimeError:
-        return Factors(matrix=matrix, factors=_with_pivoting(matrix), pivoted=True)
-    return Factors(matrix=matrix, factors=factors, pivoted=False)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -32,6 +32,29 @@ class Patch:
     sides: Mapping[str, str] = field(default_factory=dict)
     """Boundary name by side: "west" i = 0, "east" i = 2 m, "south" j = 0, "north" j = 2 n."""
 
+    @classmethod
+    def ruled(
+        cls,
+        *,
+        inner: FloatArray,
+        outer: FloatArray,
+        blend: FloatArray,
+        sides: Mapping[str, str] | None = None,
+    ) -> Patch:
+        """Patch between two curves of nodes, at j = 0 and at j = 2 n, joined by straight lines.
+
+        Args: `blend`: share of the way from inner to outer, shape (2 n + 1,), from 0 to 1.
+        """
+        share = blend[None, :, None]
+        nodes = (1 - share) * inner[:, None, :] + share * outer[:, None, :]
+        return cls(nodes=nodes, sides=sides or {})
+
+    @classmethod
+    def tensor(cls, *, x: FloatArray, y: FloatArray, sides: Mapping[str, str] | None = None) -> Patch:
+        """Rectangular patch from nodes along its two directions, shapes (2 m + 1,) and (2 n + 1,)."""
+        grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+        return cls(nodes=grid, sides=sides or {})
+
 
 def with_midpoints(*, vertices: npt.ArrayLike) -> FloatArray:
     """Nodes of quadratic cells on a line: the vertices with their midpoints between them."""
@@ -47,24 +70,6 @@ def geometric_vertices(*, cells: int, ratio: float) -> FloatArray:
     growth = np.linspace(0.0, 1.0, cells) if cells > 1 else np.zeros(1)
     lengths = ratio**growth
     return np.asarray(np.concatenate(([0.0], np.cumsum(lengths))) / lengths.sum(), dtype=np.float64)
-
-
-def tensor_patch(*, x: FloatArray, y: FloatArray, sides: Mapping[str, str] | None = None) -> Patch:
-    """Rectangular patch from nodes along its two directions, shapes (2 m + 1,) and (2 n + 1,)."""
-    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-    return Patch(nodes=grid, sides=sides or {})
-
-
-def ruled_patch(
-    *, inner: FloatArray, outer: FloatArray, blend: FloatArray, sides: Mapping[str, str] | None = None
-) -> Patch:
-    """Patch between two curves of nodes, at j = 0 and at j = 2 n, joined by straight lines.
-
-    Args: `blend`: share of the way from inner to outer, shape (2 n + 1,), from 0 to 1.
-    """
-    share = blend[None, :, None]
-    nodes = (1 - share) * inner[:, None, :] + share * outer[:, None, :]
-    return Patch(nodes=nodes, sides=sides or {})
 
 
 def _numbered(patches: Sequence[Patch]) -> tuple[FloatArray, list[IntArray]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.navier_stokes.linear import Factors, factorize
+from ringbalance.verification.navier_stokes.linear import Factors
 from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 
 
@@ -81,7 +81,7 @@ def _factorize(system: FlowSystem, c: Coefficients, entries: FloatArray, state: 
         jacobian = entries + c.inertia * system.convection_entries(state.vector)
     quads = system.space.mesh.refdom.__name__ == "RefQuad"
     layers = None if system.layers is None else system.layers[system.free]
-    factors = factorize(matrix=system.free_matrix(jacobian), along_diagonal=quads, layers=layers)
+    factors = Factors.of(matrix=system.free_matrix(jacobian), along_diagonal=quads, layers=layers)
     state.factorizations += 1
     if system.flow_component is not None:
         state.bordering = factors.solve(system.flow_load[system.free])

@@ -23,18 +23,16 @@ from scipy import sparse
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.continuation import flow_at
-from ringbalance.verification.navier_stokes.linear import Factors, factorize
+from ringbalance.verification.navier_stokes.linear import Factors
 from ringbalance.verification.navier_stokes.meshes import (
     Patch,
     geometric_vertices,
     patch_mesh,
-    ruled_patch,
-    tensor_patch,
     with_midpoints,
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
-from ringbalance.verification.navier_stokes.space import taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""
@@ -52,10 +50,10 @@ class _HalfSection(ABC):
 
     def system(self) -> FlowSystem:
         """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
-        space = taylor_hood(mesh=self.mesh(), components=3)
+        space = FlowSpace.taylor_hood(mesh=self.mesh(), components=3)
         conditions = [Dirichlet(boundary="symmetry", component=1)]
         conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
-        return flow_system(
+        return FlowSystem.of(
             space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS
         )
 
@@ -84,7 +82,7 @@ class SectionMesh(_HalfSection):
             wall = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
             wall[np.abs(wall) < 1e-15] = 0.0
             sides = {"north": "wall"} | ({flat: "symmetry"} if flat else {})
-            patches.append(ruled_patch(inner=edge, outer=wall, blend=blend, sides=sides))
+            patches.append(Patch.ruled(inner=edge, outer=wall, blend=blend, sides=sides))
         return patch_mesh(patches=patches)
 
 
@@ -108,7 +106,7 @@ class DuctMesh(_HalfSection):
         y = width * (np.concatenate([half, 1 - half[-2::-1]]) - 0.5)
         height = width / self.aspect_ratio
         z = height / 2 * (1 - geometric_vertices(cells=self.along, ratio=self.wall_ratio)[::-1])
-        patch = tensor_patch(
+        patch = Patch.tensor(
             x=with_midpoints(vertices=y),
             y=with_midpoints(vertices=z),
             sides={"west": "wall", "east": "wall", "north": "wall", "south": "symmetry"},
@@ -130,7 +128,7 @@ def _core(n: int) -> tuple[FloatArray, list[FloatArray]]:
     straight = _lines(np.array([[-corner, corner], [corner, corner]]), 2 * n)
     bulge = np.stack([np.cos(angles), np.sin(angles)], axis=1) * corner * np.sqrt(2.0)
     top = (straight + bulge) / 2
-    nodes = ruled_patch(inner=bottom, outer=top, blend=np.linspace(0.0, 1.0, 2 * n + 1)).nodes
+    nodes = Patch.ruled(inner=bottom, outer=top, blend=np.linspace(0.0, 1.0, 2 * n + 1)).nodes
     return nodes, [nodes[-1], nodes[::-1, -1], nodes[0, ::-1]]
 
 
@@ -273,4 +271,4 @@ def _factors(system: FlowSystem, coefficients: Coefficients, mass: Any, step: fl
     steady = system.free_matrix(system.linear_entries(coefficients))
     matrix = (steady + 1.5 / step * mass[:, system.free]).tocsc()
     quads = system.space.mesh.refdom.__name__ == "RefQuad"
-    return factorize(matrix=matrix, along_diagonal=quads)
+    return Factors.of(matrix=matrix, along_diagonal=quads)

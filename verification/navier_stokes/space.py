@@ -82,6 +82,46 @@ class FlowSpace:
     coupling_pattern: _ScalarPattern
     """Rows pressure, columns velocity."""
 
+    @classmethod
+    def taylor_hood(
+        cls, *, mesh: Any, components: int | None = None, axisymmetric: bool = False
+    ) -> FlowSpace:
+        """Taylor-Hood space of a mesh: quadratic velocity, linear pressure.
+
+        Args: `mesh`: scikit-fem mesh of triangles, quadrilaterals, tetrahedra or hexahedra, straight or
+            quadratic. `components`: velocity components, at least the mesh's dimension; default equal to it.
+            `axisymmetric`: read the coordinates as (x, r) and the components as (u_x, u_r).
+        Raises: ValueError: fewer components than dimensions, or an axisymmetric mesh that is not plane.
+        Source: Taylor and Hood, Comput. Fluids 1 (1973) 73.
+        """
+        count = mesh.dim() if components is None else components
+        if count < mesh.dim() or (axisymmetric and (mesh.dim() != 2 or count != 2)):
+            raise ValueError(
+                "components must reach the mesh's dimension, and be 2 on a plane mesh if axisymmetric"
+            )
+        high, low, order = _PAIRS[mesh.refdom.__name__]
+        velocity = Basis(mesh, high(), intorder=order)
+        pressure = Basis(mesh, low(), intorder=order)
+        local = np.asarray(velocity.X, dtype=np.float64)
+        shape, slope = _tables(velocity.elem, local, velocity.Nbfun)
+        points = np.asarray(velocity.mapping.F(local), dtype=np.float64)
+        weights = np.abs(velocity.mapping.detDF(local)) * velocity.W
+        return cls(
+            mesh=mesh,
+            velocity=velocity,
+            pressure=pressure,
+            components=count,
+            axisymmetric=axisymmetric,
+            weights=weights * points[1] if axisymmetric else weights,
+            inverse=np.asarray(velocity.mapping.invDF(local), dtype=np.float64),
+            points=points,
+            shape=shape,
+            slope=slope,
+            pressure_shape=_tables(pressure.elem, local, pressure.Nbfun)[0],
+            velocity_pattern=_pattern(velocity.element_dofs, velocity.element_dofs, velocity.N),
+            coupling_pattern=_pattern(pressure.element_dofs, velocity.element_dofs, velocity.N),
+        )
+
     @property
     def dimension(self) -> int:
         """Of the mesh."""
@@ -193,44 +233,6 @@ def _tables(element: Any, points: FloatArray, local: int) -> tuple[FloatArray, F
     shape = np.stack([np.broadcast_to(phi, points.shape[1]) for phi, _ in pairs])
     slope = np.stack([np.broadcast_to(dphi, points.shape) for _, dphi in pairs], axis=1)
     return shape.astype(np.float64), slope.astype(np.float64)
-
-
-def taylor_hood(*, mesh: Any, components: int | None = None, axisymmetric: bool = False) -> FlowSpace:
-    """Taylor-Hood space of a mesh: quadratic velocity, linear pressure.
-
-    Args: `mesh`: scikit-fem mesh of triangles, quadrilaterals, tetrahedra or hexahedra, straight or
-        quadratic. `components`: velocity components, at least the mesh's dimension; default equal to it.
-        `axisymmetric`: read the coordinates as (x, r) and the components as (u_x, u_r).
-    Raises: ValueError: fewer components than dimensions, or an axisymmetric mesh that is not plane.
-    Source: Taylor and Hood, Comput. Fluids 1 (1973) 73.
-    """
-    count = mesh.dim() if components is None else components
-    if count < mesh.dim() or (axisymmetric and (mesh.dim() != 2 or count != 2)):
-        raise ValueError(
-            "components must reach the mesh's dimension, and be 2 on a plane mesh if axisymmetric"
-        )
-    high, low, order = _PAIRS[mesh.refdom.__name__]
-    velocity = Basis(mesh, high(), intorder=order)
-    pressure = Basis(mesh, low(), intorder=order)
-    local = np.asarray(velocity.X, dtype=np.float64)
-    shape, slope = _tables(velocity.elem, local, velocity.Nbfun)
-    points = np.asarray(velocity.mapping.F(local), dtype=np.float64)
-    weights = np.abs(velocity.mapping.detDF(local)) * velocity.W
-    return FlowSpace(
-        mesh=mesh,
-        velocity=velocity,
-        pressure=pressure,
-        components=count,
-        axisymmetric=axisymmetric,
-        weights=weights * points[1] if axisymmetric else weights,
-        inverse=np.asarray(velocity.mapping.invDF(local), dtype=np.float64),
-        points=points,
-        shape=shape,
-        slope=slope,
-        pressure_shape=_tables(pressure.elem, local, pressure.Nbfun)[0],
-        velocity_pattern=_pattern(velocity.element_dofs, velocity.element_dofs, velocity.N),
-        coupling_pattern=_pattern(pressure.element_dofs, velocity.element_dofs, velocity.N),
-    )
 
 
 def _outer(left: FloatArray, right: FloatArray) -> FloatArray:

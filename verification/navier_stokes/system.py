@@ -44,7 +44,7 @@ class Coefficients:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlowSystem:
-    """Operators, numbering and boundary data of one flow problem; made by `flow_system`."""
+    """Operators, numbering and boundary data of one flow problem; made by `FlowSystem.of`."""
 
     space: FlowSpace
     enclosed: bool
@@ -76,6 +76,71 @@ class FlowSystem:
     """Contracted quadrature tables."""
     layers: IntArray | None = None
     """Layers of all unknowns along a long, thin mesh, for factors slab by slab."""
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        space: FlowSpace,
+        conditions: Sequence[Dirichlet],
+        enclosed: bool = False,
+        flow_component: int | None = None,
+        coriolis: npt.ArrayLike | None = None,
+        body_force: Callable[[FloatArray], FloatArray] | None = None,
+        stress_form: bool = False,
+        slab: IntArray | None = None,
+    ) -> FlowSystem:
+        """Operators and numbering of a flow problem, to be solved for any coefficients.
+
+        Args:
+            space: Taylor-Hood space.
+            conditions: velocity boundary values; a boundary without them is free: zero traction in the stress
+                form, viscosity du/dn = p n otherwise.
+            enclosed: true when no boundary is free in its normal direction: pressure up to a constant.
+            flow_component: component whose integral over the domain is prescribed when solved; None for none.
+            coriolis: C, shape (components, components); default none.
+            body_force: of coordinates (dimension, elements, points), giving (components, elements, points).
+            stress_form: viscous term with the transposed gradient, needed for the torque on a moving wall.
+            slab: number of every element's slab along a long, thin mesh, which is then solved slab by slab.
+        Raises: ValueError: an unknown boundary, a Coriolis matrix of another shape, stress form in (x, r).
+        """
+        matrix = (
+            np.zeros((space.components,) * 2) if coriolis is None else np.asarray(coriolis, dtype=np.float64)
+        )
+        if matrix.shape != (space.components,) * 2:
+            raise ValueError(f"coriolis must have shape {(space.components,) * 2}, not {matrix.shape}")
+        if stress_form and space.axisymmetric:
+            raise ValueError("the stress form is not available in axisymmetric coordinates")
+        values, fixed = _boundary_data(space, conditions)
+        if enclosed:
+            fixed[space.components * space.velocity_nodes] = True
+        free = np.flatnonzero(~fixed)
+        blocks = _block_list(space, matrix)
+        viscous, rotating, coupling = _constant_entries(space, blocks, matrix, stress_form)
+        full, part = _patterns(space, *_indices(space, blocks), free)
+        flow = np.zeros(space.unknowns)
+        if flow_component is not None:
+            where = slice(flow_component * space.velocity_nodes, (flow_component + 1) * space.velocity_nodes)
+            flow[where] = space.load_vector(np.ones_like(space.weights))
+        return cls(
+            space=space,
+            enclosed=enclosed,
+            flow_component=flow_component,
+            free=free,
+            fixed_values=values,
+            load=_force_vector(space, body_force),
+            flow_load=flow,
+            mean_load=space.pressure_load(),
+            viscous=viscous,
+            coriolis=rotating,
+            coupling=coupling,
+            blocks=blocks,
+            full_pattern=full,
+            free_pattern=part,
+            mass=space.mass_table(),
+            convection=space.convection_table(),
+            layers=None if slab is None else _layers(space, slab),
+        )
 
     def linear_entries(self, coefficients: Coefficients) -> FloatArray:
         """Entries of the linear part of the equations."""
@@ -189,68 +254,6 @@ def _force_vector(space: FlowSpace, force: Callable[[FloatArray], FloatArray] | 
         parts = [space.load_vector(values[c]) for c in range(space.components)]
         load[: space.components * space.velocity_nodes] = np.concatenate(parts)
     return load
-
-
-def flow_system(
-    *,
-    space: FlowSpace,
-    conditions: Sequence[Dirichlet],
-    enclosed: bool = False,
-    flow_component: int | None = None,
-    coriolis: npt.ArrayLike | None = None,
-    body_force: Callable[[FloatArray], FloatArray] | None = None,
-    stress_form: bool = False,
-    slab: IntArray | None = None,
-) -> FlowSystem:
-    """Operators and numbering of a flow problem, to be solved for any coefficients.
-
-    Args:
-        space: Taylor-Hood space.
-        conditions: velocity boundary values; a boundary without them is free: zero traction in the stress
-            form, viscosity du/dn = p n otherwise.
-        enclosed: true when no boundary is free in its normal direction: pressure is known up to a constant.
-        flow_component: component whose integral over the domain is prescribed at solve time; None for none.
-        coriolis: C, shape (components, components); default none.
-        body_force: of coordinates (dimension, elements, points), giving (components, elements, points).
-        stress_form: viscous term with the transposed gradient, needed for the torque on a moving wall.
-        slab: number of every element's slab along a long, thin mesh, which is then solved slab by slab.
-    Raises: ValueError: an unknown boundary, a Coriolis matrix of another shape, or the stress form in (x, r).
-    """
-    matrix = np.zeros((space.components,) * 2) if coriolis is None else np.asarray(coriolis, dtype=np.float64)
-    if matrix.shape != (space.components,) * 2:
-        raise ValueError(f"coriolis must have shape {(space.components,) * 2}, not {matrix.shape}")
-    if stress_form and space.axisymmetric:
-        raise ValueError("the stress form is not available in axisymmetric coordinates")
-    values, fixed = _boundary_data(space, conditions)
-    if enclosed:
-        fixed[space.components * space.velocity_nodes] = True
-    free = np.flatnonzero(~fixed)
-    blocks = _block_list(space, matrix)
-    viscous, rotating, coupling = _constant_entries(space, blocks, matrix, stress_form)
-    full, part = _patterns(space, *_indices(space, blocks), free)
-    flow = np.zeros(space.unknowns)
-    if flow_component is not None:
-        where = slice(flow_component * space.velocity_nodes, (flow_component + 1) * space.velocity_nodes)
-        flow[where] = space.load_vector(np.ones_like(space.weights))
-    return FlowSystem(
-        space=space,
-        enclosed=enclosed,
-        flow_component=flow_component,
-        free=free,
-        fixed_values=values,
-        load=_force_vector(space, body_force),
-        flow_load=flow,
-        mean_load=space.pressure_load(),
-        viscous=viscous,
-        coriolis=rotating,
-        coupling=coupling,
-        blocks=blocks,
-        full_pattern=full,
-        free_pattern=part,
-        mass=space.mass_table(),
-        convection=space.convection_table(),
-        layers=None if slab is None else _layers(space, slab),
-    )
 
 
 def _layers(space: FlowSpace, slab: IntArray) -> IntArray:

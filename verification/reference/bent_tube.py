@@ -32,8 +32,8 @@ from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, developed_section
-from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem, flow_system
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 Progress = Callable[[str], None]
 _NEWTON = NewtonSettings(tolerance=1e-7, max_iterations=10)
@@ -60,6 +60,68 @@ class BentTubeFlow:
     """Reduced pressure, mean over the section, over mu U/d, at those stations."""
     energy_flux: FloatArray
     """Kinetic energy carried through a station over rho U^3/2 and area: alpha, at those stations."""
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        segments: Sequence[Segment],
+        cells: SectionMesh,
+        reynolds: float,
+        rotation_reynolds: float,
+        coriolis_factor: float = 1.0,
+        first_inertia: float = 1.0,
+        progress: Progress | None = None,
+    ) -> BentTubeFlow:
+        """Steady laminar flow through a tube along a plane path that turns about the plane's normal.
+
+        Args:
+            segments: of the path, lengths over the bore; a positive turn is to the left, as the rotation.
+            cells: of the half section.
+            reynolds: Re = U d/nu, above zero.
+            rotation_reynolds: R = omega d^2/nu, zero or more, counter-clockwise about e_z.
+            coriolis_factor: on the Coriolis force in the tube, not on the inflow; other than 1 only to see
+                that a wrong one is found out.
+            first_inertia: share of the inertia to start with; bends at rest need less, such as 0.2.
+            progress: called with a short text on what is being done.
+        Returns: The flow; its solution's status says NOT_CONVERGED when Newton's method failed.
+        Raises: ValueError: a Reynolds number out of its bounds, or an impossible path.
+        Raises: ArithmeticError: the developed flow was not found.
+        Range: steady, symmetric laminar flow.
+        """
+        if not (np.isfinite(reynolds + rotation_reynolds) and reynolds > 0.0 and rotation_reynolds >= 0.0):
+            raise ValueError("reynolds must be above zero, rotation_reynolds zero or more, both finite")
+        say = progress or (lambda _: None)
+        section = cells.system()
+        kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
+        developed = developed_section(system=section, kl=kl, s=s)
+        tube = swept_tube(section=cells.mesh(), segments=segments)
+        system = _system(tube, section, developed, reynolds)
+        say(f"{system.free.size} unknowns in {int(tube.slab.max()) + 1} slabs")
+        rotation = 2 * rotation_reynolds * coriolis_factor
+
+        def solve(share: float, start: FlowSolution) -> FlowSolution:
+            say(f"inertia {share:.3g} of its full value")
+            c = Coefficients(inertia=share * reynolds, viscosity=1.0, rotation=rotation)
+            return solve_flow(system=system, coefficients=c, start=start, settings=_NEWTON, progress=say)
+
+        solution = solve(first_inertia, _guess(tube, system, developed, reynolds))
+        if first_inertia < 1.0 and solution.status.ok:
+            rule = StepRule(first=first_inertia, smallest=0.02)
+            path = follow(solve=solve, start=solution, start_at=first_inertia, targets=[1.0], rule=rule)
+            solution = path.solutions[0] if path.status.ok else replace(solution, status=path.status)
+        return cls(
+            tube=tube,
+            system=system,
+            solution=solution,
+            section=section,
+            developed=developed,
+            reynolds=reynolds,
+            rotation_reynolds=rotation_reynolds,
+            arc_length=tube.arc_length[::2],
+            mean_pressure=_mean_pressure(tube, section, solution),
+            energy_flux=_energy_flux(tube, section, solution),
+        )
 
     @property
     def gradient(self) -> float:
@@ -113,8 +175,8 @@ def _outlet_load(tube: SweptTube, space: FlowSpace, section: FlowSpace, pressure
 def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSystem:
     conditions = [Dirichlet(boundary="symmetry", component=2)]
     conditions += [Dirichlet(boundary=name, component=c) for name in ("inlet", "wall") for c in range(3)]
-    space = taylor_hood(mesh=tube.mesh)
-    system = flow_system(space=space, conditions=conditions, coriolis=CORIOLIS, slab=tube.slab)
+    space = FlowSpace.taylor_hood(mesh=tube.mesh)
+    system = FlowSystem.of(space=space, conditions=conditions, coriolis=CORIOLIS, slab=tube.slab)
     velocity = _swept_velocity(tube, developed, reynolds)
     velocity[:, space.boundary_nodes("wall")] = 0.0
     fixed = np.concatenate([velocity.ravel(), np.zeros(space.pressure_nodes)])
@@ -135,67 +197,6 @@ def _guess(tube: SweptTube, system: FlowSystem, developed: FlowSolution, reynold
         driving_gradient=0.0,
         status=Status(),
         statistics=Statistics(),
-    )
-
-
-def bent_tube_flow(
-    *,
-    segments: Sequence[Segment],
-    cells: SectionMesh,
-    reynolds: float,
-    rotation_reynolds: float,
-    coriolis_factor: float = 1.0,
-    first_inertia: float = 1.0,
-    progress: Progress | None = None,
-) -> BentTubeFlow:
-    """Steady laminar flow through a tube along a plane path that turns about the plane's normal.
-
-    Args:
-        segments: of the path, lengths over the bore; a positive turn is to the left, the sense of rotation.
-        cells: of the half section.
-        reynolds: Re = U d/nu, above zero.
-        rotation_reynolds: R = omega d^2/nu, zero or more, counter-clockwise about e_z.
-        coriolis_factor: on the Coriolis force in the tube, not on the inflow; other than 1 only to see that a
-            wrong one is found out.
-        first_inertia: share of the inertia to start with; bends at rest need a path from less, such as 0.2.
-        progress: called with a short text on what is being done.
-    Returns: The flow; its solution's status says NOT_CONVERGED when Newton's method failed.
-    Raises: ValueError: a Reynolds number out of its bounds, or an impossible path.
-    Raises: ArithmeticError: the developed flow was not found.
-    Range: steady, symmetric laminar flow.
-    """
-    if not (np.isfinite(reynolds + rotation_reynolds) and reynolds > 0.0 and rotation_reynolds >= 0.0):
-        raise ValueError("reynolds must be above zero, rotation_reynolds zero or more, both finite")
-    say = progress or (lambda _: None)
-    section = cells.system()
-    kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
-    developed = developed_section(system=section, kl=kl, s=s)
-    tube = swept_tube(section=cells.mesh(), segments=segments)
-    system = _system(tube, section, developed, reynolds)
-    say(f"{system.free.size} unknowns in {int(tube.slab.max()) + 1} slabs")
-    rotation = 2 * rotation_reynolds * coriolis_factor
-
-    def solve(share: float, start: FlowSolution) -> FlowSolution:
-        say(f"inertia {share:.3g} of its full value")
-        c = Coefficients(inertia=share * reynolds, viscosity=1.0, rotation=rotation)
-        return solve_flow(system=system, coefficients=c, start=start, settings=_NEWTON, progress=say)
-
-    solution = solve(first_inertia, _guess(tube, system, developed, reynolds))
-    if first_inertia < 1.0 and solution.status.ok:
-        rule = StepRule(first=first_inertia, smallest=0.02)
-        path = follow(solve=solve, start=solution, start_at=first_inertia, targets=[1.0], rule=rule)
-        solution = path.solutions[0] if path.status.ok else replace(solution, status=path.status)
-    return BentTubeFlow(
-        tube=tube,
-        system=system,
-        solution=solution,
-        section=section,
-        developed=developed,
-        reynolds=reynolds,
-        rotation_reynolds=rotation_reynolds,
-        arc_length=tube.arc_length[::2],
-        mean_pressure=_mean_pressure(tube, section, solution),
-        energy_flux=_energy_flux(tube, section, solution),
     )
 
 

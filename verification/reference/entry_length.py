@@ -24,7 +24,7 @@ from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.tube.development import developing_length
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.verification.navier_stokes.linear import factorize
+from ringbalance.verification.navier_stokes.linear import Factors
 from ringbalance.verification.navier_stokes.newton import FlowSolution
 from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
@@ -137,7 +137,7 @@ def _modes(matrices: tuple[Any, Any, Any], shift: float, count: int) -> tuple[Co
     """Eigenvalues mu next to a shift, and the relative residuals of their modes."""
     zero, one, two = matrices
     size = zero.shape[0]
-    factors = factorize(matrix=(zero + shift * one + shift**2 * two).tocsc(), along_diagonal=True)
+    factors = Factors.of(matrix=(zero + shift * one + shift**2 * two).tocsc(), along_diagonal=True)
 
     def inverse(y: FloatArray) -> FloatArray:
         # (q, mu q) linearises the square; one factored matrix of the section's size serves.

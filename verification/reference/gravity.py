@@ -24,13 +24,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level
-from ringbalance.verification.orders import (
-    field_error,
-    order_figure,
-    order_study,
-    orders_found,
-    refined_cells,
-)
+from ringbalance.verification.orders import OrderStudy, field_error, order_figure, orders_found, refined_cells
 from ringbalance.verification.reference.mutated_pressure import mutated_pressure
 
 _GAUSS: Final = 60
@@ -173,8 +167,8 @@ def study(
         if not solution.status.ok:
             raise ValueError(solution.status.text)
     size = [cells[0][0] / count[0] for count in cells]
-    surface = order_study(size=size, error=[_surface_error(disc, s, exact) for s in solutions])
-    field = order_study(size=size, error=[field_error(s, exact.pressure) for s in solutions])
+    surface = OrderStudy.of(size=size, error=[_surface_error(disc, s, exact) for s in solutions])
+    field = OrderStudy.of(size=size, error=[field_error(s, exact.pressure) for s in solutions])
     volume = max(abs(s.statistics.extra["volume_error"]) for s in solutions)
     middle = float(surface_radius(disc=disc, fill_ratio=fill))
     note = "cells " + ", ".join(" x ".join(map(str, count)) for count in cells)

@@ -21,7 +21,7 @@ from ringbalance.physics.pressure.solve import PressureProblem, PressureSolution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Convergence, Evidence, Level, as_found
-from ringbalance.verification.orders import OrderStudy, field_error, order_figure, order_study, refined_cells
+from ringbalance.verification.orders import OrderStudy, field_error, order_figure, refined_cells
 
 _SCALE: Final = 1e5
 """P, Pa."""
@@ -119,7 +119,7 @@ def study(
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width, half_angle=disc.central_angle / 2)
     solved = partial(_solutions, disc, exact.problem(defect), cells)
     quadratic, straight, quartic = solved(2, "curved"), solved(2, "straight"), solved(4, "curved")
-    of_sizes = partial(order_study, size=[cells[0][0] / count[0] for count in cells])
+    of_sizes = partial(OrderStudy.of, size=[cells[0][0] / count[0] for count in cells])
     fields = {
         name: of_sizes(error=[field_error(s, exact.pressure) for s in solutions])
         for name, solutions in (("quadratic", quadratic), ("straight", straight), ("quartic", quartic))

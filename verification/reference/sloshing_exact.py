@@ -48,6 +48,22 @@ class CosineWaves:
     mixed: FloatArray
     """Of -psi: integral of cos(m ...) sin(n ...), rows m."""
 
+    @classmethod
+    def of(cls, *, central_angle: float, depth: float) -> CosineWaves:
+        """The problem at a depth H = ln(R2/a); the lowest frequencies converge like the cube of 1/terms."""
+        n = np.arange(1, _TERMS + 1)
+        k = np.asarray(np.pi * n / central_angle, dtype=np.float64)
+        rows, columns = np.meshgrid(n, n, indexing="ij")
+        odd = (rows + columns) % 2 == 1
+        gap = np.where(odd, columns**2 - rows**2, 1)
+        return cls(
+            central_angle=central_angle,
+            wavenumber=k,
+            mass=np.diag(1 / np.tanh(k * depth)) * central_angle / 2,
+            spring=np.diag(k) * central_angle / 2,
+            mixed=np.where(odd, central_angle / np.pi * 2 * columns / gap, 0.0),
+        )
+
     def frequencies(self, *, modes: int) -> FloatArray:
         """Lowest natural frequencies over the speed, s, of (s^2 mass + 2 i s mixed - spring) B = 0."""
         n = self.wavenumber.size
@@ -80,22 +96,6 @@ class CosineWaves:
         order = self.wavenumber * self.central_angle / np.pi
         stream = -np.sum(found * (1 - np.cos(np.pi * order)) / (np.pi * order))
         return float(abs(1 + 2 * stream / drive))
-
-
-def cosine_waves(*, central_angle: float, depth: float) -> CosineWaves:
-    """The problem at a depth H = ln(R2/a); the lowest frequencies converge like the cube of 1/terms."""
-    n = np.arange(1, _TERMS + 1)
-    k = np.asarray(np.pi * n / central_angle, dtype=np.float64)
-    rows, columns = np.meshgrid(n, n, indexing="ij")
-    odd = (rows + columns) % 2 == 1
-    gap = np.where(odd, columns**2 - rows**2, 1)
-    return CosineWaves(
-        central_angle=central_angle,
-        wavenumber=k,
-        mass=np.diag(1 / np.tanh(k * depth)) * central_angle / 2,
-        spring=np.diag(k) * central_angle / 2,
-        mixed=np.where(odd, central_angle / np.pi * 2 * columns / gap, 0.0),
-    )
 
 
 def _load(waves: CosineWaves) -> ComplexArray:

@@ -13,7 +13,7 @@ from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.cut.tilted import tilted_liquid
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics import deferred
-from ringbalance.reduced_model.chamber.element_check import imported_elements, scene_ring
+from ringbalance.reduced_model.chamber.element_check import ImportedElements, scene_ring
 from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
 from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
 from ringbalance.reduced_model.chamber.terms import (
@@ -250,7 +250,7 @@ def _by_imported_elements(scene: Scene, fill: float) -> ChamberValues:
     if geometry is None:
         raise ValueError("the scene's chamber is not imported")
     step = min(_STEP, fill / 2, (1 - fill) / 2)
-    found = imported_elements(scene, geometry, fill_ratio=np.array([fill, fill - step, fill + step]))
+    found = ImportedElements.of(scene, geometry, fill_ratio=np.array([fill, fill - step, fill + step]))
     at, low, high = found.moment.value
     mass = scene.liquid.density * float(found.volume[2] - found.volume[1])
     return ChamberValues(

@@ -14,7 +14,7 @@ from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.chamber.gravity import closed_ring, gravity_effect
+from ringbalance.reduced_model.chamber.gravity import GravityEffect, closed_ring
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.chamber.terms import MEAN
@@ -31,7 +31,7 @@ from ringbalance.reduced_model.selection.tube_terms import (
     loss_contributions,
 )
 from ringbalance.reduced_model.tables.fit import table_from_samples
-from ringbalance.reduced_model.tube.heads import exact_heads
+from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -103,7 +103,7 @@ class LawBook:
 
     def make(self, models: LawModels) -> CalibratedLaw:
         """Make a law, again if need be, so that its making can be timed."""
-        base, made = self.base, exact_heads(with_loss(self.scene, models.loss))
+        base, made = self.base, TubeHeads.exact(with_loss(self.scene, models.loss))
         pressure, moment = self._levels(models.level)
         heads = replace(
             base.heads, head=made.head, hump_head=made.hump_head, return_hump_head=made.return_hump_head
@@ -140,7 +140,7 @@ class LawBook:
             pressure, _ = paper_closed_forms(scene, fills)
             moment = paper_law(scene).moment.pair_moment(fill_ratio=fills, opposite_fill_ratio=0.0)
         if level == QUADRATURE:
-            effect, closed = gravity_effect(scene, fill_ratio=fills), closed_ring(scene, fills)
+            effect, closed = GravityEffect.of(scene, fill_ratio=fills), closed_ring(scene, fills)
             changes = effect.wall_pressure, effect.moment
             pressure, moment = (
                 value + np.interp(fills, fills[closed], change[closed])

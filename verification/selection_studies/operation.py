@@ -15,7 +15,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.contribution import Contribution
-from ringbalance.reduced_model.law.model import CompleteLaw, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.selection.estimates import (
     FILLING,
@@ -139,7 +139,7 @@ def mass_hierarchy(book: LawBook) -> ModelHierarchy:
 
 def moved_mass(scene: Scene, *, law: CompleteLaw, course: Course, gas_time: float) -> float:
     """Mass that leaves the driven chamber by one injection of `gas_time`, s, and the wait after it, kg."""
-    model = balancer_model(law)
+    model = BalancerModel.of(law)
     plant = LiquidRing(
         model=model,
         chambers=scene.disc.chambers,

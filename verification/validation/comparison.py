@@ -17,13 +17,7 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArra
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
 from ringbalance.verification.validation.kinds import Kind, measurements
-from ringbalance.verification.validation.model_bias import (
-    MUTATIONS,
-    ModelStatistics,
-    bias,
-    model_statistics,
-    within,
-)
+from ringbalance.verification.validation.model_bias import MUTATIONS, ModelStatistics, bias, within
 from ringbalance.verification.validation.tube_at_rest import TUBE_AT_REST
 from ringbalance.verification.validation.tube_friction import FRICTION
 from ringbalance.verification.validation.vessel import VESSEL
@@ -67,7 +61,7 @@ class Comparison:
     @property
     def statistics(self) -> ModelStatistics:
         """How the predictions stand to the measurements."""
-        return model_statistics(
+        return ModelStatistics.of(
             predicted=self.predicted,
             measured=self.measured,
             series=self.series,

@@ -38,42 +38,43 @@ class ModelStatistics:
     width_needed: float
     """Factor on both uncertainties at which they hold 95 % of the points."""
 
+    @classmethod
+    def of(
+        cls,
+        *,
+        predicted: FloatArray,
+        measured: FloatArray,
+        series: StringArray,
+        stated: FloatArray,
+        measurement_uncertainty: FloatArray,
+    ) -> ModelStatistics:
+        """Statistics of ln(predicted/measured) over a data set.
+
+        bias = exp(mean) - 1; s_model^2 = s^2 - (U_D/2)^2, zero where the measurements alone explain the
+        scatter.  The points of a series share their systematic errors, so the bias is known to t s/sqrt(n) of
+        the n means of the series; from fewer than three series to U_D.
+        Args: `stated`: expanded uncertainty (95 %) of the predicted values, in their unit.
+            `measurement_uncertainty`: U_D, relative.
+        Source: McGrattan and Toman, Metrologia 48 (2011) 173, for the split of the scatter.
+        """
+        ratio = np.log(predicted / measured)
+        used = _used(predicted, measured, stated, measurement_uncertainty)
+        names = np.unique(series)
+        means = np.array([np.mean(ratio[series == name]) for name in names])
+        unexplained = float(np.var(ratio, ddof=1) - np.mean((measurement_uncertainty / 2) ** 2))
+        return cls(
+            points=ratio.size,
+            series=names.size,
+            bias=bias(predicted, measured),
+            bias_uncertainty=_mean_uncertainty(means, float(np.mean(measurement_uncertainty))),
+            standard_deviation=math.sqrt(max(unexplained, 0.0)),
+            share_within=float(np.mean(used <= 1)),
+            width_needed=float(np.quantile(used, _PROMISED)),
+        )
+
     def numbers(self) -> dict[str, float]:
         """Numbers for a case's text, by the names of `ModelStatistics`."""
         return {key: float(value) for key, value in vars(self).items()}
-
-
-def model_statistics(
-    *,
-    predicted: FloatArray,
-    measured: FloatArray,
-    series: StringArray,
-    stated: FloatArray,
-    measurement_uncertainty: FloatArray,
-) -> ModelStatistics:
-    """Statistics of ln(predicted/measured) over a data set.
-
-    bias = exp(mean) - 1; s_model^2 = s^2 - (U_D/2)^2, zero where the measurements alone explain the scatter.
-    The points of a series share their systematic errors, so the bias is known to t s/sqrt(n) of the n means
-    of the series; from fewer than three series to U_D.
-    Args: `stated`: expanded uncertainty (95 %) of the predicted values, in their unit.
-        `measurement_uncertainty`: U_D, relative.
-    Source: McGrattan and Toman, Metrologia 48 (2011) 173, for the split of the scatter.
-    """
-    ratio = np.log(predicted / measured)
-    used = _used(predicted, measured, stated, measurement_uncertainty)
-    names = np.unique(series)
-    means = np.array([np.mean(ratio[series == name]) for name in names])
-    unexplained = float(np.var(ratio, ddof=1) - np.mean((measurement_uncertainty / 2) ** 2))
-    return ModelStatistics(
-        points=ratio.size,
-        series=names.size,
-        bias=bias(predicted, measured),
-        bias_uncertainty=_mean_uncertainty(means, float(np.mean(measurement_uncertainty))),
-        standard_deviation=math.sqrt(max(unexplained, 0.0)),
-        share_within=float(np.mean(used <= 1)),
-        width_needed=float(np.quantile(used, _PROMISED)),
-    )
 
 
 def bias(predicted: FloatArray, measured: FloatArray) -> float:

@@ -26,7 +26,7 @@ from ringbalance.verification.cases.driven_fig4_imbalance.case import (
 from ringbalance.verification.cases.driven_fig5_friction.case import friction_runs, friction_time
 from ringbalance.verification.cases.driven_fig6_effort.case import efforts, growth, printed_compensation
 from ringbalance.verification.cases.driven_fig9_run_up.case import compute as run_up
-from ringbalance.verification.eccentric_mass.runs import figure_eight, figure_seven
+from ringbalance.verification.eccentric_mass.runs import BalancingFigure
 from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed
 
 
@@ -63,7 +63,7 @@ def test_figure_six_grows_only_with_what_compensation_leaves(scene: EccentricSce
 
 
 def test_figure_seven_balances_both_imbalances(scene: EccentricScene) -> None:
-    found = figure_seven(scene, time_limit=20.0)
+    found = BalancingFigure.seven(scene, time_limit=20.0)
     plant = PlantParameters.of(scene)
     expected = abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.before == pytest.approx((expected, expected))
@@ -73,7 +73,7 @@ def test_figure_seven_balances_both_imbalances(scene: EccentricScene) -> None:
 
 
 def test_figure_eight_is_mended_by_fine_tuning(scene: EccentricScene) -> None:
-    found = figure_eight(scene, time_limit=200.0)
+    found = BalancingFigure.eight(scene, time_limit=200.0)
     plant = PlantParameters.of(scene)
     # Both masses 10 degrees on turn the correction by 10 degrees: 2 sin 5 deg of the imbalance is left.
     expected = 2 * math.sin(math.radians(5)) * abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))

@@ -27,7 +27,7 @@ from ringbalance.verification.evidence import (
     figure,
 )
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
-from ringbalance.verification.reference.bent_tube import BentTubeFlow, bend_shift, bent_tube_flow
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, bend_shift
 
 REYNOLDS: Final = 200.0
 VISCOSITY: Final = 20e-6
@@ -85,7 +85,7 @@ def _solve(scene: Scene, *, mesh: tuple[int, int, float], coriolis_factor: float
     Raises: ArithmeticError: Newton's method failed.
     """
     around, across, along = mesh
-    flow = bent_tube_flow(
+    flow = BentTubeFlow.of(
         segments=path_over_crest(scene, along),
         cells=SectionMesh(around=around, across=across, wall_ratio=3.0),
         reynolds=REYNOLDS,

@@ -22,7 +22,7 @@ from ringbalance.verification.evidence import (
     Series,
     figure,
 )
-from ringbalance.verification.orders import order_study
+from ringbalance.verification.orders import OrderStudy
 from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
 
 _COUNTS = (4, 8, 16, 32, 64, 128, 256, 512)
@@ -73,7 +73,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     exact = operation.exact()
     moved = [operation.frozen() if frozen else operation.stepped(count) for count in _COUNTS]
     error = [abs(value / exact - 1) for value in moved]
-    study = order_study(size=[_COUNTS[0] / count for count in _COUNTS], error=error)
+    study = OrderStudy.of(size=[_COUNTS[0] / count for count in _COUNTS], error=error)
     # Richardson's extrapolation at first order, from segments half as long.
     limit = moved[-1] + (moved[-1] - moved[-2])
     # One half of the last correction bounds what the extrapolation has left.

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.simulation import Simulation
-from ringbalance.reduced_model.law.model import BalancerModel, balancer_model
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.verification.comparison import from_range
@@ -41,7 +41,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     runs = {gain: _run(scene, gain) for gain in _GAINS}
     rate = _rate(scene, paper_model(scene))
     _, bare = readings()
-    calibrated = _rate(bare, balancer_model(flow_law_of(bare)))
+    calibrated = _rate(bare, BalancerModel.of(flow_law_of(bare)))
     onset = _onset(scene)
     return Evidence(
         found={

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.runs import figure_seven
+from ringbalance.verification.eccentric_mass.runs import BalancingFigure
 from ringbalance.verification.evidence import Evidence, Found, Level
 
 _RATE = 1.0
@@ -29,7 +29,7 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
     if defect == "response_left_out":
         bound = parameters.unbalance * speed**2 / parameters.stiffness
     missing = 2 * parameters.moment * speed**2
-    largest = max(run.worst_amplitude for run in figure_seven(scene).runs)
+    largest = max(run.worst_amplitude for run in BalancingFigure.seven(scene).runs)
     return Evidence(
         found={
             "force_ratio": Found(

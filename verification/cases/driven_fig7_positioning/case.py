@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.runs import BalancingFigure, figure_eight, figure_seven
+from ringbalance.verification.eccentric_mass.runs import BalancingFigure
 from ringbalance.verification.eccentric_mass.scenes import thinned
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 
@@ -15,7 +15,7 @@ _SHOWN = 12.0
 
 def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Amplitudes before, on the way and after."""
-    found = figure_seven(scene) if defect is None else figure_eight(scene, time_limit=30.0)
+    found = BalancingFigure.seven(scene) if defect is None else BalancingFigure.eight(scene, time_limit=30.0)
     ratios = np.divide(found.positioned, found.before)
     arrived = [stage.end for run in found.runs for stage in run.stages if stage.name == "positioning"]
     return Evidence(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.runs import figure_eight
+from ringbalance.verification.eccentric_mass.runs import BalancingFigure
 from ringbalance.verification.evidence import Evidence, Level, as_found
 
 _TIME = {None: 200.0, "tuning_given_up": 25.0}
@@ -14,7 +14,7 @@ _TIME = {None: 200.0, "tuning_given_up": 25.0}
 
 def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Amplitudes after positioning and after fine tuning."""
-    found = figure_eight(scene, time_limit=_TIME[defect])
+    found = BalancingFigure.eight(scene, time_limit=_TIME[defect])
     left = np.divide(found.positioned, found.before)
     ended = np.divide(found.after, found.before)
     settled = [run.settling_time or run.time[-1] for run in found.runs]

@@ -19,7 +19,7 @@ from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
-from ringbalance.verification.orders import order_study
+from ringbalance.verification.orders import OrderStudy
 from ringbalance.verification.reference.block_chambers import disc_chamber
 from ringbalance.verification.reference.exact_chamber import exact_totals
 from ringbalance.verification.reference.manufactured import Manufactured
@@ -106,5 +106,5 @@ def _manufactured(disc: Disc, defect: str | None) -> tuple[float, float]:
         solution = solve_on(space, exact.problem(defect))
         true = exact.pressure(space.body.nodes.T)
         errors.append(float(np.sqrt(np.mean((solution.values - true) ** 2) / np.mean(true**2))))
-    study = order_study(size=[4.0, 2.0, 1.0], error=errors)
+    study = OrderStudy.of(size=[4.0, 2.0, 1.0], error=errors)
     return study.settled_order, study.finest_error

@@ -18,7 +18,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.orders import OrderStudy, order_figure, order_study
+from ringbalance.verification.orders import OrderStudy, order_figure
 from ringbalance.verification.reference.block_chambers import disc_chamber
 from ringbalance.verification.reference.manufactured import Manufactured
 
@@ -89,7 +89,7 @@ def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> dict[str
         errors.append(_errors(space, exact, solve_on(space, problem).values))
     field, wall = zip(*errors, strict=True)
     steps = [1 / size for size in sizes]
-    return {"field": order_study(size=steps, error=field), "wall": order_study(size=steps, error=wall)}
+    return {"field": OrderStudy.of(size=steps, error=field), "wall": OrderStudy.of(size=steps, error=wall)}
 
 
 def _errors(space: TetrahedronSpace, exact: Manufactured, values: FloatArray) -> tuple[float, float]:

@@ -14,9 +14,9 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
-from ringbalance.verification.orders import OrderStudy, order_study
+from ringbalance.verification.orders import OrderStudy
 from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber, sector_chamber
-from ringbalance.verification.reference.sloshing_exact import cosine_waves, ring_frequencies, still_frequency
+from ringbalance.verification.reference.sloshing_exact import CosineWaves, ring_frequencies, still_frequency
 
 _FILL: Final = 0.4
 _PLANE_CELLS: Final = {"light": (10, 12, 8), "heavy": (16, 20, 14)}
@@ -132,7 +132,7 @@ def _plane(disc: Disc, level: Level, defect: str | None) -> dict[str, float]:
     """A sector without plates against a sum of cosines."""
     a = float(surface_radius(disc=disc, fill_ratio=_FILL))
     depth = float(np.log(disc.outer_radius / a))
-    waves = cosine_waves(central_angle=disc.central_angle, depth=depth)
+    waves = CosineWaves.of(central_angle=disc.central_angle, depth=depth)
     system = _spoiled(_plane_system(disc, a, level), defect)
     exact = waves.frequencies(modes=2)
     values = frequencies(system, 6)[0]
@@ -165,7 +165,7 @@ def _still(level: Level, defect: str | None) -> OrderStudy:
         squares = np.linalg.eigvalsh(system.reduced.stiffness[:first, :first])
         values = np.sqrt(np.maximum(squares, 0.0))
         worst.append(max(float(np.abs(values / s - 1).min()) for s in exact))
-    return order_study(size=[1 / cells[0] for cells in _LEVELS[level]], error=worst)
+    return OrderStudy.of(size=[1 / cells[0] for cells in _LEVELS[level]], error=worst)
 
 
 @lru_cache(maxsize=8)

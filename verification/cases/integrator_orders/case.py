@@ -22,7 +22,7 @@ from ringbalance.verification.cases.integrator_orders.side_by_side import (
 )
 from ringbalance.verification.cases.integrator_orders.stall import stall_study
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.orders import OrderStudy, order_study
+from ringbalance.verification.orders import OrderStudy
 from ringbalance.verification.reference.adaptive_ode import adaptive_ode
 from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
 
@@ -115,7 +115,7 @@ def _explicit(drive: Drive, duration: float, *, frozen: bool) -> OrderStudy:
         u0 = float(drive.flow(drive.fill).velocity)
         fills = [drive.fill - u0 * drive.exchange_rate * duration] * len(_COUNTS)
     error = [abs(fill - exact) / moved for fill in fills]
-    return order_study(size=[_COUNTS[0] / count for count in _COUNTS], error=error)
+    return OrderStudy.of(size=[_COUNTS[0] / count for count in _COUNTS], error=error)
 
 
 def _kinked_difference(law: PaperLaw, drive: Drive, duration: float) -> float:

@@ -21,9 +21,9 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level
 from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import CORIOLIS, SectionMesh
-from ringbalance.verification.navier_stokes.space import FlowSpace, taylor_hood
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, flow_system
-from ringbalance.verification.orders import order_figure, order_study, orders_found
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
+from ringbalance.verification.orders import OrderStudy, order_figure, orders_found
 
 _AROUND: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
 _TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)
@@ -99,8 +99,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     used, around = _spoiled(defect), _AROUND[level]
     solved = [_solve(count, used) for count in around]
     size = [around[0] / count for count in around]
-    flow = order_study(size=size, error=[_velocity_error(*pair) for pair in solved])
-    stress = order_study(size=size, error=[_pressure_error(*pair) for pair in solved])
+    flow = OrderStudy.of(size=size, error=[_velocity_error(*pair) for pair in solved])
+    stress = OrderStudy.of(size=size, error=[_pressure_error(*pair) for pair in solved])
     unknowns = [space.unknowns for space, _ in solved]
     note = f"unknowns {', '.join(map(str, unknowns))}"
     return Evidence(
@@ -129,13 +129,13 @@ def _spoiled(defect: str | None) -> Coefficients:
 def _solve(around: int, coefficients: Coefficients) -> tuple[FlowSpace, FlowSolution]:
     across = max(1, round(_ACROSS * around))
     cells = SectionMesh(around=around, across=across, wall_ratio=_WALL_RATIO)
-    space = taylor_hood(mesh=cells.mesh(), components=3)
+    space = FlowSpace.taylor_hood(mesh=cells.mesh(), components=3)
     conditions = [
         Dirichlet(boundary=name, component=c, value=partial(_component, c))
         for name in ("symmetry", "wall")
         for c in range(3)
     ]
-    system = flow_system(
+    system = FlowSystem.of(
         space=space, conditions=conditions, enclosed=True, coriolis=CORIOLIS, body_force=body_force
     )
     solution = solve_flow(system=system, coefficients=coefficients)

@@ -13,7 +13,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level
-from ringbalance.verification.orders import order_study, orders_found
+from ringbalance.verification.orders import OrderStudy, orders_found
 from ringbalance.verification.reference.block_chambers import block_chamber
 
 _LEVELS: Final = {"light": (2, 4, 8, 16), "heavy": (2, 4, 8, 16, 32)}
@@ -65,8 +65,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     }
     size = [1 / n for n in cells]
     studies = {
-        "round": order_study(size=size, error=errors[curved][:, 0].tolist()),
-        "straight": order_study(size=size, error=errors["hexahedron"][:, 0].tolist()),
+        "round": OrderStudy.of(size=size, error=errors[curved][:, 0].tolist()),
+        "straight": OrderStudy.of(size=size, error=errors["hexahedron"][:, 0].tolist()),
     }
     found = orders_found(studies)
     found["tilted_error"] = Found(value=float(errors[curved][-1, 2]))

@@ -15,7 +15,7 @@ from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
-from ringbalance.verification.reference.sloshing_exact import CosineWaves, cosine_waves
+from ringbalance.verification.reference.sloshing_exact import CosineWaves
 
 _MODES: Final = 4
 _FILLS: Final = (0.1, 0.25, 0.5)
@@ -68,7 +68,7 @@ def _depths(disc: Disc) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def _waves(disc: Disc) -> tuple[CosineWaves, ...]:
-    return tuple(cosine_waves(central_angle=disc.central_angle, depth=float(h)) for h in _depths(disc))
+    return tuple(CosineWaves.of(central_angle=disc.central_angle, depth=float(h)) for h in _depths(disc))
 
 
 def _still_deviation(disc: Disc) -> float:

@@ -72,8 +72,8 @@ def test_a_slow_and_a_fast_disc_get_different_models_for_stated_reasons(table_1_
     assert slow.fidelity.models["gravity"] == "all orders"
     assert "gravity" not in fast.fidelity.name
     assert fast.fidelity.models["gravity"] == "left out"
-    assert any(r.startswith("sloshing at 1x: in; worth") for r in slow.reasons)
-    assert any(r.startswith("sloshing at 1x: left out; worth") for r in fast.reasons)
+    assert any(r.startswith("sloshing at 1x: in; estimated contribution") for r in slow.reasons)
+    assert any(r.startswith("sloshing at 1x: left out; estimated contribution") for r in fast.reasons)
 
 
 def test_the_paper_disc_leaves_sloshing_out_at_one_per_cent_and_takes_it_at_a_ten_thousandth(

@@ -28,7 +28,7 @@ from scipy.special import iv, ivp, jv, jvp, kv, kvp, yv, yvp
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 
 _TERMS = 160
-_SEARCH = np.linspace(3.9, 0.05, 1200)
+_SEARCH = np.linspace(12.0, 0.05, 3600)
 _TRIVIAL = 0.01
 """Distance from |s| = 2 within which the condition is met by no flow at all."""
 

@@ -33,6 +33,7 @@ from itertools import product
 from typing import Final
 
 import numpy as np
+from scipy.linalg import LinAlgWarning
 from scipy.sparse.linalg import lobpcg, splu
 
 from ringbalance.mesh.liquid_body import Level
@@ -153,8 +154,9 @@ def _potentials(fields: Fields, start: FloatArray) -> FloatArray:
     """Columns phi of the slowest waves without rotation, K phi = s^2 M phi, (grad phi)^2 = 1."""
     space, mass, near = fields.space, fields.surface_mass, fields.shifted
     with warnings.catch_warnings():
-        # It warns that its last fields are rough ones; they need not be better.
+        # It warns that its last fields are rough, or nearly the same; they need not be better.
         warnings.simplefilter("ignore", UserWarning)
+        warnings.simplefilter("ignore", LinAlgWarning)
         values, shapes = lobpcg(
             mass, start, B=near.matrix, M=near.cycle, largest=True, tol=1e-14, maxiter=_ITERATIONS
         )

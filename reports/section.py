@@ -87,7 +87,7 @@ class Section:
     collect: Callable[[Work], Record | None] = _nothing
     """Plain numbers and texts for the evidence, under the section's name; None: nothing there."""
     apart: bool = False
-    """Whether a worker may collect it, after the cases: it takes long, and what it needs is compiled by then."""
+    """Whether a worker may collect it, after the cases: it takes long, and all it needs is compiled then."""
     show: Callable[[Record, Record], Record | None] = _everything
     """From its own evidence and the whole to what the template calls `view`: texts, `Drawing`s, or None."""
     always: bool = False

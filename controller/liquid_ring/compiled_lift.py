@@ -32,8 +32,9 @@ from ringbalance.controller.liquid_ring.compiled_column import (
 from ringbalance.controller.liquid_ring.compiled_gas import gas_volume, line_rates
 from ringbalance.controller.liquid_ring.records import P, Record, U, X
 
-_STEPS: Final = 48
-"""Of the rise of a leg before liquid passes the crest, at most half a radian of its oscillation each."""
+_BEHIND: Final = 0.54956
+_ARRIVES: Final = 0.62435
+"""Of y'' = y^2 + t with y = -sqrt(-t) long before: -y and y' at t = 0."""
 
 
 @inlined
@@ -107,28 +108,19 @@ def lift_rates(
 ) -> tuple[float, float, float, float, float, float]:
     """Acceleration along the direction, m/s^2; by x through the front, against the direction; then as
     `accelerations` by the speed, the pressure upstream, the gas downstream and the liquid there."""
-    place = front(plant, motion, x)
-    found, by_place, by_speed = _acceleration(plant, motion, place, speed, crest_margins(plant, at)[1])
-    each = 1.0 / (plant.density * place * plant.length)
-    _, by_gas, by_far = crest_slopes(plant, at)
-    return found, -by_place / plant.hold_up, by_speed, each, -each * by_gas, -each * by_far
-
-
-@inlined
-def _acceleration(
-    plant: Record, motion: Record, place: float, speed: float, crest: float
-) -> tuple[float, float, float]:
-    """Of the front along the direction, m/s^2, and its slopes by place and by speed.
-
-    Args: `crest`: what drives liquid at the crest, p_A - p_c + P_A - D_m, Pa.
-    """
-    direction, rho, entrance = motion.direction, plant.density, plant.lift_entrance
+    direction, rho = motion.direction, plant.density
+    place, entrance = front(plant, motion, x), plant.lift_entrance
     height, slope = _leg(plant, place, direction)
+    margin = crest_margins(plant, at)[1] + height
     along = (1.0 - entrance) / crest_stop(plant, direction)
     share, length = entrance + along * place, place * plant.length
     loss, loss_slope = tube_loss(plant, crest_table(direction), speed, law_log(speed, motion.log_speed))
-    found = ((crest + height) / rho - share * loss) / length
-    return found, (slope / rho - along * loss) / length - found / place, -share * loss_slope / length
+    found = (margin / rho - share * loss) / length
+    by_place = (slope / rho - along * loss) / length - found / place
+    each = 1.0 / (rho * length)
+    _, by_gas, by_far = crest_slopes(plant, at)
+    by_x = -by_place / plant.hold_up
+    return found, by_x, -share * loss_slope / length, each, -each * by_gas, -each * by_far
 
 
 @in_place
@@ -169,84 +161,48 @@ def set_out(plant: Record, motion: Record) -> None:
 def _first_front(plant: Record, motion: Record) -> tuple[float, float]:
     """Fraction of the path where the leg stands as flow over the crest becomes possible, and velocity, m/s.
 
-    At the level under a gas that is there at once; under one that a line fills the leg has risen with it.
+    At the level under a gas that is there at once.  Under one that a line fills slowly the leg has risen with
+    it, `_risen`.  Between them as far as a rising pressure moves a leg of constant length: p t^2/(6 rho s L),
+    t the time of the line while choked.
     """
     direction, x = motion.direction, motion.state[X]
     own = x if direction > 0 else plant.total - x
-    below = plant.column_pressure - hydrostatic(plant, own)[0]
-    # An entrance has the inertia of about a bore's length.
-    shortest = math.sqrt(4.0 / math.pi * plant.tube_area) / plant.length
-    level = max(_balance(plant, below, direction), shortest)
-    if not plant.line or level >= crest_start(plant, direction):
-        return level, 0.0
-    chamber, volume = 0 if direction > 0 else 1, gas_volume(plant, own)
-    if plant.inertia:
-        return _risen(plant, motion, level, motion.state[P + chamber], volume)
-    # Without inertia it is there at once, but no earlier than an even pressure would bring it.
-    gauge = motion.state[P + chamber] - plant.ambient_pressure
-    time = gauge * volume / (plant.passing * (plant.gas_pressure + plant.ambient_pressure))
-    way = gauge * time * time / (6.0 * plant.density * level * plant.length * plant.length)
-    return min(level + way, crest_start(plant, direction)), 0.0
-
-
-@inlined
-def _balance(plant: Record, below: float, direction: int) -> float:
-    """Fraction of the path up to which a leg stands whose pressure is so far below the crest's, Pa."""
-    part, straight = below / (plant.column_pressure - plant.port_pressure), plant.lift_straight
-    part = min(max(part, 0.0), 1.0)
+    tall = plant.column_pressure - plant.port_pressure
+    part = (plant.column_pressure - hydrostatic(plant, own)[0]) / tall
+    part, straight = min(max(part, 0.0), 1.0), plant.lift_straight
     root = straight + math.sqrt(straight * straight + 4.0 * (1.0 - straight) * part)
-    return float(crest_start(plant, direction) * (1.0 - (2.0 * part / root if part > 0.0 else 0.0)))
-
-
-@in_place
-def _risen(plant: Record, motion: Record, level: float, now: float, volume: float) -> tuple[float, float]:
-    """Front and velocity of a leg that the gas of a line has driven from the level up to its pressure `now`.
-
-    rho s L u' = p(t) - p_c + P_A - D(s) - K(s) rho u^2/2 by Runge and Kutta's method, from the ambient
-    pressure on, p(t) by the line.  Of a slow gas the last 24 radians of the leg's oscillation at the level
-    do: before them it follows its balance, as its loss damps what the start has set off.
-    """
-    direction, ambient, x = motion.direction, plant.ambient_pressure, motion.state[X]
-    gas = motion.state[P] - ambient, motion.state[P + 1] - ambient
-    crest = crest_margins(plant, ends(plant, x, plant.total - x, gas[0], gas[1], direction))[1]
-    stiff = -_leg(plant, level, direction)[1]
-    swing = math.sqrt(stiff / (plant.density * level)) / plant.length
-    begin = max(now - 0.5 * _STEPS / swing * _filling(plant, now, volume), ambient)
-    step, place, speed = (now - begin) / _STEPS, level, 0.0
-    if step <= 0.0:
+    start = crest_start(plant, direction)
+    # An entrance has the inertia of about a bore's length.
+    level = max(start * (1.0 - 2.0 * part / root), math.sqrt(4.0 / math.pi * plant.tube_area) / plant.length)
+    if not plant.line:
         return level, 0.0
-    if begin > ambient:
-        place = max(_balance(plant, now - begin - crest, direction), level)
-        rate, slope = _filling(plant, begin, volume), -_leg(plant, place, direction)[1]
-        # From rest at the ambient pressure on.
-        begun = min(swing * (begin - ambient) / rate, 1.0)
-        speed = begun * rate * plant.length / slope if slope > 0.0 else 0.0
-    for number in range(_STEPS):
-        pressure = begin + number * step
-        time = step / _filling(plant, pressure + 0.5 * step, volume)
-        place, speed = _kutta(plant, motion, place, speed, crest + pressure - now, step, time)
-    return min(max(place, level), crest_stop(plant, direction)), max(speed, 0.0)
+    chamber = 0 if direction > 0 else 1
+    pressure, content = motion.state[P + chamber], motion.state[P + 2 + chamber]
+    volume = gas_volume(plant, own)
+    gauge = pressure - plant.ambient_pressure
+    time = gauge * volume / (plant.passing * (plant.gas_pressure + plant.ambient_pressure))
+    way = gauge * time * time / (6.0 * plant.density * level * plant.length)
+    rate = line_rates(plant, pressure, content, volume, 0.0, True)[0]
+    place, speed = _risen(plant, start, tall, max(rate, 0.0))
+    if level + way / plant.length < place:
+        return level + way / plant.length, 0.0
+    return max(place, level), speed
 
 
 @inlined
-def _filling(plant: Record, pressure: float, volume: float) -> float:
-    """dp/dt of a chamber's gas under the open valve, Pa/s; how much gas it holds does not matter to that."""
-    return max(line_rates(plant, pressure, 1.0, volume, 0.0, True)[0], 1e-300)
+def _risen(plant: Record, start: float, tall: float, rate: float) -> tuple[float, float]:
+    """Front and velocity of a leg that has followed a pressure rising at a rate, as that reaches the crest's.
 
-
-@inlined
-def _kutta(
-    plant: Record, motion: Record, place: float, speed: float, crest: float, growth: float, time: float
-) -> tuple[float, float]:
-    """Place and speed after a step of time, s, in which the pressure grows evenly, Pa."""
-    per = 1.0 / plant.length
-    a1 = _acceleration(plant, motion, place, speed, crest)[0]
-    u2 = speed + 0.5 * time * a1
-    half = crest + 0.5 * growth
-    a2 = _acceleration(plant, motion, place + 0.5 * time * speed * per, u2, half)[0]
-    u3 = speed + 0.5 * time * a2
-    a3 = _acceleration(plant, motion, place + 0.5 * time * u2 * per, u3, half)[0]
-    u4 = speed + time * a3
-    a4 = _acceleration(plant, motion, place + time * u3 * per, u4, crest + growth)[0]
-    moved = time / 6.0 * (speed + 2.0 * u2 + 2.0 * u3 + u4) * per
-    return place + moved, speed + time / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+    A leg that touches the crest's circle has no stiffness there: with y the way to the crest's start,
+    y'' = A y^2 + B t, whose solution that follows the balance y = -sqrt(-B t/A) passes t = 0 at
+    -0.5496 (B^2/A^3)^(1/5) with 0.6243 (B^3/A^2)^(1/5).  A straight leg follows its balance.
+    """
+    length = start * plant.length
+    if not plant.inertia or rate == 0.0:
+        return start, 0.0
+    if plant.lift_straight > 0.0:
+        return start, rate * length / (tall * plant.lift_straight)
+    mass = plant.density * length
+    stiff, rising = tall / (mass * length * length), rate / mass
+    behind = _BEHIND * (rising**2 / stiff**3) ** 0.2
+    return start - behind / plant.length, _ARRIVES * (rising**3 / stiff**2) ** 0.2

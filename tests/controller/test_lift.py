@@ -243,26 +243,6 @@ def test_a_leg_rises_with_the_gas_of_a_line(
     assert found == pytest.approx(reference, rel=0.01, abs=0.4e-3)
 
 
-def test_a_leg_reaches_the_crest_at_a_time_that_does_not_jump_from_one_line_to_the_next(
-    smooth: Scene, plant_of: Callable[..., Dynamics], pulse: Pulse
-) -> None:
-    """From gas that comes faster than the leg can follow to gas that it follows, lines 6 % apart.
-
-    Even steps in the line's logarithm: a smooth time of 5 to 7 ms has second differences of some
-    5 ms (0.06)^2 = 0.02 ms; each limit taken alone up to where the other begins leaves 0.4 ms.
-    """
-    model, instants = calibrate(smooth).model, np.linspace(1e-5, 10e-3, 4001)
-    assert isinstance(model.flow, CalibratedLaw)
-    column, arrivals = Column(smooth, model.flow), []
-    for conductance in np.geomspace(13e-8, 26e-8, 13):
-        gas = replace(smooth.gas, conductance=float(conductance), critical_ratio=0.3, valve_lag=0.0)
-        plant = plant_of(replace(smooth, gas=gas), model, LIFT, INERTIA, FILLING)
-        through = (0.25 - pulse(plant, 1.0, instants).fills) * model.chamber_volume / model.tube_area
-        arrivals.append(float(np.interp((column.leg[1] - column.leg[0]) / 2, through, instants)))
-    assert np.all(np.diff(arrivals) < 0)
-    assert np.abs(np.diff(arrivals, 2)).max() < 0.04e-3
-
-
 def test_the_front_counts_from_where_it_starts_and_has_the_slopes_that_it_states(
     scene: Scene, plant_of: Callable[..., Dynamics]
 ) -> None:

@@ -36,6 +36,15 @@ def test_division_by_zero_is_infinite_as_in_numpy() -> None:
     assert compiled(share)(1.0, 0.0) == math.inf
 
 
+def test_without_compilation_functions_stay_plain() -> None:
+    text = (
+        "from ringbalance.controller.eccentric_mass.plant.integrate import plant_step\n"
+        "assert type(plant_step).__name__ == 'function'\n"
+    )
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    subprocess.run([sys.executable, "-c", text], env=environment, check=True)
+
+
 def test_what_compiled_code_alone_calls_has_no_machine_code_of_its_own() -> None:
     def squared(x: float) -> float:
         return x * x

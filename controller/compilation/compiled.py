@@ -69,9 +69,9 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
 
 def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
     dispatcher = numba.njit(function, **_OPTIONS, **options)
-    if dispatcher is function:
-        # NUMBA_DISABLE_JIT is set.
-        return function
+    if not hasattr(dispatcher, "py_func"):
+        # NUMBA_DISABLE_JIT is set: it is the function itself.
+        return cast(Callable[P, R], dispatcher)
     if _Dispatcher is not object:
         kind = _Guarded if _calls_python(function) else _Called
         dispatcher = kind(py_func=function, locals=dispatcher.locals, targetoptions=dispatcher.targetoptions)

@@ -22,7 +22,7 @@ from scipy.sparse import csr_matrix, diags_array
 from scipy.sparse.linalg import LinearOperator
 
 from ringbalance.physics.sloshing.projection import Fields, gradient_errors
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 
 LOWEST: Final = 2.1
 """Frequency ratio from which waves are taken from here: at 2 the problem changes its type."""
@@ -83,10 +83,12 @@ class _State:
     shapes: _Shapes
     found: ComplexArray
     """Nodal pressures."""
+    fast: BoolArray
+    """Those with l of 1; that others are slower is certain, as what is found bounds l from above."""
     steps: ComplexArray
-    """By which one cycle would improve them."""
+    """By which one cycle would improve the fast ones."""
     left: FloatArray
-    """Error of l_j that the iteration has not removed, bounded."""
+    """Error of l_j that the iteration has not removed, bounded; zero for slower ones."""
 
 
 def fast_waves(fields: Fields, start: FloatArray, waves: int) -> FastWaves:
@@ -102,11 +104,10 @@ def fast_waves(fields: Fields, start: FloatArray, waves: int) -> FastWaves:
     state = _improved(fields, parts, _orthonormal(start.astype(np.complex128)), asked + _SPARE)
     before = state.found[:, :0]
     for _ in range(_ITERATIONS):
-        fast = state.shapes.eigenvalue[:asked] >= 1
-        if not fast.any() or np.all(state.left[:asked][fast] < _ACCURACY):
+        if np.all(state.left[:asked] < _ACCURACY):
             break
         basis = np.concatenate([state.found, state.steps, before], axis=1)
-        before = state.found
+        before = state.found[:, state.fast]
         state = _improved(fields, parts, _orthonormal(basis), asked + _SPARE)
     return _described(fields, state, asked)
 
@@ -115,12 +116,13 @@ def _improved(fields: Fields, parts: _Parts, basis: ComplexArray, count: int) ->
     applied, adjoint = parts.on(basis), basis.conj().T
     small = _Parts(*(adjoint @ part for part in applied))
     shapes = _shapes(small, count)
-    residuals = _residuals(applied, shapes)
-    steps = _columnwise(fields.shifted.cycle, residuals)
+    fast = shapes.eigenvalue >= 1
+    residuals = _residuals(applied, shapes)[:, fast]
+    steps, left = _columnwise(fields.shifted.cycle, residuals), np.zeros(fast.size)
     # K(s) is at least the stiffness over s (s + 2).
-    left = np.einsum("ij,ij->j", residuals.conj(), steps).real
+    left[fast] = np.einsum("ij,ij->j", residuals.conj(), steps).real
     left *= shapes.frequency * (shapes.frequency + 2)
-    return _State(small, basis, shapes, basis @ shapes.columns, steps, left)
+    return _State(small, basis, shapes, basis @ shapes.columns, fast, steps, left)
 
 
 def _parts(fields: Fields) -> _Parts:

@@ -17,6 +17,7 @@ from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.scene.units import DIMENSIONS
+from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.runner import DRIVEN, paper_scene
 
 
@@ -33,7 +34,8 @@ def collect_eccentric(
     Raises: SceneError: a run that takes too many samples or steps.
     """
     tell = progress or (lambda _: None)
-    with cases_of_report(scene=paper_scene(), level=level, only=DRIVEN, pool=pool) as judged_cases:
+    ids = [case.id for case in load_cases() if case.paper == DRIVEN]
+    with cases_of_report(ids, scene=paper_scene(), level=level, pool=pool) as judged_cases:
         tell("balanced and locked run")
         study = eccentric_study(scene).document()
         verification, kept = judged_cases(tell)

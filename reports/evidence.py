@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import date
 from functools import partial
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -28,7 +27,7 @@ from ringbalance.reports.pictures.fields import shown_field
 from ringbalance.reports.provenance import provenance, versions
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene
 from ringbalance.reports.section import Level, Record, Work
-from ringbalance.reports.sections import begun, collected, finished
+from ringbalance.reports.sections import begun, collected, completed
 from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import paper_numbers
@@ -41,8 +40,6 @@ from ringbalance.verification.runner import DRIVEN, cases_under_way
 Progress = Callable[[str], None]
 
 FORMAT: Final = 1
-_ELSEWHERE: Final[Mapping[Level, str]] = MappingProxyType({"light": DRIVEN, "heavy": ""})
-"""Paper whose claims stand in the reports on its own balancer; here only where everything is asked for."""
 LAW_POINTS: Final = 51
 """Fill ratios at which the flow law is drawn."""
 
@@ -64,7 +61,9 @@ def collect_evidence(
     Raises: SceneError: a scene that cannot be calibrated or simulated.
     """
     tell = progress or (lambda _: None)
-    with cases_of_report(scene=scene, level=level, without=_ELSEWHERE[level], pool=pool) as judged_cases:
+    # The claims about the other balancer stand in the reports on it; here only where everything is asked for.
+    ids = [case.id for case in load_cases() if level == "heavy" or case.paper != DRIVEN]
+    with cases_of_report(ids, scene=scene, level=level, pool=pool) as judged_cases:
         apart = begun(scene, level, pool)
         tell("pressure field")
         pressure = _pressure(scene)
@@ -80,7 +79,7 @@ def collect_evidence(
     cases = merge_saved(found, saved)
     if judged is not None:
         judged(cases)
-    sections |= finished(apart, pool, scene, level)
+    sections = completed(sections, apart, work, pool)
     # What a section measured by the clock does not reproduce.
     clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}
     return {
@@ -147,20 +146,14 @@ def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
 
 @contextmanager
 def cases_of_report(
-    *,
-    scene: Scene,
-    level: Level,
-    only: str = "",
-    without: str = "",
-    pool: Workers | None = None,
+    ids: Sequence[str], *, scene: Scene, level: Level, pool: Workers | None = None
 ) -> Iterator[Callable[[Progress], tuple[list[Record], dict[str, str]]]]:
     """Start the cases of a report that no earlier one has kept; they run beside the body.
 
-    Args: `only`, `without`: a paper's name. `pool`: runs cases beside this process.
+    Args: `pool`: runs cases beside this process.
     Yields: What waits for them, to be called in the body: records of all cases, and the date of each that an
     earlier report has kept.
     """
-    ids = [case.id for case in load_cases() if case.paper != without and only in ("", case.paper)]
     kept = kept_cases() if level == "light" else {}
     wanted = [name for name in ids if name not in kept]
 

@@ -93,15 +93,13 @@ def collected(work: Work, *, without: Collection[str]) -> Record:
     return {name: record for name, record in found.items() if record is not None}
 
 
-def finished(begun: Begun, pool: Workers | None, scene: Scene, level: Level) -> Record:
-    """The evidence of sections `begun` apart; what no worker has begun is collected here."""
-    if pool is None:
-        return {}
-    found = {
-        name: pool.taken(future, partial(_section_evidence, name, scene, level))
-        for name, future in reversed(begun.items())
-    }
-    return {name: record for name, record in found.items() if record is not None}
+def completed(found: Record, apart: Begun, work: Work, pool: Workers | None) -> Record:
+    """The evidence of all sections in their order: `found`, and that of those `begun` apart."""
+    if pool is not None:
+        own = partial(_section_evidence, scene=work.scene, level=work.level)
+        found |= {name: pool.taken(one, partial(own, name)) for name, one in reversed(apart.items())}
+    ordered = {section.name: found.get(section.name) for section in SECTIONS}
+    return {name: record for name, record in ordered.items() if record is not None}
 
 
 def sections_of(evidence: Record) -> tuple[Section, ...]:

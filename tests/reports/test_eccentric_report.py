@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from check_traces import traces, untrue
 
-from ringbalance.reports import evidence as evidence_module
+from ringbalance.reports import eccentric_evidence
 from ringbalance.reports.eccentric_evidence import parameters
 from ringbalance.reports.figures.eccentric import sampled_poles
 from ringbalance.reports.pages.eccentric_scene import SECTIONS
@@ -40,7 +40,7 @@ def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> P
     out = tmp_path_factory.mktemp("report")
     with pytest.MonkeyPatch.context() as patch:
         # The claims of its paper have tests of their own.
-        patch.setattr(evidence_module, "load_cases", tuple)
+        patch.setattr(eccentric_evidence, "load_cases", tuple)
         write_report(scene, out, scene_text='name = "small"\n')
     return out
 

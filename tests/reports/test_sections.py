@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from concurrent.futures import Future
 from dataclasses import replace
 from importlib.resources import files
 from typing import Any
@@ -23,10 +24,11 @@ from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.pictures.view import VIEW
 from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
-from ringbalance.reports.sections import SECTIONS, drawings_in, section_views, viewed
+from ringbalance.reports.sections import SECTIONS, collected, completed, drawings_in, section_views, viewed
 from ringbalance.reports.traces import untraced
 from ringbalance.scene.models import Scene
-from ringbalance.verification.loops import loop_scene
+from ringbalance.scene.platform.processes import Workers
+from ringbalance.verification.loops import calibration_of, loop_scene
 from ringbalance.verification.runner import paper_scene
 
 Record = dict[str, Any]
@@ -256,3 +258,17 @@ def test_half_the_fitted_constant_gives_the_literal_reading_the_same_runs(again:
 def test_only_the_papers_moment_has_a_literal_reading(work: Work) -> None:
     with pytest.raises(ValueError, match="only the paper's model"):
         paper_again.literal_moment(work.calibration.model)
+
+
+def test_evidence_is_in_the_page_s_order_whoever_collected_it() -> None:
+    scene = paper_scene()
+    work = Work(scene=scene, calibration=calibration_of(scene), level="light")
+    found = {"trade": {"a": 1}, "summary": {"b": 2}}
+    alone = completed(dict(found), {}, work, None)
+    assert list(alone) == ["summary", "trade"]
+    with Workers(1) as pool:
+        # No worker has begun it.
+        shared = completed(dict(found), {"sloshing": Future()}, work, pool)
+    assert list(shared) == ["summary", "sloshing", "trade"]
+    whole = collected(work, without=[s.name for s in SECTIONS if s.name != "sloshing"])
+    assert shared["sloshing"] == whole["sloshing"]

@@ -36,8 +36,8 @@ UNITS: Final = {
     "stall_pressure": "Pa",
 }
 UNSTATED: Final = (
-    "The scene states no uncertainty of its inputs, so no ± here holds what they would add; a value without ± "
-    "is known no better than the inputs."
+    "The scene states no uncertainty of its inputs, so no ± here holds what they would add; a value without "
+    "± is known no better than the inputs."
 )
 _DIGITS: Final = 9
 _UNSTATED_DIGITS: Final = 4

@@ -16,8 +16,7 @@ from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import MODEL_CAUSES
-from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
+from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR, START_ERROR

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from ringbalance.scene import deferred
 from ringbalance.scene.faults import Fault, toml_text
-from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of, shown
+from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Bend, Scene
@@ -138,7 +138,7 @@ def in_usual_unit(path: str, value: float) -> float:
 def scene_fault(*, scene: Scene, table: str, key: str, problem: str, allowed: str) -> Fault:
     """The error about a value of a loaded scene that only a later room finds; raise `SceneError` with it."""
     path = f"{table}.{key}"
-    line = _LINES.get(path) or _Line(path=path, shown=shown(key), dimension="")
+    line = _LINES.get(path) or _Line(path=path, shown=Shown(key), dimension="")
     written = toml_text(_written(line, _value(scene, path)))
     return Fault(file=scene.file, table=table, key=key, value=written, problem=problem, allowed=allowed)
 

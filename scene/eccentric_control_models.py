@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, Protocol
 
 from ringbalance.scene.keys.declaration import derived, standard
-from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, angle_of_turn, each_of, quantity
-from ringbalance.scene.keys.quantities import (
+from ringbalance.scene.keys.fields import (
+    NOT_NEGATIVE,
+    POSITIVE,
     Damping,
     Gate,
     Length,
@@ -24,6 +25,9 @@ from ringbalance.scene.keys.quantities import (
     Unbalance,
     Velocity,
     Weight,
+    angle_of_turn,
+    each_of,
+    quantity,
 )
 
 Discretisation = Literal["exact", "euler"]

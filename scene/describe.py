@@ -135,9 +135,9 @@ def in_usual_unit(path: str, value: float) -> float:
     return float(format_quantity(value, dimension, usual_unit(path), digits=_EXACT).split(" ")[0])
 
 
-def scene_fault(*, scene: Scene, table: str, key: str, problem: str, allowed: str) -> Fault:
+def scene_fault(scene: Scene, path: str, *, problem: str, allowed: str) -> Fault:
     """The error about a value of a loaded scene that only a later room finds; raise `SceneError` with it."""
-    path = f"{table}.{key}"
+    table, key = path.split(".")
     line = _LINES.get(path) or _Line(path=path, shown=Shown(key), dimension="")
     written = toml_text(_written(line, _value(scene, path)))
     return Fault(file=scene.file, table=table, key=key, value=written, problem=problem, allowed=allowed)

@@ -35,9 +35,8 @@ def controller_of(scene: Scene, model: BalancerModel | None = None) -> Controlle
             raise ValueError("the law-based algorithm needs a model, such as calibrate(scene).model")
         return law_based_of(scene, model)
     fault = scene_fault(
-        scene=scene,
-        table="controller",
-        key="kind",
+        scene,
+        "controller.kind",
         problem="this version does not simulate this algorithm",
         allowed='"target_vector", "trial", "law_based"',
     )

@@ -13,14 +13,21 @@ from ringbalance.controller.algorithms.algorithm import Command, Controller, Mea
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
 from ringbalance.controller.formulas.stopping import Cause, has_held, has_risen, stop_cause
-from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots
 from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
 from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.outcome import VERDICTS, Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
-from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
+from ringbalance.controller.simulation import (
+    Injection,
+    Outcome,
+    Sample,
+    Simulation,
+    misadjustments,
+    noise_floor,
+    overshoots,
+)
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.chamber.gravity import check_ring

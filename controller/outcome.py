@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Final
 
 from ringbalance.controller.formulas.stopping import NOTICEABLE, Cause, has_grown
-from ringbalance.controller.judgement import NOISE_DEVIATIONS
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import (
     BEYOND_CAPACITY,
@@ -19,7 +18,7 @@ from ringbalance.controller.liquid_ring.reach import (
     starting_pressure,
 )
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.controller.simulation import Injection, Outcome, Sample, Verdict
+from ringbalance.controller.simulation import NOISE_DEVIATIONS, Injection, Outcome, Sample, Verdict
 from ringbalance.controller.tuning.dead_time import standing_remedy
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
 from ringbalance.controller.tuning.recommendation import recommended_gain

@@ -39,6 +39,9 @@ DissolvedGas = Literal["none", "saturated"]
 PressurePlace = Literal["chamber", "shaft"]
 Entrance = Literal["sharp", "rounded", "projecting"]
 GasProcess = Literal["isothermal", "adiabatic"]
+_OUTRIGHT = derived(
+    "that of the known liquid", "wins when given; its uncertainty is then 0 unless [uncertainty] has one"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,23 +145,11 @@ class Liquid:
         ),
         Shown("temperature", "degC", absent="not given"),
     ]
-    density: Annotated[
-        float,
-        quantity("density", POSITIVE),
-        derived(
-            "that of the known liquid",
-            "wins when given; its uncertainty is then 0 unless [uncertainty] has one",
-        ),
-        UNCERTAIN,
-        Shown("density", "kg/m^3"),
-    ]
+    density: Annotated[float, quantity("density", POSITIVE), _OUTRIGHT, UNCERTAIN, Shown("density", "kg/m^3")]
     kinematic_viscosity: Annotated[
         float,
         quantity("kinematic_viscosity", POSITIVE),
-        derived(
-            "that of the known liquid",
-            "wins when given; its uncertainty is then 0 unless [uncertainty] has one",
-        ),
+        _OUTRIGHT,
         UNCERTAIN,
         Shown("kinematic viscosity", "mm^2/s"),
     ]

@@ -179,7 +179,7 @@ def _react(shared: Record, run: Record, noise: tuple[float, float], noise_before
 
 @in_place
 def _watch(shared: Record, run: Record, seen_before: float) -> None:
-    """Overshoots, rises and misadjustments, as `judgement` counts them."""
+    """Overshoots, rises and misadjustments, as `simulation` counts them."""
     if run.samples == 1:
         run.first_seen = run.seen_amplitude
     elif run.seen_amplitude > shared.limit:

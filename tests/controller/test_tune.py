@@ -18,8 +18,7 @@ from ringbalance.controller.eccentric_mass.strategy.settings import StrategySett
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.cli import _show
 from ringbalance.controller.tuning.eccentric import FIRST_RUNS, eccentric_settling, tune_eccentric
-from ringbalance.controller.tuning.loop_factor import vibration_rates
-from ringbalance.controller.tuning.margins import loop_margins
+from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
 from ringbalance.reduced_model.calibration import calibrated_model

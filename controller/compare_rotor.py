@@ -17,8 +17,7 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.speed import speed_at
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
 from ringbalance.controller.rotor import wrapped
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene, SpeedPoint

@@ -12,10 +12,9 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
-from ringbalance.controller.formulas.stopping import Cause, has_held, has_risen, stop_cause
-from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
+from ringbalance.controller.formulas import Cause, has_held, has_risen, stop_cause
+from ringbalance.controller.liquid_ring.integrators import integrator_of
 from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.outcome import VERDICTS, Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
@@ -93,7 +92,7 @@ def simulate(
     check_fit(scene, balancer)
     if modelled and integrator is not None:
         raise ValueError("an integrator carries the flow law alone: give it, or terms to model")
-    quasi_steady = integrator or (closed_form if has_closed_form(balancer.flow) else quadrature)
+    quasi_steady = integrator or integrator_of(balancer.flow)
     asked = () if integrator is not None else modelled
     used = run_models(scene=scene, model=balancer, asked=asked)
     residual = residual_fill_ratio(scene, law=balancer.flow) if residual_fill is None else residual_fill

@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Final
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.formulas.stopping import has_risen, has_turned
+from ringbalance.controller.formulas import has_risen, has_turned
 from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.plant import Operation
 from ringbalance.controller.tuning.loop_factor import LoopFactor

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from ringbalance.controller.formulas.control_law import valve_time
+from ringbalance.controller.formulas import valve_time
 
 StateT = TypeVar("StateT")
 

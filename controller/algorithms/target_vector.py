@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, valve_commands
-from ringbalance.controller.formulas.control_law import vector_gas_time, vector_shares
+from ringbalance.controller.formulas import vector_gas_time, vector_shares
 
 OnReversal = Literal["reset", "accumulate"]
 

@@ -15,8 +15,8 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     start_estimate,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise
+from ringbalance.controller.eccentric_mass.plant.open_loop import longest_run
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.substep_limit import longest_run
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
 from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains

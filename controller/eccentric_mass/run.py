@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
+from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, check_substeps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation, found_beforehand, remedies_of
 from ringbalance.controller.eccentric_mass.run_loop import Record, recorded
 from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan

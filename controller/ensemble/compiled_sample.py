@@ -19,8 +19,7 @@ from ringbalance.controller.ensemble.compiled_disc import (
 from ringbalance.controller.ensemble.compiled_motion import begin, inject
 from ringbalance.controller.ensemble.compiled_noise import noise_pair, uniform_radii
 from ringbalance.controller.ensemble.compiled_records import Record
-from ringbalance.controller.formulas.control_law import valve_time, vector_gas_time, vector_shares
-from ringbalance.controller.formulas.stopping import (
+from ringbalance.controller.formulas import (
     AT_REST,
     HELD,
     NONE,
@@ -31,6 +30,9 @@ from ringbalance.controller.formulas.stopping import (
     has_risen,
     has_turned,
     stop_cause,
+    valve_time,
+    vector_gas_time,
+    vector_shares,
 )
 from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
 from ringbalance.scene.arrays import FloatArray

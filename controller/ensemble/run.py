@@ -15,7 +15,7 @@ from ringbalance.controller.ensemble.compiled_records import GAS_LINE, MOMENT_NO
 from ringbalance.controller.ensemble.compiled_sample import run_members
 from ringbalance.controller.ensemble.samples import LARGEST_RATIO, Members
 from ringbalance.controller.ensemble.transfer import PairTransfer
-from ringbalance.controller.formulas.paths import piece_rise
+from ringbalance.controller.formulas import piece_rise
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
 from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATIONS, TAIL_POINTS
 from ringbalance.controller.rotor import chamber_directions

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ringbalance.controller.formulas.stopping import NOTICEABLE
+from ringbalance.controller.formulas import NOTICEABLE
 from ringbalance.controller.liquid_ring.interval import longest_opening, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
 from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL, opening_within

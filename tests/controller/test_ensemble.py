@@ -26,7 +26,7 @@ from ringbalance.controller.ensemble.monte_carlo import (
 from ringbalance.controller.ensemble.run import MomentTable
 from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
 from ringbalance.controller.ensemble.transfer import PairTransfer
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor

@@ -18,9 +18,8 @@ from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
 from ringbalance.controller.algorithms.law_based import InfluenceEstimate
 from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
-from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.integrators import closed_form, quadrature
 from ringbalance.controller.liquid_ring.opening import gas_time
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import chamber_directions

@@ -12,7 +12,7 @@ import pytest
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.integrators import closed_form
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import disc_unbalance

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.observations import Observations

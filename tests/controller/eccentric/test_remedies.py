@@ -13,8 +13,8 @@ import pytest
 from scipy.stats import chi2
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
+from ringbalance.controller.eccentric_mass.plant.open_loop import check_substeps, longest_run
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps, longest_run
 from ringbalance.controller.eccentric_mass.remedies import (
     _more_time,
     _slower_walks,

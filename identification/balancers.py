@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED

@@ -7,15 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ringbalance.identification.criticism.review import Review
+from ringbalance.identification.data.kinds import template as template_of
 from ringbalance.identification.data.reading import read_observations
-from ringbalance.identification.data.template import template as template_of
-from ringbalance.identification.documents import fit_document
+from ringbalance.identification.documents import fit_document, fit_view
 from ringbalance.identification.fitting import Loss, problem_of
 from ringbalance.identification.fitting import fit as fit_scene
 from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.saving import save_result
-from ringbalance.identification.show import fit_view
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean
 from ringbalance.scene.loader import read_scene
 from ringbalance.scene.platform.files import check_file

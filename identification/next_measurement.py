@@ -15,7 +15,7 @@ import numpy as np
 
 from ringbalance.identification.balancers import both_sides
 from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.result import FitResult

@@ -16,7 +16,7 @@ from itertools import combinations
 from pathlib import Path, PurePath
 from typing import Any, Final
 
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, FittedParameter

@@ -18,8 +18,7 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
 from ringbalance.reduced_model.chamber.gravity import closed_ring
-from ringbalance.reduced_model.chamber.imported_walls import share_across
-from ringbalance.reduced_model.chamber.values import paper_closed_forms
+from ringbalance.reduced_model.chamber.values import paper_closed_forms, share_across
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import BoolArray, FloatArray

@@ -12,10 +12,9 @@ from typing import Final
 import numpy as np
 
 from ringbalance.identification.criticism.law_comparison import LawComparison
-from ringbalance.identification.criticism.linear_fit import LinearFit
-from ringbalance.identification.criticism.patterns import Criticism
+from ringbalance.identification.criticism.patterns import Criticism, LinearFit
 from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.predict.device import Device
 from ringbalance.identification.result import FitResult

@@ -8,8 +8,12 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
-from ringbalance.reduced_model.chamber.imported_walls import drawing_shares, share_across
-from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
+from ringbalance.reduced_model.chamber.values import (
+    by_closed_form,
+    by_quadrature,
+    drawing_shares,
+    share_across,
+)
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene

@@ -15,8 +15,10 @@ from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.terms import MEAN, PLATES, chamber_contributions
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.law.building import tube_path
-from ringbalance.reduced_model.selection.loss_models import CONSTANT_MODELS, MODELS, ROTATING
 from ringbalance.reduced_model.selection.range_flow import (
+    CONSTANT_MODELS,
+    MODELS,
+    ROTATING,
     SHARES,
     flows,
     range_ends,

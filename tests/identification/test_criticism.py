@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.identification.criticism.law_comparison import NEEDED, LawComparison, summaries
-from ringbalance.identification.criticism.linear_fit import LinearFit
-from ringbalance.identification.criticism.patterns import LEVEL, Criticism, runs_probability
+from ringbalance.identification.criticism.patterns import LEVEL, Criticism, LinearFit, runs_probability
 from ringbalance.scene.arrays import FloatArray
 
 ROWS = 60

@@ -12,10 +12,9 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.identification.data import tables
-from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.kinds import KINDS, template
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.data.reading import observations_of, read_observations
-from ringbalance.identification.data.template import template
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.models import Scene
 

@@ -15,7 +15,7 @@ from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.identification.balancers import fitted_names
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of

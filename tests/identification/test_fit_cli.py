@@ -18,9 +18,8 @@ from ringbalance.identification.balancers import informed
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.patterns import Criticism
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.kinds import KINDS
+from ringbalance.identification.data.kinds import KINDS, template
 from ringbalance.identification.data.reading import observations_of, read_observations
-from ringbalance.identification.data.template import template
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene

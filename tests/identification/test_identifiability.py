@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import DEPENDENT, Verdict, power_text
 from ringbalance.identification.predict.device import Models

@@ -14,7 +14,7 @@ from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, Review, power_of
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
 from ringbalance.identification.predict.device import Device, Models

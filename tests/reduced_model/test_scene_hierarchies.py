@@ -20,7 +20,7 @@ from ringbalance.reduced_model.chamber.values import (
     by_paper,
     by_quadrature,
 )
-from ringbalance.reduced_model.selection.loss_models import (
+from ringbalance.reduced_model.selection.range_flow import (
     CONSTANT,
     CORRELATIONS,
     LOSSES,

@@ -21,8 +21,14 @@ from ringbalance.reduced_model.chamber.terms import MEAN
 from ringbalance.reduced_model.chamber.values import paper_closed_forms
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
-from ringbalance.reduced_model.selection.loss_models import CONSTANT, LOSSES, loss_at, with_loss
-from ringbalance.reduced_model.selection.range_flow import SHARES, equal_velocity
+from ringbalance.reduced_model.selection.range_flow import (
+    CONSTANT,
+    LOSSES,
+    SHARES,
+    equal_velocity,
+    loss_at,
+    with_loss,
+)
 from ringbalance.reduced_model.selection.tube_terms import (
     CREST,
     LEVEL_STEPS,

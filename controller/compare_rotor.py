@@ -224,5 +224,5 @@ def _check_rotor(rotor: OneRotor, scene: EccentricScene, found: EccentricRotor) 
 
 
 def _refusal(scene: AnyScene, table: str, key: str, problem: str, allowed: str) -> SceneError:
-    fault = Fault(file=scene.file, table=table, key=key, value="", problem=problem, allowed=allowed)
+    fault = Fault(file=scene.file, table=table, key=key, problem=problem, allowed=allowed)
     return SceneError([fault])

@@ -141,6 +141,15 @@ class Verdict(StrEnum):
     """A small residual grows, or the amplitude did."""
 
 
+_VERDICTS: Final[Mapping[Outcome, Verdict]] = {
+    Outcome.SETTLED: Verdict.SETTLED,
+    Outcome.HOVERING: Verdict.HOVERING,
+    Outcome.UNSTABLE: Verdict.UNSTABLE,
+    Outcome.DIVERGING: Verdict.UNSTABLE,
+}
+"""What an outcome says of the loop; any other: not settled."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Sample:
     """One look at the vibration and what the controller made of it."""
@@ -174,7 +183,6 @@ class Simulation:
     integrator: str
     """How operations were carried through time."""
     outcome: Outcome
-    verdict: Verdict
     settled: bool
     """Whether the amplitude held within the limit for the hold time and is expected to stay."""
     settling_time: float | None
@@ -209,6 +217,11 @@ class Simulation:
     """Every physical term, with its model and its estimated contribution."""
     terms_modelled: tuple[str, ...]
     """Names of the terms that are modelled beyond the flow law; empty: it alone carries the operations."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the outcome says of the loop."""
+        return _VERDICTS.get(self.outcome, Verdict.NOT_SETTLED)
 
     # Most runs are one of many, of which nobody asks what follows.
     @property

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Literal, Protocol
 
 from ringbalance.scene.keys.declaration import derived, standard
@@ -45,22 +46,6 @@ class _Corner(Protocol):
 
     @property
     def speed(self) -> float: ...
-
-
-def _a_tenth(radius: float) -> float:
-    return radius / 10
-
-
-def _assumed_position_noise(noise: float) -> float:
-    return max(noise, _FINEST_POSITION)
-
-
-def _assumed_velocity_noise(noise: float) -> float:
-    return max(noise, _FINEST_VELOCITY)
-
-
-def _assumed_rate_noise(noise: float) -> float:
-    return max(noise, _FINEST_RATE)
 
 
 def _capacity(mass: float, radius: float) -> float:
@@ -114,7 +99,7 @@ class ImbalanceFilter:
             "position_noise of [sensor], at least 1 um",
             "standard deviation that the filter assumes",
             "sensor.position_noise",
-            rule=_assumed_position_noise,
+            rule=partial(max, _FINEST_POSITION),
         ),
     ]
     velocity_noise: Annotated[
@@ -123,7 +108,7 @@ class ImbalanceFilter:
             "velocity_noise of [sensor], at least 10 um/s",
             "standard deviation that the filter assumes",
             "sensor.velocity_noise",
-            rule=_assumed_velocity_noise,
+            rule=partial(max, _FINEST_VELOCITY),
         ),
     ]
     velocity_walk: Annotated[
@@ -201,7 +186,7 @@ class FrictionFilter:
             "encoder_rate_noise of [sensor], at least 0.001 rad/s",
             "standard deviation that the filter assumes",
             "sensor.encoder_rate_noise",
-            rule=_assumed_rate_noise,
+            rule=partial(max, _FINEST_RATE),
         ),
     ]
     rate_walk: Annotated[Rate, standard("0.01 rad/s", "random walk of the speed of a mass within 1 s")]
@@ -220,7 +205,7 @@ class FrictionFilter:
             "a tenth of guide_radius",
             "standard deviation of the friction arm before the first update",
             "masses.guide_radius",
-            rule=_a_tenth,
+            rule=lambda radius: radius / 10,
         ),
     ]
     drive_speed: Annotated[

@@ -43,5 +43,5 @@ def checked_law(scene: AnyScene, law: str) -> None:
 def _wrong_kind(scene: AnyScene, problem: str, kind: str) -> SceneError:
     value = f'"{scene.balancer}"'
     allowed = f'a scene with balancer = "{kind}"; report, simulate, tune, compare and fit take both'
-    fault = Fault(file=scene.file, table="", key="balancer", value=value, problem=problem, allowed=allowed)
+    fault = Fault(file=scene.file, key="balancer", value=value, problem=problem, allowed=allowed)
     return SceneError([fault])

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand, valve_commands
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand, opening
 from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
 from ringbalance.controller.liquid_ring.opening import gas_time
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
@@ -140,15 +140,13 @@ class LawBased:
         seen = self._seen(state, measurement)
         if measurement.amplitude <= self.limit:
             return seen, Command(resting=True)
-        asked = self._gas_times(seen, _vector(measurement))
-        valves = valve_commands(
-            asked,
+        command = opening(
+            self._gas_times(seen, _vector(measurement)),
             minimum_gas_time=self.minimum_gas_time,
             maximum_gas_time=self.maximum_gas_time,
             offsets=self.offsets,
         )
-        reason = "" if valves else "the valve-open time is below the minimum"
-        return replace(seen, valves=valves), Command(valves=valves, reason=reason)
+        return replace(seen, valves=command.valves), command
 
     def _seen(self, state: _LawBasedState, now: Measurement) -> _LawBasedState:
         """Follow the liquid to the sample's time, and learn from the response."""

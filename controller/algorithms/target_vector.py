@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, valve_commands
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, opening
 from ringbalance.controller.formulas import vector_gas_time, vector_shares
 
 OnReversal = Literal["reset", "accumulate"]
@@ -93,14 +93,13 @@ class TargetVector:
             length=min(max(wanted, 0.0), self.maximum_gas_time),
             at_residual=measurement.at_residual,
         )
-        valves = valve_commands(
+        command = opening(
             shares,
             minimum_gas_time=self.minimum_gas_time,
             maximum_gas_time=self.maximum_gas_time,
             offsets=self.offsets,
         )
-        reason = "" if valves else "the valve-open time is below the minimum"
-        return replace(state, integral=integral, previous=measurement), Command(valves=valves, reason=reason)
+        return replace(state, integral=integral, previous=measurement), command
 
     def _pid(self, state: TargetVectorState, now: Measurement) -> tuple[float, float]:
         """Unlimited valve-open time of the vector and the integral to remember."""

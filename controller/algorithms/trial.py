@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, valve_commands
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, opening
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,13 +65,12 @@ class Trial:
         fell = state.previous is not None and amplitude < state.previous
         rose = state.previous is not None and not fell
         position = (state.position + rose) % len(self.sequence)
-        valves = valve_commands(
+        command = opening(
             ((self.sequence[position], self._gas_time(amplitude, first=not fell)),),
             minimum_gas_time=self.minimum_gas_time,
             maximum_gas_time=self.maximum_gas_time,
         )
-        reason = "" if valves else "the valve-open time is below the minimum"
-        return TrialState(position=position, previous=amplitude), Command(valves=valves, reason=reason)
+        return TrialState(position=position, previous=amplitude), command
 
     def _gas_time(self, amplitude: float, *, first: bool) -> float:
         fine = amplitude < self.fine_below

@@ -99,7 +99,7 @@ def _faster(bare: Candidate, offset: Candidate, model: BalancerModel, known: Fac
     """Of two the one of which more of a few runs settle, or as many with the slowest sooner."""
 
     def rank(each: Candidate) -> tuple[float, float]:
-        found = tried(each.scene, model, known.widths, told=lambda _: None)
+        found = tried(each.scene, model, known.widths)
         return found.settled.value, -(found.quantiles["p95"] or math.inf)
 
     return max(bare, offset, key=rank)
@@ -151,7 +151,7 @@ def _try(
 ) -> SettlingTimes:
     what = each.change or "the recommended gain alone"
     told(f"{what} ...")
-    found = tried(each.scene, model, known.widths, told=lambda _: None)
+    found = tried(each.scene, model, known.widths)
     rows.append(Tried(change=what, settled=found.settled.value, runs=found.runs))
     return found
 

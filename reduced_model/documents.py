@@ -95,14 +95,9 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
         | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
         | _curve(chamber.moment, at, "moment", "kg_m")
         | {name: _listed(values) for name, values in paper_columns(calibration, fills).items()}
-        | _across(scene, fills)
+        | {"moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills)))}
         | {"lambda_per_transferred_mass_m": _listed(calibration.lambda_over_fill(fill_ratio=fills))}
     )
-
-
-def _across(scene: Scene, fills: FloatArray) -> dict[str, Any]:
-    """Angle from the middle of a chamber to the moment of liquid moved at the fills; zero for a sector."""
-    return {"moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills)))}
 
 
 def _check(check: ElementCheck) -> dict[str, Any]:

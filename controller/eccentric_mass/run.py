@@ -11,7 +11,7 @@ from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, chec
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation, found_beforehand, remedies_of
 from ringbalance.controller.eccentric_mass.run_loop import Record, recorded
-from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, StageSpan
 from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings, believed_whirl
@@ -69,12 +69,7 @@ def simulate_eccentric(
         voltage=np.ascontiguousarray(record.voltage.T),
         drive_off=record.hold == RELEASED,
         energy=record.energy,
-        estimates=EccentricEstimates(
-            imbalance=record.imbalance,
-            imbalance_covariance=record.imbalance_covariance,
-            friction_arm=record.friction_arm,
-            friction_variance=record.friction_variance,
-        ),
+        estimates=record,
         stages=_stages(record.stage, time),
         targets=_targets(scene, record),
         unbalanced_amplitude=_unbalanced(scene, float(speed[-1])),

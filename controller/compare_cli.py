@@ -15,9 +15,9 @@ from ringbalance.controller.compare import Comparison, Side
 from ringbalance.controller.compare import compare as compare_scenes
 from ringbalance.controller.tuning.dead_time import offset_text
 from ringbalance.reduced_model.calibration import law_by_name
-from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.terminal import activity, results_console
 
 SETTLED = 0

@@ -12,8 +12,8 @@ from typing import Final
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.formulas import has_risen, has_turned
-from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.plant import Operation
+from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.results import Status

@@ -19,12 +19,11 @@ from ringbalance.controller.line_runs import line_runs, line_runs_document, line
 from ringbalance.controller.loop import simulate as run_loop
 from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reports.figures import deferred
-from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene, checked_law
+from ringbalance.scene.narrowing import AnyScene, Models, checked_law, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.terminal import Activity, activity, results_console
 

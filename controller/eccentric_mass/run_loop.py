@@ -8,11 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.plant.friction import STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant, stretches
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at, turned
-from ringbalance.controller.eccentric_mass.plant.plant import electrical_energy, rest_state, stuck_flags
+from ringbalance.controller.eccentric_mass.plant.plant import (
+    STUCK,
+    electrical_energy,
+    rest_state,
+    stuck_flags,
+)
 from ringbalance.controller.eccentric_mass.strategy.plan import (
     RELEASED,
     Cause,

@@ -34,7 +34,7 @@ from ringbalance.controller.formulas import (
     vector_gas_time,
     vector_shares,
 )
-from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
+from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.scene.arrays import FloatArray
 
 _CERTAIN: Final = 1 + 1e-9

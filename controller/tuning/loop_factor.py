@@ -19,8 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.algorithms.law_based import LawBased
-from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
+from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, pair_changes
 from ringbalance.controller.algorithms.target_vector import TargetVector
 from ringbalance.controller.liquid_ring.reach import (
     LEAST_PRESSURE,

@@ -19,8 +19,7 @@ from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.predict.device import Device
 from ringbalance.identification.result import FitResult
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.tables.fit import table_from_samples
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
 from ringbalance.scene.arrays import FloatArray, StringArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene

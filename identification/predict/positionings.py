@@ -11,10 +11,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import rest_state
+from ringbalance.controller.eccentric_mass.plant.plant import LOCKED, STUCK, rest_state
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.predicted import PredictedKind
 from ringbalance.scene.arrays import FloatArray, IntArray

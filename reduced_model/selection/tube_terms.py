@@ -28,9 +28,9 @@ from ringbalance.reduced_model.selection.range_flow import (
 )
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.regime import SiphonCrest
-from ringbalance.scene.accuracy import FINEST
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import FINEST
 from ringbalance.scene.tube_models import CORRELATION, FINEST_MODELS, LEFT_OUT, Fidelity, TubeModels
 
 TUBE_LOSS: Final = "loss of the tube"

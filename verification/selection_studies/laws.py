@@ -36,11 +36,11 @@ from ringbalance.reduced_model.selection.tube_terms import (
     flow_contributions,
     loss_contributions,
 )
-from ringbalance.reduced_model.tables.fit import table_from_samples
+from ringbalance.reduced_model.tables import table_from_samples
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import with_tolerance
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
 
 EQ_12: Final = "Eq. 12"

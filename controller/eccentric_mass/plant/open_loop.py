@@ -13,10 +13,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import LONGEST, fastest_rate, plant_step
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
-from ringbalance.controller.eccentric_mass.plant.plant import SIZE, rest_state, stuck_flags
+from ringbalance.controller.eccentric_mass.plant.plant import LOCKED, SIZE, STUCK, rest_state, stuck_flags
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError

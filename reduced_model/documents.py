@@ -192,12 +192,12 @@ def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
     """What limits a chamber at the reported fill ratios."""
     scene, chamber = calibration.scene, calibration.chamber
     fills, computed = chamber.reported_fill_ratio, chamber.ring.closed[list(chamber.reported)]
-    return row_status(scene, fill_ratio=fills, closed=computed & closed_ring(scene, fills))
+    return _row_status(scene, fill_ratio=fills, closed=computed & closed_ring(scene, fills))
 
 
 def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[RowStatus, ...]:
     """What limits a velocity out of a chamber at fill ratios, under the scene's gas pressure."""
-    return row_status(
+    return _row_status(
         calibration.scene,
         fill_ratio=fill_ratio,
         closed=closed_ring(calibration.scene, fill_ratio),
@@ -302,7 +302,7 @@ REMEDIES: Final[Mapping[RowStatus, str]] = MappingProxyType(
 )
 
 
-def row_status(
+def _row_status(
     scene: Scene, *, fill_ratio: FloatArray, closed: BoolArray, residual: float = 0.0
 ) -> tuple[RowStatus, ...]:
     """Status of each fill ratio x; an empty chamber is limited by its residual liquid alone.

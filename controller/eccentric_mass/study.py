@@ -90,7 +90,7 @@ class Requirement:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EccentricStudy:
+class _EccentricStudy:
     """What a report shows of one scene."""
 
     scene: EccentricScene
@@ -114,7 +114,7 @@ class EccentricStudy:
         }
 
 
-def eccentric_study(scene: EccentricScene) -> EccentricStudy:
+def eccentric_study(scene: EccentricScene) -> _EccentricStudy:
     """Run a scene balanced and locked, and judge its loops and requirements.
 
     A scene that states uncertainties is run again with all inputs drawn, which gives the intervals, and with
@@ -125,7 +125,7 @@ def eccentric_study(scene: EccentricScene) -> EccentricStudy:
     moved, drawn = _moved_runs(scene), _drawn_runs(scene)
     rows = (_with_intervals(row, moved, drawn) for row in _of_run(scene, run))
     requirements = (*rows, *_of_loops(tuning.gains))
-    return EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
+    return _EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
 
 
 def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:

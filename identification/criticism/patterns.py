@@ -239,12 +239,12 @@ def _runs(fit: LinearFit, order: FloatArray | None) -> Iterator[_Test]:
                 test="runs",
                 block=block,
                 against="order",
-                p_value=runs_probability(plus, signs.size - plus, runs),
+                p_value=_runs_probability(plus, signs.size - plus, runs),
                 text=f"residuals of {block} keep their sign: {runs} runs in {signs.size} measurements",
             )
 
 
-def runs_probability(plus: int, minus: int, runs: int) -> float:
+def _runs_probability(plus: int, minus: int, runs: int) -> float:
     """Probability of at most so many runs among signs in random order.
 
     Source: Wald and Wolfowitz, Ann. Math. Statist. 11 (1940) 147, recalled; the counting is elementary.

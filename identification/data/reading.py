@@ -49,7 +49,7 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observ
     for path in paths:
         content, wrong = read_content(path)
         if not wrong:
-            observations, wrong = observations_of(content, file=file_name(path), scene=scene)
+            observations, wrong = _observations_of(content, file=file_name(path), scene=scene)
             found += [observations] if observations else []
         faults += in_order(wrong)
     faults += [*_given_twice(found), *_known_already(found, scene)]
@@ -76,7 +76,7 @@ def _known_already(found: Iterable[Observations], scene: AnyScene) -> Iterator[F
             yield data_fault(each.file, "", problem, allowed=allowed)
 
 
-def observations_of(
+def _observations_of(
     content: bytes, *, file: str, scene: AnyScene
 ) -> tuple[Observations | None, tuple[Fault, ...]]:
     """The observations of a file's bytes, or all that is wrong with it."""

@@ -102,7 +102,7 @@ Progress = Callable[[float, float], None]
 """Called with the simulated time and the time limit, s."""
 
 
-class PlantRun(NamedTuple):
+class _PlantRun(NamedTuple):
     """History of the plant."""
 
     time: FloatArray
@@ -151,7 +151,7 @@ def run_plant(
     commands: FloatArray | None = None,
     locked: bool = False,
     progress: Progress | None = None,
-) -> PlantRun:
+) -> _PlantRun:
     """Run a scene's plant from rest, with the voltages given.
 
     Args: `commands`: V, shape (steps, 2); None for drives switched off. `locked`: whether both masses are
@@ -173,7 +173,7 @@ def run_plant(
         if progress is not None:
             progress(end * step, scene.run.time_limit)
     elapsed: FloatArray = np.arange(len(states), dtype=np.float64) * step
-    return PlantRun(elapsed, np.interp(elapsed, times, speeds), states, flags)
+    return _PlantRun(elapsed, np.interp(elapsed, times, speeds), states, flags)
 
 
 def stretches(samples: int) -> Iterator[tuple[int, int]]:

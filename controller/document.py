@@ -16,7 +16,7 @@ from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_text, line_warning
 from ringbalance.reduced_model.selection.registry import neglected_in_injections
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.platform.terminal import two_columns
 
 
@@ -41,7 +41,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "loop_factor_limit": simulation.loop.limit,
         "largest_staying_loop_factor": simulation.loop.largest_staying,
         "vibration_rate_m_per_s": simulation.loop.rate,
-        "stationary_deviation_m": _finite(simulation.loop.deviation),
+        "stationary_deviation_m": finite(simulation.loop.deviation),
         "time_s": simulation.time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
@@ -81,8 +81,8 @@ def simulation_history(simulation: Simulation) -> dict[str, Sequence[Any]]:
         "time_s": time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
-        "measured_amplitude_m": [None if m is None else _finite(m.amplitude) for m in seen],
-        "measured_phase_rad": [None if m is None else _finite(m.phase) for m in seen],
+        "measured_amplitude_m": [None if m is None else finite(m.amplitude) for m in seen],
+        "measured_phase_rad": [None if m is None else finite(m.phase) for m in seen],
     }
     for letter, fill in simulation.fill_ratio.items():
         gas = np.zeros(time.size, dtype=np.int64)
@@ -114,14 +114,10 @@ def _samples(samples: tuple[Sample, ...]) -> dict[str, Any]:
     seen = [sample.measurement for sample in samples]
     return {
         "time_s": [sample.time for sample in samples],
-        "amplitude_m": [None if m is None else _finite(m.amplitude) for m in seen],
-        "phase_rad": [None if m is None else _finite(m.phase) for m in seen],
+        "amplitude_m": [None if m is None else finite(m.amplitude) for m in seen],
+        "phase_rad": [None if m is None else finite(m.phase) for m in seen],
         "resting": [sample.command.resting for sample in samples],
     }
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and np.isfinite(value) else None
 
 
 _BARS: Final = "▁▂▃▄▅▆▇█"

@@ -113,7 +113,7 @@ def simulate(
         exact=sensor is None and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0,
         state=DiscState.initial(disc=scene.disc),
     )
-    run.cause = run.go(progress or _silent)
+    run.cause = run.go(progress or (lambda _, __: None))
     name = getattr(quasi_steady, "__name__", "custom") if dynamics is None else RUNGE_KUTTA
     return _record(run, integrator=name, used=used)
 
@@ -124,10 +124,6 @@ def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> Balanc
     if flow_law is not None and model is None:
         return BalancerModel.of(flow_law)
     raise ValueError("give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither")
-
-
-def _silent(_: float, __: float) -> None:
-    """No progress wanted."""
 
 
 @dataclass(kw_only=True)

@@ -22,6 +22,7 @@ from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 from ringbalance.reduced_model.budget import rounded
+from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.units import format_quantity
 
@@ -107,7 +108,7 @@ def _parameter(found: FittedParameter) -> dict[str, Any]:
         "name": found.name,
         "path": found.path,
         "value": found.value,
-        "interval": [_finite(end) for end in found.interval],
+        "interval": [finite(end) for end in found.interval],
         "at_bound": list(found.at_bound),
         "before": found.before,
         "before_interval": None if found.before_interval is None else list(found.before_interval),
@@ -116,10 +117,6 @@ def _parameter(found: FittedParameter) -> dict[str, Any]:
         "verdict": found.verdict.value,
         "text": found.text,
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _noise(found: Noise) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 from ringbalance.scene.keys.declaration import derived, standard
 from ringbalance.scene.keys.fields import (
@@ -41,13 +41,6 @@ _FINEST_RATE = 1e-3
 _LONGEST_WAIT = 30.0
 
 
-class _Corner(Protocol):
-    """One corner of a speed profile."""
-
-    @property
-    def speed(self) -> float: ...
-
-
 def _capacity(mass: float, radius: float) -> float:
     """Greatest static moment of the eccentric masses, kg m."""
     return 2 * mass * radius
@@ -69,8 +62,8 @@ def _settling(damping: float, rotor: float, mass: float) -> float:
     return _LONGEST_WAIT if damping * _LONGEST_WAIT <= 8 * whole else 8 * whole / damping
 
 
-def _two_turns(profile: Sequence[_Corner]) -> float:
-    """Time of two turns of the rotor at the start, s."""
+def _two_turns(profile: Sequence[Any]) -> float:
+    """Time of two turns of the rotor at the start of a speed profile, s."""
     speeds = [abs(corner.speed) for corner in profile]
     fastest = speeds[0] or max(speeds) if speeds else 0.0
     return 4 * math.pi / fastest if fastest else 1.0

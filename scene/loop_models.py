@@ -32,11 +32,6 @@ Shaft = Literal["horizontal", "vertical"]
 ControllerKind = Literal["target_vector", "trial", "law_based"]
 
 
-def _hold_time(period: float) -> float:
-    """Of samples below a limit half of the time by chance, ten in a row are so once in a thousand."""
-    return 10 * period
-
-
 @dataclass(frozen=True, kw_only=True)
 class Environment:
     """Gravity and how the shaft lies in it."""
@@ -164,13 +159,14 @@ class ControllerSettings:
         ),
         Shown("period", "s"),
     ]
+    # Of samples below a limit half of the time by chance, ten in a row are so once in a thousand.
     hold_time: Annotated[
         PositiveTime,
         derived(
             "10 times period",
             "the run is settled once the amplitude has stayed at or below limit for this long",
             "controller.period",
-            rule=_hold_time,
+            rule=lambda period: 10 * period,
         ),
         Shown("hold time", "s"),
     ]

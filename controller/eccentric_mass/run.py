@@ -38,7 +38,7 @@ def simulate_eccentric(
     """
     check_substeps(scene)
     record, findings, innovation = recorded(
-        scene, seed, progress or _silent, settings or StrategySettings.of(scene)
+        scene, seed, progress or (lambda _, __: None), settings or StrategySettings.of(scene)
     )
     cause = Cause(int(record.cause[-1]))
     times, speeds = scene.rotor.profile
@@ -80,10 +80,6 @@ def locked_run(scene: EccentricScene, *, progress: Progress | None = None) -> Ec
     """The run of the same rotor with the masses clamped where they start: without balancing."""
     clamped = replace(scene, supervisor=replace(scene.supervisor, strategy="locked"))
     return simulate_eccentric(clamped, progress=progress)
-
-
-def _silent(_: float, __: float) -> None:
-    """No progress wanted."""
 
 
 def _facts(

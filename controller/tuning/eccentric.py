@@ -79,7 +79,7 @@ def tune_eccentric(
     ready, changes = advised(scene, gains)
     settling = None
     if runs and scene.supervisor.strategy != "locked":
-        settling = _eccentric_settling(ready, runs=runs, told=told or _silent)
+        settling = _eccentric_settling(ready, runs=runs, told=told or (lambda _: None))
     return EccentricTuning(scene=scene, gains=gains, tuned=changes, settling=settling)
 
 
@@ -135,10 +135,6 @@ def _advice(done: list[EccentricRun]) -> str:
         return ""
     usual = Counter(run.outcome for run in failed).most_common(1)[0][0]
     return next(run.status for run in failed if run.outcome is usual)
-
-
-def _silent(_: str) -> None:
-    """No progress wanted."""
 
 
 def _of_loops(gains: RecommendedGains) -> str:

@@ -37,6 +37,7 @@ from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed, neglected_in_injections
+from ringbalance.scene.arrays import finite
 from ringbalance.scene.models import Scene
 
 
@@ -100,7 +101,7 @@ def tune(
     settling times are given for it.
     Raises: SceneError: settings without a meaning, or a rotor too slow to form a ring.
     """
-    told = progress or _silent
+    told = progress or (lambda _: None)
     check_settings(scene)
     check_ring(scene)
     told("uncertainty ...")
@@ -190,10 +191,6 @@ def _line_reaches(lines: tuple[LineAnswer, ...], *, settles: bool) -> bool | Non
     return settles if all(answer.end == "given" for answer in lines) else None
 
 
-def _silent(_: str) -> None:
-    """No progress wanted."""
-
-
 def _margins(scene: Scene, loop: LoopFactor, known: FactorUncertainty) -> Margins:
     settings = scene.controller
     error = abs(settings.assumed_lag_angle - scene.rotor.lag_angle)
@@ -221,10 +218,10 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "loop_factor_limit": loop.limit,
         "present": {"loop_factor": tuning.present.value, "unstable": tuning.present.unstable},
         "vibration_rate_m_per_s": loop.rate,
-        "stationary_deviation_m": _finite(loop.deviation),
+        "stationary_deviation_m": finite(loop.deviation),
         "margins": None
         if margins is None
-        else {name: _finite(value) for name, value in asdict(margins).items()}
+        else {name: finite(value) for name, value in asdict(margins).items()}
         | {"left_gain_factor": margins.left_gain_factor, "left_phase": margins.left_phase},
         "uncertainty": [asdict(part) for part in tuning.contributions],
         "first_gas_time_s": tuning.first_gas_time,
@@ -254,10 +251,6 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "neglected": asdict(neglected_in_injections(tuning.models_used)),
         "models_used": [asdict(used) for used in tuning.models_used],
     }
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
 
 
 def _over_capacity(scene: Scene, beyond: float) -> str:

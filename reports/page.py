@@ -16,10 +16,9 @@ from PIL import Image
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
-from ringbalance.reports.figures.chamber import chamber_figures
+from ringbalance.reports.figures.calibration import chamber_figures, tube_figures
 from ringbalance.reports.figures.loop import loop_figures
 from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.figures.tube import tube_figures
 from ringbalance.reports.numbers import (
     PLUS_MINUS,
     display_unit,

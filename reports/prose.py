@@ -1,9 +1,10 @@
-"""Plain-text prose into proper signs: Greek letters, powers, subscripts; no number is changed."""
+"""Wording of the report: plain text set with proper signs, no number changed; inputs by name and origin."""
 
 from __future__ import annotations
 
 import re
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 _GREEK: Final = {
     "alpha": "α",
@@ -45,6 +46,12 @@ _UNITS: Final = {
 }
 _PLAIN: Final = re.compile(r"[^A-Za-z^%'*]*")
 """What nothing here changes, unless it has a " - ": most cells of tables."""
+_CERTAIN: Final = ("given", "measured")
+_OWNERS: Final = {"lqr": "regulator", "masses": "eccentric masses"}
+"""What a table of the scene file stands for, where that is another word."""
+_ALONE: Final = ("accuracy", "environment", "run", "gas.ambient_pressure")
+"""Tables, and a key, whose keys need no owner."""
+_MESH: Final = "disc.mesh"
 
 
 def typeset(text: str) -> str:
@@ -69,3 +76,35 @@ def key_words(path: str) -> str:
 
 def _index(match: re.Match[str]) -> str:
     return (match[1] or match[2]) + match[3].translate(_SUBSCRIPTS) + ("′" if match[4] else "")
+
+
+def series(names: list[str]) -> str:
+    """Names as a sentence has them: "a, b and c"."""
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)
+
+
+def resting(evidence: Mapping[str, Any], *paths: str) -> str:
+    """The inputs among some that are neither given nor measured, with their origin."""
+    origins = evidence["scene"].get("origins") or {}
+    by_origin: dict[str, list[str]] = {}
+    for named in paths:
+        # What follows from the mesh of an imported chamber rests on that.
+        path = _MESH if origins.get(named) == "derived" else named
+        if (origin := origins.get(path, "given")) not in _CERTAIN:
+            by_origin.setdefault(origin, []).append(key_words(path))
+    return "; ".join(f"{origin}: {', '.join(names)}" for origin, names in by_origin.items())
+
+
+def named_with_origin(evidence: Mapping[str, Any], path: str) -> str:
+    """An input's name, with its origin where it is neither given nor measured."""
+    origin = (evidence["scene"].get("origins") or {}).get(path, "given")
+    return input_name(path) + ("" if origin in _CERTAIN else f" ({origin})")
+
+
+def input_name(path: str) -> str:
+    """The name of an input that a path in the scene file stands for, such as "bore of the tube"."""
+    table, _, key = path.partition(".")
+    owner = _OWNERS.get(table, table.replace("_", " "))
+    if not key or path.startswith(_ALONE) or owner in key_words(path).split():
+        return key_words(path) if key else path
+    return f"{key_words(path)} of the {owner}"

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from ringbalance.reports.numbers import percent
+from ringbalance.reports.prose import series
 from ringbalance.reports.section import Record
 
 CLAIM_VERDICTS: Final = ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run")
@@ -109,7 +110,9 @@ def lead_sentence(evidence: Record) -> str:
     own = [case for case in checks(evidence) if case not in measured]
     run = [case for case in own if case["verdict"] != "not run"]
     passed = sum(case["verdict"] == "passed" for case in run)
-    told = f"Of {len(claims(evidence))} claims of the liquid-ring paper {_series(parts)}. "
+    told = (
+        f"Of {len(claims(evidence))} claims of the liquid-ring paper {series(parts) or 'none was judged'}. "
+    )
     foreign = sum(elsewhere(case, evidence) for case in claims(evidence))
     if foreign:
         told += (
@@ -120,12 +123,6 @@ def lead_sentence(evidence: Record) -> str:
         confirmed = sum(case["verdict"] == "confirmed" for case in measured)
         told += f" Of {len(measured)} comparisons of parts with measurements, {confirmed} are confirmed."
     return told
-
-
-def _series(parts: list[str]) -> str:
-    if len(parts) < 2:
-        return parts[0] if parts else "none was judged"
-    return f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
 def elsewhere(case: Record, evidence: Record) -> bool:

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ringbalance.verification.assumptions import Assumption
-from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Quantity
+from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Quantity, fill
 from ringbalance.verification.comparison import COVERAGE_FACTOR, Comparison
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
-from ringbalance.verification.text import fill
 from ringbalance.verification.verdicts import Verdict
 
 

@@ -19,7 +19,7 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.origins import input_name
+from ringbalance.reports.prose import input_name
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.tables import FOLDER, is_long, table_file
 from ringbalance.reports.traces import traced

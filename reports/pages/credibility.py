@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from ringbalance.reports import summary
-from ringbalance.reports.origins import input_name
+from ringbalance.reports.prose import input_name
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.verification.standing import HEADS, standing_rows
 

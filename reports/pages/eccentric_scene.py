@@ -32,9 +32,9 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.origins import input_name, named_with_origin
 from ringbalance.reports.pages import credibility, document, measured
 from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.prose import input_name, named_with_origin
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.reports.summary import OPEN
 from ringbalance.reports.traces import traced

@@ -10,7 +10,6 @@ from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING, THIN_SPACE, given, number, percent, shown
-from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
     SMALLEST,
     STANDING,
@@ -21,7 +20,7 @@ from ringbalance.reports.pages.requirements import (
     requirement_table,
     requirements,
 )
-from ringbalance.reports.prose import key_words
+from ringbalance.reports.prose import key_words, named_with_origin
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import LIKELY, MISSED, OPEN
 from ringbalance.reports.traces import found_at, read, states_uncertainty, traced

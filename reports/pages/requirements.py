@@ -11,7 +11,7 @@ from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import given, number, percent, shown
-from ringbalance.reports.origins import resting
+from ringbalance.reports.prose import resting
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.summary import (
     LIKELY,

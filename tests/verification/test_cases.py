@@ -19,12 +19,12 @@ from ringbalance.mesh.geometry import chamber_volume, half_angle
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Scene
+from ringbalance.verification.case import placeholders
 from ringbalance.verification.catalogue import case_code, load_cases
 from ringbalance.verification.document import case_document
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases
-from ringbalance.verification.text import placeholders
 from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
 
 FOLDER = Path(__file__).resolve().parents[2] / "verification" / "cases"

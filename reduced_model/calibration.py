@@ -10,8 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.tube.loss import TubeLoss, tube_loss
-from ringbalance.physics.tube.range import VELOCITIES
+from ringbalance.physics.tube.loss import VELOCITIES, TubeLoss, tube_loss
 from ringbalance.reduced_model.budget import Budget, budgets
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.gravity import check_ring

@@ -22,8 +22,7 @@ from ringbalance.physics.tube.ends import (
     kinetic_factor,
     turbulent_entrance_loss,
 )
-from ringbalance.physics.tube.friction import friction_factor
-from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
+from ringbalance.physics.tube.friction import friction_factor, reynolds_number, rotation_reynolds_number
 from ringbalance.physics.tube.rotation import (
     STRAIGHT_CRITICAL_REYNOLDS,
     critical_reynolds,

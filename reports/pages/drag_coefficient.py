@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.range import VELOCITIES
+from ringbalance.physics.tube.loss import VELOCITIES
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime

@@ -13,8 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.loss import flow_states
-from ringbalance.physics.tube.range import range_notes
+from ringbalance.physics.tube.loss import flow_states, range_notes
 from ringbalance.physics.tube.state import TubeState, tube_state_at
 from ringbalance.physics.tube.uncertainty import input_parts, model_parts
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw

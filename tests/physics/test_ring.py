@@ -16,9 +16,8 @@ from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
 from ringbalance.physics.convergence import Verdict
 from ringbalance.physics.pressure import linear as pressure_linear
-from ringbalance.physics.pressure.integrals import liquid_integrals
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
-from ringbalance.physics.pressure.ring_samples import QUANTITIES
+from ringbalance.physics.pressure.ring_samples import QUANTITIES, liquid_integrals
 from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray

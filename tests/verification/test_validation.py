@@ -24,9 +24,14 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section_without_inertia,
 )
 from ringbalance.verification.validation import tube_at_rest
-from ringbalance.verification.validation.comparison import KINDS, compare, friction
+from ringbalance.verification.validation.comparison import (
+    KINDS,
+    Comparison,
+    ModelStatistics,
+    compare,
+    friction,
+)
 from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.model_bias import ModelStatistics
 from ringbalance.verification.validation.tube_friction import laminar_ratio
 from ringbalance.verification.validation.wave_frequency import tank_frequency
 
@@ -53,13 +58,14 @@ def _synthetic(
     series = np.repeat(np.array([f"rig {i}" for i in range(20)]), count // 20)
     measured = true * np.exp(0.01 * rng.standard_normal(count))
     predicted = true * (1 + bias) * np.exp(scatter * rng.standard_normal(count))
-    return ModelStatistics.of(
+    return Comparison(
         predicted=predicted,
         measured=measured,
         series=series,
         stated=2 * np.hypot(scatter, bias) * predicted,
-        measurement_uncertainty=np.full(count, 0.02),
-    )
+        uncertainty=np.full(count, 0.02),
+        columns={},
+    ).statistics
 
 
 def test_bias_and_scatter_of_a_made_up_model_are_found() -> None:
@@ -88,13 +94,14 @@ def test_the_interval_of_the_bias_covers_when_rigs_differ() -> None:
     series = np.repeat(np.array([f"rig {i}" for i in range(8)]), 50)
     for _ in range(400):
         measured = np.exp(np.repeat(0.02 * rng.standard_normal(8), 50) + 0.005 * rng.standard_normal(400))
-        found = ModelStatistics.of(
+        found = Comparison(
             predicted=np.ones(400),
             measured=measured,
             series=series,
             stated=np.full(400, 0.04),
-            measurement_uncertainty=np.full(400, 0.01),
-        )
+            uncertainty=np.full(400, 0.01),
+            columns={},
+        ).statistics
         covered += abs(found.bias) <= found.bias_uncertainty
     assert binomtest(covered, 400, 0.95).pvalue > 1e-3
 

@@ -14,10 +14,10 @@ from ringbalance.reports.pictures.process import (
     start_drawing,
     write_fields,
 )
+from ringbalance.reports.prose import untraced
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.section import Level
 from ringbalance.reports.summary import lead_sentence
-from ringbalance.reports.traces import untraced
 from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene

@@ -31,9 +31,9 @@ from ringbalance.reports.numbers import (
 )
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.eccentric_scene import BALANCER
+from ringbalance.reports.prose import traced
 from ringbalance.reports.section import Cells, Record, Table
 from ringbalance.reports.sections import drawings_in, section_views, viewed
-from ringbalance.reports.traces import traced
 
 Facts = tuple[tuple[str, str], ...]
 """Labels and texts."""

@@ -10,9 +10,8 @@ from typing import Any
 
 from ringbalance.verification.assumptions import Assumption, overridden
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Quantity, fill
-from ringbalance.verification.comparison import COVERAGE_FACTOR, Comparison
-from ringbalance.verification.evidence import CaseCode, Evidence, Found, Level, Reference
-from ringbalance.verification.verdicts import Verdict, judge_quantity
+from ringbalance.verification.evidence import COVERAGE_FACTOR, CaseCode, Evidence, Found, Level, Reference
+from ringbalance.verification.verdicts import Comparison, Verdict, judge_quantity
 
 
 @dataclass(frozen=True, kw_only=True)

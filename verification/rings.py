@@ -10,8 +10,7 @@ from ringbalance.physics.convergence import GridConvergence, Verdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Convergence, Found
+from ringbalance.verification.evidence import Convergence, Found, from_half_width
 from ringbalance.verification.paper_numbers import RING_RADIUS, with_plate
 from ringbalance.verification.reference.exact_chamber import exact_moment
 

@@ -168,7 +168,8 @@ def developing_length(
     Args: `friction_ratio`: F of developed laminar flow there, broadcasts.
     Returns: l/d, of the broadcast shape: at least the length of the section's eigenproblem, at most 3 times
         it.
-    Range: compared with `slowest_decay` of the case `developing_flow` for Re up to 2000, R up to 1e4, R Re up to 3e5.
+    Range: compared with the decay rates of the case `developing_flow` for Re up to 2000, R up to 1e4, R Re
+        up to 3e5.
     Source: our bound of computed decay rates, with exact limits.
     """
     re, rotation, ratio = (

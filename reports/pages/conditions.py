@@ -9,9 +9,8 @@ from ringbalance.reduced_model.budget import UNSTATED, believed
 from ringbalance.reports.figures.operation import tornado
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, number, shown
-from ringbalance.reports.prose import named_with_origin
+from ringbalance.reports.prose import named_with_origin, read, states_uncertainty, traced
 from ringbalance.reports.section import Cells, Record, Section, Table
-from ringbalance.reports.traces import read, states_uncertainty, traced
 from ringbalance.verification.standing import budget_standing
 
 _NAMES: Final = {

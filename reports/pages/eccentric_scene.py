@@ -34,10 +34,9 @@ from ringbalance.reports.numbers import (
 )
 from ringbalance.reports.pages import credibility, document, measured
 from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.prose import input_name, named_with_origin
+from ringbalance.reports.prose import input_name, named_with_origin, traced
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.reports.summary import OPEN
-from ringbalance.reports.traces import traced
 
 BALANCER: Final = "eccentric_mass"
 _MODEL: Final = "Plant and filters are models; no measurement of this machine is compared with here."

@@ -20,10 +20,9 @@ from ringbalance.reports.pages.requirements import (
     requirement_table,
     requirements,
 )
-from ringbalance.reports.prose import key_words, named_with_origin
+from ringbalance.reports.prose import found_at, key_words, named_with_origin, read, states_uncertainty, traced
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import LIKELY, MISSED, OPEN
-from ringbalance.reports.traces import found_at, read, states_uncertainty, traced
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.uncertain import half_widths
 from ringbalance.verification.assumptions import assumptions_of

@@ -11,7 +11,7 @@ from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import given, number, percent, shown
-from ringbalance.reports.prose import resting
+from ringbalance.reports.prose import evidence_at, read, resting, traced, untraced
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.summary import (
     LIKELY,
@@ -29,7 +29,6 @@ from ringbalance.reports.summary import (
     what_enlarges,
     worst,
 )
-from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
 
 STANDING: Final = "Vibration up to which the scene’s valve-open times transfer no liquid"

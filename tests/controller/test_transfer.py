@@ -13,8 +13,7 @@ from ringbalance.controller.liquid_ring.closed_form import closed_form, has_clos
 from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.verification.reference.adaptive_ode import adaptive_ode
-from ringbalance.verification.reference.explicit_segments import explicit_segments
+from ringbalance.verification.reference.transfers import adaptive_ode, explicit_segments
 
 DriveBy = Callable[..., Drive]
 

@@ -32,7 +32,7 @@ from ringbalance.verification.validation.comparison import (
     friction,
 )
 from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.tube_friction import laminar_ratio
+from ringbalance.verification.validation.tube_at_rest import laminar_ratio
 from ringbalance.verification.validation.wave_frequency import tank_frequency
 
 _DATA = files("ringbalance.verification.validation") / "data"

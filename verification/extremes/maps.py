@@ -22,7 +22,7 @@ from ringbalance.verification.extremes.axes import AXES, Axis
 from ringbalance.verification.extremes.design import Base, Point
 from ringbalance.verification.extremes.point import ROUND_OFF, Ending, Judgement
 from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
-from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
+from ringbalance.verification.reference.transfers import explicit_segments, paper_drive
 
 Progress = Callable[[int, int], None]
 

@@ -19,8 +19,7 @@ from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArra
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
 from ringbalance.verification.validation.kinds import Kind, measurements
-from ringbalance.verification.validation.tube_at_rest import TUBE_AT_REST
-from ringbalance.verification.validation.tube_friction import FRICTION
+from ringbalance.verification.validation.tube_at_rest import FRICTION, TUBE_AT_REST
 from ringbalance.verification.validation.vessel import VESSEL
 from ringbalance.verification.validation.wave_frequency import WAVE_FREQUENCY
 from ringbalance.verification.verdicts import Verdict, judge_quantity

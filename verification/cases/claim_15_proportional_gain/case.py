@@ -13,8 +13,7 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_range
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table, from_range
 from ringbalance.verification.loops import amplitude_series, flow_law_of, loop_scene, run_loop, settled_after
 from ringbalance.verification.paper_numbers import fig_7_readings
 

@@ -23,8 +23,7 @@ from ringbalance.verification.cases.integrator_orders.side_by_side import (
 from ringbalance.verification.cases.integrator_orders.stall import stall_study
 from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.orders import OrderStudy
-from ringbalance.verification.reference.adaptive_ode import adaptive_ode
-from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
+from ringbalance.verification.reference.transfers import adaptive_ode, explicit_segments, paper_drive
 
 _COUNTS: Final = (8, 16, 32, 64, 128, 256)
 _INSTANTS: Final = 200

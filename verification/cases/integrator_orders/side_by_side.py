@@ -17,8 +17,7 @@ from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.evidence import Table
-from ringbalance.verification.reference.adaptive_ode import adaptive_ode
-from ringbalance.verification.reference.explicit_segments import explicit_segments
+from ringbalance.verification.reference.transfers import adaptive_ode, explicit_segments
 
 _WAYS: Final[Mapping[str, Integrator]] = {
     "closed form": closed_form,

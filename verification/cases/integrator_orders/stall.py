@@ -25,7 +25,7 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.cases.integrator_orders.side_by_side import TrialLaw
 from ringbalance.verification.evidence import Curve, Series, figure
-from ringbalance.verification.reference.explicit_segments import explicit_segments
+from ringbalance.verification.reference.transfers import explicit_segments
 
 _COUNTS: Final = (8, 16, 32, 64, 128)
 _PHASES: Final = np.linspace(1.0, 1.3, 31)

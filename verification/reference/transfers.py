@@ -1,5 +1,5 @@
-"""Transfers integrated in other ways: by Eq. 20's explicit segments, the paper's own way through an operation;
-and by an adaptive Runge-Kutta method with events, an independent reference."""
+"""Transfers integrated in other ways: by Eq. 20's explicit segments, the paper's own way, and by an adaptive
+Runge-Kutta method with events, an independent reference."""
 
 from __future__ import annotations
 

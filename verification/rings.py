@@ -1,13 +1,18 @@
-"""Finite-element rings that several cases share: each is computed once per process."""
+"""Finite-element rings that several cases share, each computed once per process; and mutations of their
+pressure problem, put in from outside: the product has no parameter for them."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
+from unittest.mock import patch
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.convergence import GridConvergence, Verdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
+from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid
 from ringbalance.physics.results import Estimate
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Convergence, Found, from_half_width
@@ -80,3 +85,20 @@ def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> 
         geometry="quadratic",
         note=f"{' x '.join(map(str, quantities.cells[0]))} cells on the finest mesh; {record.text}",
     )
+
+
+@contextmanager
+def mutated_pressure(*, source: float = 1.0, wall: float = 1.0) -> Iterator[None]:
+    """Multiply the source term and the walls' condition of every rotating liquid solved inside."""
+    true = RotatingLiquid.problem
+
+    def problem(liquid: RotatingLiquid) -> PressureProblem:
+        exact = true(liquid)
+        return PressureProblem(
+            source=lambda places: source * exact.source(places),
+            wall_flux=lambda places, normals: wall * exact.wall_flux(places, normals),
+            surface_pressure=exact.surface_pressure,
+        )
+
+    with patch.object(RotatingLiquid, "problem", problem):
+        yield

@@ -18,21 +18,9 @@ from ringbalance.identification.data.measurements import Measurements, Measureme
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
-from ringbalance.verification.validation.kinds import Kind, measurements
-from ringbalance.verification.validation.tube_at_rest import FRICTION, TUBE_AT_REST
-from ringbalance.verification.validation.vessel import VESSEL
-from ringbalance.verification.validation.wave_frequency import WAVE_FREQUENCY
+from ringbalance.verification.validation.kinds import KINDS, Kind, measurements
 from ringbalance.verification.verdicts import Verdict, judge_quantity
 
-KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
-    {
-        "friction": FRICTION,
-        "tube_at_rest": TUBE_AT_REST,
-        "vessel": VESSEL,
-        "wave_frequency": WAVE_FREQUENCY,
-    }
-)
-"""Kinds of data that the program can predict."""
 PROMISED: Final = 0.93
 """Fraction of the points that both 95 % uncertainties must hold: 0.95, less the chance of a small sample."""
 MUTATIONS: Final[Mapping[str | None, float]] = MappingProxyType(

@@ -17,8 +17,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.reference.gravity import tilted_liquid
-from ringbalance.verification.reference.mutated_pressure import mutated_pressure
-from ringbalance.verification.rings import ring_of
+from ringbalance.verification.rings import mutated_pressure, ring_of
 
 _FILL_SHARE: Final = 0.8
 

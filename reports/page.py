@@ -247,7 +247,7 @@ def page_content(
     context = {
         **_frame(evidence, sections),
         "tallies": _tallies(evidence),
-        "causes": _causes(evidence),
+        "causes": summary.common_causes(summary.claims(evidence)),
         "equations": _equations(),
         "figures": figures,
         "pictures": shown_pictures,
@@ -303,15 +303,6 @@ def _tallies(evidence: Record) -> Record:
         "claims": summary.verdict_counts(summary.claims(evidence), summary.CLAIM_VERDICTS),
         "checks": summary.verdict_counts(summary.checks(evidence), summary.CHECK_VERDICTS),
     }
-
-
-def _causes(evidence: Record) -> list[str]:
-    """What several claims that do not simply hold have in common."""
-    return [
-        f"{found['cause']}: claims {', '.join(map(str, found['numbers']))}"
-        for found in summary.common_causes(summary.claims(evidence))
-        if len(found["numbers"]) > 1
-    ]
 
 
 def _equations() -> Record:

@@ -115,20 +115,18 @@ def default_sloshing_cells(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, in
     return tuple((more * radial // k, more * angular // k) for k in (1, 2, 4))
 
 
-def resonant_fills(
-    *, disc: Disc, modes: int = 4, highest: float | None = None
-) -> tuple[tuple[int, float], ...]:
+def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ...]:
     """Fills at which a natural frequency equals the speed, s_n(x) = 1, whatever the speed.
 
     Args: `modes`: how many of the lowest modes are looked at; higher ones resonate in thinner rings and are
-        damped more. `highest`: fill ratio up to which to look; default the disc's largest.
+        damped more.
     Returns: Mode number (from 1) and fill ratio of each, by mode.
-    Raises: ValueError: no modes, or a highest fill outside (0, 1].
+    Raises: ValueError: no modes.
     Source: `sloshing_modes`; the frequencies grow with the fill.
     """
-    top = disc.max_fill_ratio if highest is None else highest
-    if not 0 < top <= 1 or modes < 1:
-        raise ValueError("highest must lie within (0, 1], and at least one mode must be asked for")
+    if modes < 1:
+        raise ValueError("at least one mode must be asked for")
+    top = disc.max_fill_ratio
     if disc.geometry is not None:
         return _imported_resonances(disc, modes, top)
     middle = default_sloshing_cells(disc=disc, modes=modes)[1]

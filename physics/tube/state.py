@@ -50,8 +50,6 @@ class TubeState:
     """Critical Re over the straight tube's."""
     rotating_friction: FloatArray
     """f with rotation."""
-    laminar_ratio: FloatArray
-    """F, laminar friction with rotation over that without."""
     bends: tuple[FloatArray, ...]
     """K of each bend, in order along the path."""
     bend_half_width: FloatArray
@@ -137,7 +135,6 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
         rotating_friction=turning,
         bends=tuple(k for k, _ in bends),
         bend_half_width=np.asarray(sum((w for _, w in bends), start=np.zeros(re.shape))),
-        laminar_ratio=laminar,
         kinetic_factor=alpha,
         terms=terms,
     )

@@ -21,6 +21,7 @@ from ringbalance.reports.summary import (
     UNASKED,
     above,
     below,
+    decided,
     ideal_valve,
     line_verdict,
     runs_settled,
@@ -123,12 +124,8 @@ def requirement_figure(rows: Iterable[Requirement]) -> Drawing | None:
 
 def decision(rows: Iterable[Requirement]) -> str:
     """One sentence: how many requirements are met, and which are not."""
-    judged = [row for row in rows if row.verdict in {MET, MISSED, OPEN}]
-    named = {v: [r.name[0].lower() + r.name[1:] for r in judged if r.verdict == v] for v in (MISSED, OPEN)}
-    met = len(judged) - sum(map(len, named.values()))
-    said = f"{met} of {len(judged)} requirements {'is' if met == 1 else 'are'} met"
-    parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
-    return "; ".join([said, *parts]) + "."
+    asked = (row for row in rows if row.verdict != UNASKED)
+    return decided([(row.name[0].lower() + row.name[1:], row.verdict) for row in asked])
 
 
 def _capacity(evidence: Record) -> Requirement | None:

@@ -113,10 +113,6 @@ class StabilityMap:
     judgements: tuple[Judgement, ...]
     """Row by row: all x for the first y, then for the next."""
 
-    def at(self, row: int, column: int) -> Judgement:
-        """One cell. Args: `row`: index of y. `column`: index of x."""
-        return self.judgements[row * self.x_values.size + column]
-
 
 def _answered(judgement: Judgement) -> bool:
     """Whether a point got an answer, with or without a reservation."""
@@ -248,7 +244,6 @@ def at_aspect(scene: Scene, aspect: float) -> Judgement:
         text="",
         violations=faults,
         residual=ring.statistics.relative_residual,
-        unknowns=float(ring.statistics.unknowns),
         worst_ratio=ratio,
     )
 

@@ -54,7 +54,6 @@ class Judgement:
     """What should have held and did not."""
     residual: float = 0.0
     """Largest relative residual of its linear solves."""
-    unknowns: float = 0.0
     worst_ratio: float = -1.0
     """Largest |error| over half-width against the closed form; -1 where gravity is modelled, without one."""
     loop: str = ""
@@ -103,7 +102,6 @@ def judge_point(
         text=_reservation(calibration),
         violations=violations,
         residual=float(calibration.statistics["relative_residual"]),
-        unknowns=float(calibration.statistics["unknowns"]),
         worst_ratio=ratio,
         loop=str(run.outcome),
     )

@@ -5,7 +5,6 @@ The velocity is the one that a full tube takes by itself under a head, and k is 
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -142,10 +141,3 @@ def driving_head(scene: Scene, *, share: float) -> float:
     wall = wall_pressure_of(scene, fills)
     driving = scene.gas.pressure + float(wall[0] - wall[1])
     return max(driving, _LEAST * scene.gas.pressure) / scene.liquid.density
-
-
-def with_bore(scene: Scene, factor: float) -> Scene:
-    """A scene whose bore is multiplied; a bend's radius is at least the bore, so a wide tube still bends."""
-    tube, bore = scene.tube, factor * scene.tube.bore
-    bends = tuple(dataclasses.replace(bend, radius=max(bend.radius, bore)) for bend in tube.bends)
-    return dataclasses.replace(scene, tube=dataclasses.replace(tube, bore=bore, bends=bends))

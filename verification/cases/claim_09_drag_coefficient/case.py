@@ -21,7 +21,6 @@ from ringbalance.verification.cases.claim_07_bernoulli.case import (
     driving_head,
     running_tube,
     running_tubes,
-    with_bore,
 )
 from ringbalance.verification.evidence import (
     Curve,
@@ -121,7 +120,11 @@ def _with_liquid(scene: Scene, liquid: Liquid) -> Running:
 
 
 def _with_bore(scene: Scene, factor: float) -> Running:
-    return running_tube(with_bore(scene, factor), head=scene.gas.pressure / scene.liquid.density)
+    """With the bore multiplied; a bend's radius is at least the bore, so a wide tube still bends."""
+    tube, bore = scene.tube, factor * scene.tube.bore
+    bends = tuple(dataclasses.replace(bend, radius=max(bend.radius, bore)) for bend in tube.bends)
+    changed = dataclasses.replace(scene, tube=dataclasses.replace(tube, bore=bore, bends=bends))
+    return running_tube(changed, head=scene.gas.pressure / scene.liquid.density)
 
 
 def _range(runs: Sequence[Running]) -> Found:

@@ -61,11 +61,6 @@ _PICTURE_WIDTH: Final = 1000
 _PICTURE_QUALITY: Final = 80
 
 
-def _page_figures(evidence: Record) -> Record:
-    """The figures of the sections, by name; one whose evidence is missing is None."""
-    return chamber_figures(evidence) | tube_figures(evidence) | loop_figures(evidence)
-
-
 def _column(values: list[float], unit: str, *, digits: int = 6) -> list[str]:
     """One column in one unit and to one decimal place, that of its largest value's last digit."""
     display = display_unit(unit, *values)
@@ -235,7 +230,7 @@ def page_content(
     if evidence.get("balancer") == BALANCER:
         sections = viewed(evidence, sections_by(evidence))
         return PageContent(context=_frame(evidence, sections), drawings=tuple(drawings_in(sections)))
-    figures, shown_pictures = _page_figures(evidence), _pictures(evidence["pictures"], pictures or {})
+    figures = chamber_figures(evidence) | tube_figures(evidence) | loop_figures(evidence)
     sections = viewed(evidence, sections_by(evidence))
     views = views_of(evidence["verification"])
     claims = [
@@ -250,7 +245,7 @@ def page_content(
         "causes": summary.common_causes(summary.claims(evidence)),
         "equations": _equations(),
         "figures": figures,
-        "pictures": shown_pictures,
+        "pictures": _pictures(evidence["pictures"], pictures or {}),
         "chamber": _chamber_table(calibration["chamber"]),
         "drag_at": _drag_table(calibration["tube"], evidence["operating_point"]),
         "injections": _injections(runs.get("calibrated")),
@@ -261,7 +256,8 @@ def page_content(
         "models": _models(calibration["models_used"]),
         "mesh_facts": _mesh_facts(evidence["pressure"]["mesh"]),
     }
-    drawings = drawings_in([figures, sections, *(_own_drawings(case) for case in (*claims, *checks))])
+    own = [[case["order_plot"], *case["drawings"]] for case in (*claims, *checks)]
+    drawings = drawings_in([figures, sections, *own])
     return PageContent(context=context, drawings=tuple(drawings))
 
 
@@ -276,10 +272,6 @@ def _frame(evidence: Record, sections: list[Record]) -> Record:
         "version_facts": _version_facts(evidence),
         "product": f"ringbalance {evidence['versions']['ringbalance']}",
     }
-
-
-def _own_drawings(case: Record) -> list[Record]:
-    return [case["order_plot"], *case["drawings"]]
 
 
 def _stamp(evidence: Record) -> Facts:

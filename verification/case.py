@@ -140,7 +140,7 @@ class Mutation(_Record):
     cost: Literal["light", "heavy"] = "light"
 
 
-class Study(_Record):
+class _Study(_Record):
     """A computation that several cases share, in place of a `case.py`."""
 
     of: Literal["pressure under gravity", "manufactured pressure", "choice of models", "measurements"]
@@ -173,7 +173,7 @@ class CaseDefinition(_Record):
     """One sentence for a designer, by verdict, or "default"."""
     equations: tuple[Text, ...]
     reference: _ReferenceText
-    study: Study | None = None
+    study: _Study | None = None
     """What computes it where the folder has no `case.py`."""
     judged_on: Literal["scene", "paper"] = "scene"
     """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""

@@ -10,7 +10,7 @@ from functools import lru_cache
 from unittest.mock import patch
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
-from ringbalance.physics.convergence import GridConvergence, Verdict
+from ringbalance.physics.convergence import Verdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid
 from ringbalance.physics.results import Estimate
@@ -38,16 +38,12 @@ def found_of(quantities: RingQuantities, name: str, index: int) -> Found:
     It is not conclusive where the meshes do not converge steadily.
     """
     estimate: Estimate = getattr(quantities, name)
+    converges = quantities.convergence[name][index].verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)
     return Found(
         value=float(estimate.value[index]),
         numerical=from_half_width(float(estimate.uncertainty[index])),
-        conclusive=quantities.status.ok and _conclusive(quantities.convergence[name][index]),
+        conclusive=quantities.status.ok and converges,
     )
-
-
-def _conclusive(convergence: GridConvergence) -> bool:
-    """Whether the values converge steadily or have reached round-off."""
-    return convergence.verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)
 
 
 def chamber_moment(scene: Scene, *, density: float, factor: float = 1.0) -> Found:

@@ -17,13 +17,7 @@ from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.physics.convergence import GridConvergence, gci
 from ringbalance.physics.pressure.ring_bounds import Case
-from ringbalance.physics.pressure.ring_samples import (
-    QUANTITIES,
-    Sample,
-    Turn,
-    empty_sample,
-    turn_mean,
-)
+from ringbalance.physics.pressure.ring_samples import QUANTITIES, Sample, Turn, empty_sample, turn_mean
 from ringbalance.physics.pressure.solve import RotatingLiquid
 from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.scene.arrays import BoolArray, FloatArray

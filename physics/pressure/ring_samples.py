@@ -132,7 +132,7 @@ def _solve(
     return solve_pressure(chamber=chamber, problem=liquid.problem())
 
 
-def _row(totals: LiquidIntegrals) -> list[float]:
+def _row(totals: _LiquidIntegrals) -> list[float]:
     """None of these changes in the mirror image, which gravity at the opposite angle makes."""
     return [
         totals.volume,
@@ -157,7 +157,7 @@ def _failed(status: Status) -> Sample:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LiquidIntegrals:
+class _LiquidIntegrals:
     """Integrals over the liquid of one chamber: totals."""
 
     volume: float
@@ -174,7 +174,7 @@ class LiquidIntegrals:
     """Its torque about the shaft, with the rotation, N m."""
 
 
-def liquid_integrals(*, solution: PressureSolution, density: float, axial_width: float) -> LiquidIntegrals:
+def liquid_integrals(*, solution: PressureSolution, density: float, axial_width: float) -> _LiquidIntegrals:
     """Integrals of a solution in three dimensions, or of one in a cross-section times the axial width.
 
     Every cross-section is the same without axial gravity, and the integral of its pressure is the force on
@@ -192,7 +192,7 @@ def liquid_integrals(*, solution: PressureSolution, density: float, axial_width:
         forces |= {"end_back": -push, "end_front": push}
         torques |= {"end_back": 0.0, "end_front": 0.0}
     moment = density * unit**3 * depth * np.sum(volume.weights * volume.points, axis=(1, 2))
-    return LiquidIntegrals(
+    return _LiquidIntegrals(
         volume=float(unit**2 * depth * volume.weights.sum()),
         first_moment=np.pad(moment, (0, 3 - len(moment))),
         wall_pressure=_wall_pressure(solution),

@@ -30,7 +30,7 @@ FORMAL_ORDER: Final = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class SloshingModes:
+class _SloshingModes:
     """Planar modes of the liquid in one chamber, lowest first."""
 
     fill_ratio: FloatArray
@@ -50,7 +50,7 @@ def sloshing_modes(
     fill_ratio: npt.ArrayLike,
     modes: int = 4,
     cells: tuple[tuple[int, int], ...] | None = None,
-) -> SloshingModes:
+) -> _SloshingModes:
     """Lowest natural frequencies of the liquid in one chamber, over the angular velocity.
 
     (-s^2 S + 2 i s C + A) psi = 0; without Coriolis force and plates s_n^2 = k tanh(k ln(R2/a)), k = n
@@ -76,7 +76,7 @@ def sloshing_modes(
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
     found = np.array([[_lowest(disc, float(a), counts, modes) for counts in meshes] for a in radii])
     widths = np.apply_along_axis(_half_width, 1, found, meshes)
-    return SloshingModes(
+    return _SloshingModes(
         fill_ratio=fills,
         surface_radius=radii,
         frequency_ratio=Estimate(value=found[:, 0].copy(), uncertainty=widths),
@@ -85,7 +85,7 @@ def sloshing_modes(
     )
 
 
-def _imported(disc: Disc, geometry: ChamberGeometry, fills: FloatArray, modes: int) -> SloshingModes:
+def _imported(disc: Disc, geometry: ChamberGeometry, fills: FloatArray, modes: int) -> _SloshingModes:
     """Waves in three dimensions, those along the shaft among them, on a chamber's own mesh."""
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
     waves = [ring_waves(geometry=geometry, surface_radius=float(radius)) for radius in radii]
@@ -93,7 +93,7 @@ def _imported(disc: Disc, geometry: ChamberGeometry, fills: FloatArray, modes: i
         np.array([getattr(each.frequency_ratio, name)[:modes] for each in waves])
         for name in ("value", "uncertainty")
     )
-    return SloshingModes(
+    return _SloshingModes(
         fill_ratio=fills,
         surface_radius=radii,
         frequency_ratio=Estimate(value=values, uncertainty=widths),

@@ -9,12 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.bends import (
-    BEND_UNCERTAINTY,
-    bend_loss,
-    straight_length,
-    turbulent_bend_loss,
-)
+from ringbalance.physics.tube.bends import BEND_UNCERTAINTY, bend_loss, straight_length, turbulent_bend_loss
 from ringbalance.physics.tube.ends import (
     TURBULENT_KINETIC_FACTOR,
     entrance_loss,

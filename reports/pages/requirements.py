@@ -337,10 +337,11 @@ def _of_line(evidence: Record, key: str, name: str, *, bound: str = "limit_m") -
         read(evidence, f"calibration.gas_line.ends.{i}.{key}", "m", digits=2) for i in (ends[0], ends[-1])
     )
     least, most = (line["ends"][i][key] for i in (ends[0], ends[-1]))
+    reached = low if len(ends) == 1 else f"{low} (fast valve) to {high} (slow valve)"
     return Requirement(
         name=name,
         wanted=f"at most {given(line[bound], 'm', digits=2)}",
-        result=_valves(low, high, len(ends)) if most else "none",
+        result=reached if most else "none",
         verdict=below((least, most), line[bound]),
         rests="" if line["given"] else "a default range of valves: the scene describes none",
         required=line[bound],
@@ -350,10 +351,6 @@ def _of_line(evidence: Record, key: str, name: str, *, bound: str = "limit_m") -
         unit="m",
         at_least=False,
     )
-
-
-def _valves(low: str, high: str, valves: int) -> str:
-    return low if valves == 1 else f"{low} (fast valve) to {high} (slow valve)"
 
 
 def _grade_row(evidence: Record) -> Requirement | None:

@@ -10,11 +10,7 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.ensemble.monte_carlo import (
-    Ensemble,
-    ensemble_transfer,
-    simulate_ensemble,
-)
+from ringbalance.controller.ensemble.monte_carlo import Ensemble, ensemble_transfer, simulate_ensemble
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation

@@ -156,7 +156,7 @@ def _coefficients(*, kl: float, s: float, inertia: float) -> Coefficients:
     return Coefficients(inertia=inertia, viscosity=1.0, rotation=rotation)
 
 
-def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> March:
+def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> _March:
     """The same in time, from the flow without inertia and a disturbance of one per cent.
 
     It finds what a steady solution leaves out where that is unstable; flow is alike along the tube.
@@ -206,7 +206,7 @@ def friction_ratio(solution: FlowSolution) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class March:
+class _March:
     """A flow at constant flow rate over equal steps."""
 
     gradients: FloatArray
@@ -227,7 +227,7 @@ def _march_flow(
     start: FloatArray,
     step: float,
     steps: int,
-) -> March:
+) -> _March:
     """Flow from a given one on, with the boundary values zero or those of `start`.
 
     Second-order backward differences, convection extrapolated from two steps:
@@ -256,7 +256,7 @@ def _march_flow(
         now[free] = change + found[i] * bordering
         if not np.isfinite(found[i]) or np.abs(now).max() > 1e12:
             raise ArithmeticError("the flow grew without bound: take shorter steps")
-    return March(gradients=found, vector=now)
+    return _March(gradients=found, vector=now)
 
 
 def _mass(system: FlowSystem) -> Any:

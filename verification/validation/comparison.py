@@ -189,7 +189,8 @@ def _check(data: Measurements, kind: Kind) -> None:
     missing = [name for name in wanted if name not in data.columns]
     known = {*wanted, *kind.optional, "uncertainty"}
     strange = [name for name in data.columns if name not in known]
-    faults = [f'the column "{name}" is missing: {_meaning(kind, name)}' for name in missing]
+    meaning = {kind.measured: f"the measured {kind.title}", **kind.columns}
+    faults = [f'the column "{name}" is missing: {meaning[name]}' for name in missing]
     faults += [f'the column "{name}" is not known; allowed: {", ".join(sorted(known))}' for name in strange]
     faults += [
         f'the column "{name}" must be positive in every row'
@@ -203,10 +204,6 @@ def _check(data: Measurements, kind: Kind) -> None:
     ]
     if faults:
         raise MeasurementsError("\n".join(faults))
-
-
-def _meaning(kind: Kind, name: str) -> str:
-    return kind.columns.get(name, f"the measured {kind.title}")
 
 
 def study(

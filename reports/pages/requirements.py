@@ -48,13 +48,12 @@ class Requirement:
     rests: str
     """Inputs behind it that nobody gave, with their origin."""
     required: float | None = None
-    """As a number of `unit`; None where there is none to draw."""
+    """In SI units; None where there is none to draw."""
     reached: float | None = None
     uncertainty: float = 0.0
     low: float | None = None
     high: float | None = None
     """Ends of what is reached, where they are others than plus and minus the uncertainty."""
-    unit: str = "1"
     at_least: bool = True
     """Whether more than required is better."""
 
@@ -147,7 +146,6 @@ def _capacity(evidence: Record) -> Requirement | None:
         required=needed,
         reached=rest["usable_pair_moment_kg_m"],
         uncertainty=both,
-        unit="kg m",
     )
 
 
@@ -186,7 +184,6 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
         uncertainty=both,
         low=gas * point[key] / most - both if most > 0 else None,
         high=gas * point[key] / least + both if least > 0 else None,
-        unit="Pa",
     )
 
 
@@ -265,7 +262,6 @@ def _settling(evidence: Record) -> Requirement | None:
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "controller.period"),
         required=wanted,
         reached=times.get("p95"),
-        unit="s",
         at_least=False,
     )
 
@@ -303,7 +299,6 @@ def _residual_row(evidence: Record) -> Requirement | None:
         # Where more than noise decides, a bar of the noise would show less than is there.
         required=limit if verdict == alone else None,
         reached=noise,
-        unit="m",
         at_least=False,
     )
 
@@ -348,7 +343,6 @@ def _of_line(evidence: Record, key: str, name: str, *, bound: str = "limit_m") -
         reached=least,
         low=least,
         high=most,
-        unit="m",
         at_least=False,
     )
 
@@ -370,6 +364,5 @@ def _grade_row(evidence: Record) -> Requirement | None:
         rests=resting(evidence, "rotor.mass", "rotor.influence_coefficient"),
         required=bound if verdict == below((reached,), bound or reached) else None,
         reached=reached,
-        unit="m/s",
         at_least=False,
     )

@@ -68,7 +68,7 @@ class ShownField(Protocol):
         ...
 
     def write(self, *, path: Path) -> Path:
-        """Write gauge pressure, Pa, and depth below the free surface, m. Raises: OSError."""
+        """Write gauge pressure, Pa, and depth below the free surface, m, to a VTU file. Raises: OSError."""
         ...
 
     def outside(self) -> _Outside:
@@ -110,7 +110,6 @@ class ChamberField:
     """On the three-dimensional mesh."""
 
     def record(self) -> Record:
-        """Sizes and quality of the mesh, and how the solve ended."""
         chamber, solution = self.solution.chamber, self.solution
         quality = chamber.quality()
         return {
@@ -130,7 +129,6 @@ class ChamberField:
         return _profile(scene, self.fill_ratio, radius, self.solution.pressure[line])
 
     def outside(self) -> _Outside:
-        """What bounds the liquid."""
         chamber = self.solution.chamber
         corners = chamber.grid[(slice(None, None, chamber.order),) * 3]
         sides = [np.take(corners, end, axis=axis) for axis in range(3) for end in (0, -1)]
@@ -141,10 +139,6 @@ class ChamberField:
         return _Outside(places=chamber.places.T, faces=np.concatenate(faces), pressure=self.solution.pressure)
 
     def write(self, *, path: Path) -> Path:
-        """Write the field to a VTU file: gauge pressure in Pa and depth below the free surface in m.
-
-        Raises: OSError: the file cannot be written.
-        """
         chamber = self.solution.chamber
         radius = np.hypot(*chamber.places[:2])
         fields = {

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -21,3 +25,13 @@ def distinct(values: npt.ArrayLike) -> FloatArray:
 def clipped(values: npt.ArrayLike, low: float, high: float) -> FloatArray:
     """As np.clip, which takes three times as long for a few numbers."""
     return np.minimum(np.maximum(values, low), high)
+
+
+def stretches(values: Sequence[Any]) -> list[tuple[Any, slice]]:
+    """Stretches of equal values, each reaching to the first of the next so that a line has no gap."""
+    found, start = [], 0
+    for value, members in groupby(values):
+        stop = start + len(list(members))
+        found.append((value, slice(start, min(stop + 1, len(values)))))
+        start = stop
+    return found

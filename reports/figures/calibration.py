@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import groupby
 from typing import Final
 
 import numpy as np
@@ -15,7 +14,7 @@ from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import given, measured, percent, short, shown
 from ringbalance.reports.section import Record
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, stretches
 
 _VELOCITY_TICKS: Final = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]
 _REGIME_LINES: Final[dict[str, Record]] = {
@@ -147,15 +146,10 @@ def _nice_ticks(low: float, high: float) -> list[float]:
 
 def _shade_transition(axes: Axes, velocity: FloatArray, states: list[str]) -> None:
     """Grey where the flow is neither laminar nor turbulent."""
-    start = 0
-    for state, members in groupby(states):
-        count = len(list(members))
+    for state, part in stretches(states):
         if state == "transitional":
-            last = min(start + count, velocity.size - 1)
-            axes.axvspan(
-                velocity[start], velocity[last], color=style.MUTED, alpha=0.13, linewidth=0, label=state
-            )
-        start += count
+            ends = velocity[part.start], velocity[part.stop - 1]
+            axes.axvspan(*ends, color=style.MUTED, alpha=0.13, linewidth=0, label=state)
 
 
 def _reynolds_axis(axes: Axes, reynolds_per_velocity: float) -> None:
@@ -238,16 +232,6 @@ def _drag_terms(tube: Record) -> Drawing:
     )
 
 
-def _regime_runs(regimes: list[str]) -> list[tuple[str, slice]]:
-    """Stretches of one regime, each reaching to the first point of the next so that the line has no gap."""
-    runs, start = [], 0
-    for regime, members in groupby(regimes):
-        stop = start + len(list(members))
-        runs.append((regime, slice(start, min(stop + 1, len(regimes)))))
-        start = stop
-    return runs
-
-
 def _flow_law(law: Record, row: int) -> Drawing:
     """Velocity over fill ratio at one gas pressure: the calibrated law with its regimes against Eq. 19."""
     fill = np.asarray(law["fill_ratio"])
@@ -260,7 +244,7 @@ def _flow_law(law: Record, row: int) -> Drawing:
             fill, np.maximum(velocity - band, 0), velocity + band, color=style.FOUND, alpha=0.2, linewidth=0
         )
         named: set[str] = set()
-        for regime, part in _regime_runs(regimes):
+        for regime, part in stretches(regimes):
             label = None if regime in named else f"calibrated, {regime}"
             axes.plot(fill[part], velocity[part], color=style.FOUND, label=label, **_REGIME_LINES[regime])
             named.add(regime)

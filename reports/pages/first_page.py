@@ -22,7 +22,7 @@ from ringbalance.reports.pages.requirements import (
 )
 from ringbalance.reports.prose import found_at, key_words, named_with_origin, read, states_uncertainty, traced
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.summary import LIKELY, MISSED, OPEN
+from ringbalance.reports.summary import LIKELY, MISSED, OPEN, tuning_of
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.uncertain import half_widths
 from ringbalance.verification.assumptions import assumptions_of
@@ -177,7 +177,7 @@ def loop_sentences(evidence: Record) -> list[str]:
 
 def _change(evidence: Record) -> str:
     """Keys and values that are recommended beside the gain, as keys of the scene file; empty: none."""
-    return str(((evidence.get("summary") or {}).get("tuning") or {}).get("change") or "")
+    return str(tuning_of(evidence).get("change") or "")
 
 
 def _retuned(evidence: Record) -> Record | None:
@@ -293,7 +293,7 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
     valve = _VALVE.get(verdicts.get(SMALLEST, ""))
     valve_named = "the scene’s valve" if line["given"] else "any valve of the default range"
     told = [valve.format(valve=valve_named)] if valve else []
-    tuned, tuning = _retuned(evidence), (evidence.get("summary") or {}).get("tuning") or {}
+    tuned, tuning = _retuned(evidence), tuning_of(evidence)
     if tuned is None:
         return told
     gain = shown(tuned["proportional_s_per_m"], "s/m", digits=2)

@@ -92,7 +92,19 @@ def solved_ring(
     linear = solve_on(space, liquid.problem())
     exact = density * angular_velocity**2 * body.level.value(space.body.nodes) + gas_pressure
     status = _NO_RING if no_ring else (status if linear.status.ok else linear.status)
-    return _ring(geometry, space, linear, exact, density, angular_velocity, status)
+    walls = {name: space.facets(name) for name in space.boundaries if name != FREE_SURFACE}
+    # What the facets of the outer wall leave of r^2 there stands for the other walls, too.
+    doubt = density * angular_velocity**2 / 2 * SAFETY * faceting(geometry).wall
+    mean, still = (_mean(walls[OUTER_WALL], values) for values in (linear.values, exact))
+    weights = space.weights
+    return ImportedRing(
+        wall_pressure=Estimate(value=np.array(mean), uncertainty=np.array(abs(mean - still) + doubt)),
+        loads={name: _load(facets, linear.values, exact, doubt) for name, facets in walls.items()},
+        volume=float(weights.sum()),
+        first_moment=density * weights @ space.points,
+        status=status,
+        statistics=linear.statistics,
+    )
 
 
 _NO_RING: Final = Status(
@@ -158,32 +170,6 @@ def _flux(problem: PressureProblem, facets: Facets) -> FloatArray:
     normals = facets.area / weights[..., None]
     flux = problem.wall_flux(np.moveaxis(facets.points, -1, 0), np.moveaxis(normals, -1, 0))
     return np.asarray(flux * weights)
-
-
-def _ring(
-    geometry: ChamberGeometry,
-    space: TetrahedronSpace,
-    linear: LinearSolution,
-    exact: FloatArray,
-    density: float,
-    angular_velocity: float,
-    status: Status,
-) -> ImportedRing:
-    walls = {name: space.facets(name) for name in space.boundaries if name != FREE_SURFACE}
-    # What the facets of the outer wall leave of r^2 there stands for the other walls, too.
-    doubt = density * angular_velocity**2 / 2 * SAFETY * faceting(geometry).wall
-    loads = {name: _load(facets, linear.values, exact, doubt) for name, facets in walls.items()}
-    wall = walls[OUTER_WALL]
-    mean, still = (_mean(wall, values) for values in (linear.values, exact))
-    weights = space.weights
-    return ImportedRing(
-        wall_pressure=Estimate(value=np.array(mean), uncertainty=np.array(abs(mean - still) + doubt)),
-        loads=loads,
-        volume=float(weights.sum()),
-        first_moment=density * weights @ space.points,
-        status=status,
-        statistics=linear.statistics,
-    )
 
 
 def _mean(facets: Facets, nodal: FloatArray) -> float:

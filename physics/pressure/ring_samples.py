@@ -41,15 +41,15 @@ class Sample:
     """In the order of `QUANTITIES`, SI totals, shape (5,)."""
     ripple: FloatArray
     """First harmonic of wall pressure (Pa) and moment (kg m), zero-to-peak, shape (2,)."""
-    surfaces: tuple[FloatArray, ...]
+    surfaces: tuple[FloatArray, ...] = ()
     """Found surfaces, one per angle, m; empty without gravity."""
     status: Status
-    unknowns: int
-    residual: float
+    unknowns: int = 0
+    residual: float = 0.0
     """Largest relative residual of the linear systems."""
-    flux_mismatch: float
+    flux_mismatch: float = 0.0
     """Largest mismatch of flux and force on a found surface, relative."""
-    rounding: float
+    rounding: float = 0.0
     """Largest rounding of a found surface's place, in mean depths."""
 
 
@@ -144,16 +144,7 @@ def _row(totals: _LiquidIntegrals) -> list[float]:
 
 
 def _failed(status: Status) -> Sample:
-    return Sample(
-        values=np.zeros(WIDTH),
-        ripple=np.zeros(2),
-        surfaces=(),
-        status=status,
-        unknowns=0,
-        residual=0.0,
-        flux_mismatch=0.0,
-        rounding=0.0,
-    )
+    return Sample(values=np.zeros(WIDTH), ripple=np.zeros(2), status=status)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -52,7 +52,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     spoiled = 1.001 if defect == "exchange_rate_off" else 1.0
     duration = _SHARE * _end(long)
     study = _explicit(long, duration, frozen=defect == "frozen_velocity")
-    stall = stall_study(low, law, spoiled=defect == "stall_rate_off")
+    stalled, longest, drawn = stall_study(low, law, spoiled=defect == "stall_rate_off")
     t = np.linspace(0, duration, 21)[1:]
     found = {
         "quadrature_error": _quadrature_error(long, duration, spoiled),
@@ -62,15 +62,12 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "kinked_difference": _kinked_difference(law, long, duration),
         "tapered_quadrature": tapered_error(long, law, t, quadrature),
         "tapered_adaptive": tapered_error(long, law, t, adaptive_ode(tolerance=1e-10)),
-        "overshoot_share": stall.overshoot_share,
-        "overshoot_reach": stall.overshoot_reach,
-        "limit_error": stall.limit_error,
-        "cycle_error": stall.cycle_error,
+        **stalled,
     }
     return Evidence(
         found=as_found(**found),
-        numbers={"longest_for_per_mille": stall.longest_for_per_mille, "time_to_stall": _end(low)},
-        series=(stall.series,),
+        numbers={"longest_for_per_mille": longest, "time_to_stall": _end(low)},
+        series=(drawn,),
         tables=(side_by_side(long, law, duration),),
         convergence=(study.table("fill by explicit segments, relative error", 1.0),),
     )

@@ -1,7 +1,8 @@
-"""Arrays as every room has them: their types, and what numpy has only at the price of a slow start."""
+"""Arrays and numbers as every room has them: types, and what numpy has only at the price of a slow start."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
@@ -35,3 +36,8 @@ def stretches(values: Sequence[Any]) -> list[tuple[Any, slice]]:
         found.append((value, slice(start, min(stop + 1, len(values)))))
         start = stop
     return found
+
+
+def finite(value: float | None) -> float | None:
+    """A number as JSON can hold it: None for one that is not finite."""
+    return value if value is not None and math.isfinite(value) else None

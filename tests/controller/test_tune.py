@@ -17,9 +17,8 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.cli import _show
-from ringbalance.controller.tuning.eccentric import FIRST_RUNS, eccentric_settling, tune_eccentric
-from ringbalance.controller.tuning.loop_factor import vibration_rates
-from ringbalance.controller.tuning.margins import loop_margins
+from ringbalance.controller.tuning.eccentric import FIRST_RUNS, _eccentric_settling, tune_eccentric
+from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
 from ringbalance.reduced_model.calibration import calibrated_model
@@ -272,7 +271,7 @@ def test_eccentric_masses_get_their_sampled_loops_and_settling_times(
 def test_settling_times_of_eccentric_masses_are_those_of_whole_runs() -> None:
     """Runs that end early, because they have settled, settle as they do in the whole time."""
     scene = washing_machine(time_limit=12.0)
-    found = eccentric_settling(scene, runs=6, told=lambda _: None)
+    found = _eccentric_settling(scene, runs=6, told=lambda _: None)
     times = []
     for number in range(6):
         seed = scene.run.seed + number

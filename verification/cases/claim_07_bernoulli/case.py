@@ -14,7 +14,7 @@ import numpy as np
 
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.selection.loss_models import TABLES, velocity_under_head
+from ringbalance.reduced_model.selection.range_flow import TABLES, velocity_under_head
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure, from_half_width
 from ringbalance.verification.loops import flow_law_of

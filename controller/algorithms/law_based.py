@@ -14,7 +14,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand, opening
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
+from ringbalance.controller.liquid_ring.motion import PairState
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import gas_time
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.rotor import chamber_directions, disc_unbalance

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.compiled_lift import resume, stands
 from ringbalance.controller.liquid_ring.compiled_march import carry
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Record, Switch
 from ringbalance.controller.liquid_ring.records import EVENTS, MOTION, WORK, WORKSPACE, P, U
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
@@ -35,19 +35,11 @@ class Passage:
     """Change of x by flow out of the chamber that was not driven last, with both valves closed."""
 
 
-def pass_time(
-    dynamics: Dynamics, *, fill: float, total: float, primed: bool, motion: Motion, instants: FloatArray
-) -> Passage:
-    """Let time pass for one pair.
-
-    Args:
-        fill: x of chamber 0.
-        total: sum of the two fill ratios.
-        primed: whether the tube holds a continuous column.
-        instants: s from now, ascending, the last one the end.
-    """
+def pass_time(dynamics: Dynamics, pair: PairState, *, instants: FloatArray) -> Passage:
+    """Let time pass for one pair. Args: `instants`: s from now, ascending, the last one the end."""
+    total = pair.total
     plant = dynamics.kept_plant(total=total)
-    state = packed(plant, fill=fill, primed=primed, motion=motion)
+    state = packed(plant, fill=pair.fill, primed=pair.primed, motion=pair.motion)
     notes = np.stack([instants, instants])
     carry(plant[0], state, _NONE, float(instants[-1]), notes, instants.size, np.zeros(WORKSPACE))
     lowest, highest = max(0.0, total - dynamics.max_fill_ratio), min(total, dynamics.max_fill_ratio)
@@ -60,19 +52,10 @@ def pass_time(
     )
 
 
-def longest_opening(
-    dynamics: Dynamics,
-    *,
-    fill: float,
-    total: float,
-    primed: bool,
-    motion: Motion,
-    chamber: int,
-    duration: float,
-) -> float:
+def longest_opening(dynamics: Dynamics, pair: PairState, *, chamber: int, duration: float) -> float:
     """Longest valve-open time, at most `duration`, s, whose injection and tail leave the residual fill."""
-    plant = dynamics.kept_plant(total=total)
-    states = np.concatenate([packed(plant, fill=fill, primed=primed, motion=motion)] * 2)
+    plant = dynamics.kept_plant(total=pair.total)
+    states = np.concatenate([packed(plant, fill=pair.fill, primed=pair.primed, motion=pair.motion)] * 2)
     w = np.zeros(WORKSPACE)
     return carry(plant[0], states, chamber, duration, w, 0, w)
 

@@ -188,6 +188,27 @@ class Motion:
         return self.velocity == 0 and self.gases == (0.0, 0.0) and not any(self.valves) and not self.pending
 
 
+@dataclass(frozen=True, kw_only=True)
+class PairState:
+    """Liquid of two opposite chambers: one fill is stored, the other follows from the total."""
+
+    fill: float
+    """x of the chamber on the positive side of the pair's axis (A, B, ...)."""
+    total: float
+    """Sum of the two fill ratios, constant."""
+    primed: bool = False
+    """Whether the connecting tube holds a continuous column."""
+    driven_first: bool = True
+    """Whether the last gas went into the chamber on the positive side."""
+    motion: Motion = field(default_factory=Motion)
+    """Velocity, gas and valves, where the plant models them; at rest otherwise."""
+
+    @property
+    def opposite_fill(self) -> float:
+        """x of the chamber on the negative side, total - x."""
+        return self.total - self.fill
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dynamics:
     """The terms of a plant that its flow law does not know."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ringbalance.controller.formulas import NOTICEABLE
 from ringbalance.controller.liquid_ring.interval import longest_opening, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
+from ringbalance.controller.liquid_ring.motion import Dynamics, PairState, Record, Switch
 from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL, opening_within
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer
 from ringbalance.controller.rotor import chamber_directions
@@ -18,27 +18,6 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Disc
-
-
-@dataclass(frozen=True, kw_only=True)
-class PairState:
-    """Liquid of two opposite chambers: one fill is stored, the other follows from the total."""
-
-    fill: float
-    """x of the chamber on the positive side of the pair's axis (A, B, ...)."""
-    total: float
-    """Sum of the two fill ratios, constant."""
-    primed: bool = False
-    """Whether the connecting tube holds a continuous column."""
-    driven_first: bool = True
-    """Whether the last gas went into the chamber on the positive side."""
-    motion: Motion = field(default_factory=Motion)
-    """Velocity, gas and valves, where the plant models them; at rest otherwise."""
-
-    @property
-    def opposite_fill(self) -> float:
-        """x of the chamber on the negative side, total - x."""
-        return self.total - self.fill
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,15 +116,7 @@ class LiquidRing:
         if (pair.fill if first else pair.opposite_fill) <= self.residual_fill + NEAR_RESIDUAL:
             return 0.0
         if self.dynamics is not None:
-            return longest_opening(
-                self.dynamics,
-                fill=pair.fill,
-                total=pair.total,
-                primed=pair.primed,
-                motion=pair.motion,
-                chamber=0 if first else 1,
-                duration=duration,
-            )
+            return longest_opening(self.dynamics, pair, chamber=0 if first else 1, duration=duration)
         drive = self._drive(pair, first=first, gas_pressure=self.gas_pressure)
         return opening_within(
             drive=drive, least=self.residual_fill, duration=duration, integrator=self.integrator
@@ -221,14 +192,7 @@ class LiquidRing:
         if self.dynamics is None:
             raise ValueError("this plant has no terms to carry through time")
         begun = pair if valve is None else self._commanded(pair, valve, index)
-        passage = pass_time(
-            self.dynamics,
-            fill=begun.fill,
-            total=begun.total,
-            primed=begun.primed,
-            motion=begun.motion,
-            instants=instants,
-        )
+        passage = pass_time(self.dynamics, begun, instants=instants)
         after = replace(begun, fill=passage.fill, primed=passage.primed, motion=passage.motion)
         operation = None if valve is None else self._operation(after, valve)
         return _Path(state=after, fill=passage.fills, operation=operation, drift=passage.ran_back)

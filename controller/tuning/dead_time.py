@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.liquid_ring.interval import pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Switch
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
 from ringbalance.physics.roots import bracketed_root
@@ -70,14 +70,8 @@ def _lost(fills: Fills, dynamics: Dynamics, metres: float, steady: float) -> flo
 
     def short(opening: float) -> float:
         valve = tuple(Switch(after=lag + after, chamber=0, opens=after == 0.0) for after in (0.0, opening))
-        end = pass_time(
-            dynamics,
-            fill=fills.driven,
-            total=total,
-            primed=False,
-            motion=Motion(pending=valve),
-            instants=np.array([lag + opening + _TAIL]),
-        )
+        pair = PairState(fill=fills.driven, total=total, motion=Motion(pending=valve))
+        end = pass_time(dynamics, pair, instants=np.array([lag + opening + _TAIL]))
         return (fills.driven - end.fill) / per_metre - metres
 
     longest = steady + _LONGEST

@@ -13,7 +13,7 @@ import pytest
 
 from ringbalance.controller.liquid_ring import compiled_column
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Switch
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Switch
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
@@ -240,7 +240,7 @@ def pulse() -> Callable[..., Passage]:
         opens = Switch(after=lag, chamber=0, opens=True)
         closes = Switch(after=lag + duration, chamber=0, opens=False)
         given: dict[str, Any] = {"motion": Motion(pending=(opens, closes)), "primed": False} | state
-        return pass_time(dynamics, fill=fill, total=0.5, instants=instants, **given)
+        return pass_time(dynamics, PairState(fill=fill, total=0.5, **given), instants=instants)
 
     return make
 
@@ -250,13 +250,7 @@ def resumed() -> Callable[..., Passage]:
     """The interval after another one, from the state in which that ended."""
 
     def make(dynamics: Dynamics, before: Passage, duration: float) -> Passage:
-        return pass_time(
-            dynamics,
-            fill=before.fill,
-            total=0.5,
-            primed=before.primed,
-            motion=before.motion,
-            instants=np.array([duration]),
-        )
+        pair = PairState(fill=before.fill, total=0.5, primed=before.primed, motion=before.motion)
+        return pass_time(dynamics, pair, instants=np.array([duration]))
 
     return make

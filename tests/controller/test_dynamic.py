@@ -16,7 +16,7 @@ from ringbalance.controller.formulas import flow_shape
 from ringbalance.controller.liquid_ring import compiled_column
 from ringbalance.controller.liquid_ring.compiled_gas import line_rates
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
+from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState
 from ringbalance.physics.gas import GasLine
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -172,7 +172,7 @@ def test_liquid_swings_in_a_full_tube_with_the_peaks_of_its_energy(
     free = replace(dynamics.column, one_way=False, gas_off=-1.0)
     t = np.linspace(1e-3, 2.0, 2000)
     found = pass_time(
-        replace(dynamics, column=free), fill=0.251, total=0.5, primed=True, motion=Motion(), instants=t
+        replace(dynamics, column=free), PairState(fill=0.251, total=0.5, primed=True), instants=t
     )
     rate, c = dynamics.tube_area / dynamics.chamber_volume, 1.2 / 0.12
     turns = np.flatnonzero(np.diff(np.sign(np.diff(found.fills))) != 0) + 1
@@ -255,9 +255,7 @@ def test_a_closed_chamber_fills_and_vents_by_the_quadrature(
         parts = sorted({start + AMBIENT, p_end, choked_end}, reverse=not filling)
         parts = [p for p in parts if min(start + AMBIENT, p_end) <= p <= max(start + AMBIENT, p_end)]
         time = sum(quad(lambda p: 1 / rate(p), a, b, epsrel=1e-12)[0] for a, b in pairwise(parts))
-        found = pass_time(
-            dynamics, fill=0.25, total=0.5, primed=False, motion=begun, instants=np.array([time])
-        )
+        found = pass_time(dynamics, PairState(fill=0.25, total=0.5, motion=begun), instants=np.array([time]))
         assert found.motion.gases[0] + AMBIENT == pytest.approx(p_end, rel=1e-7)
 
 
@@ -272,7 +270,7 @@ def test_choked_filling_is_linear_in_time_and_faster_without_heat(
     for exponent, process in ((1.0, "isothermal"), (1.4, "adiabatic")):
         own = replace(dynamics, line=line(process=process))
         t = np.array([time / exponent])
-        found = pass_time(own, fill=0.25, total=0.5, primed=False, motion=open_, instants=t)
+        found = pass_time(own, PairState(fill=0.25, total=0.5, motion=open_), instants=t)
         assert found.motion.gases[0] == pytest.approx(slope * time, rel=1e-9)
     # First law: what has come in, m c_p T_0, is what is there, p V/(gamma - 1), beyond the start.
     mass_r = (found.motion.contents or (0.0, 0.0))[0] - AMBIENT * volume / 293.15

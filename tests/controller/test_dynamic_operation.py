@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Motion
+from ringbalance.controller.liquid_ring.motion import Column, Dynamics, PairState
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.loop import simulate
@@ -292,7 +292,7 @@ def test_a_creep_through_a_narrow_tube_takes_few_steps(
     own = plant(calibrate(thick).model, "tube inertia")
     monkeypatch.setattr("ringbalance.controller.liquid_ring.motion.MOST_STEPS", 5000)
     instants = np.array([0.5, 5.0, 50.0])
-    found = pass_time(own, fill=0.3, total=0.5, primed=True, motion=Motion(), instants=instants)
+    found = pass_time(own, PairState(fill=0.3, total=0.5, primed=True), instants=instants)
 
     def rates(_: float, y: FloatArray) -> list[float]:
         flow = own.tube_area * max(y[1], 0.0) / own.chamber_volume
@@ -323,7 +323,7 @@ def test_a_creep_near_its_balance_takes_few_steps(
     left = []
     for offset in (1e-5, 1e-7):
         found = pass_time(
-            own, fill=0.25 + offset, total=0.5, primed=True, motion=Motion(), instants=np.array([20.0])
+            own, PairState(fill=0.25 + offset, total=0.5, primed=True), instants=np.array([20.0])
         )
         assert found.motion.record.event is not Event.UNFINISHED
         left.append((found.fill - 0.25) / offset)

@@ -13,7 +13,8 @@ from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.liquid_ring.integrators import closed_form
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
+from ringbalance.controller.liquid_ring.motion import PairState
+from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.simulation import Outcome, Simulation, Verdict

@@ -1,4 +1,4 @@
-"""The plant alone over many steps: prescribed speed, prescribed voltages, no controller.
+"""The plant alone over many steps: prescribed speed, drives switched off, no controller.
 
 How many substeps a run takes is counted before it begins.
 """
@@ -111,8 +111,6 @@ class _PlantRun(NamedTuple):
     """W, rad/s, shape (steps + 1,)."""
     state: FloatArray
     """Shape (steps + 1, 8)."""
-    stuck: IntArray
-    """Shape (steps + 1, 2)."""
 
     @property
     def amplitude(self) -> FloatArray:
@@ -145,35 +143,29 @@ def run_steps(
     return states, flags
 
 
-def run_plant(
-    scene: EccentricScene,
-    *,
-    commands: FloatArray | None = None,
-    locked: bool = False,
-    progress: Progress | None = None,
-) -> _PlantRun:
-    """Run a scene's plant from rest, with the voltages given.
+def run_plant(scene: EccentricScene, *, locked: bool = False, progress: Progress | None = None) -> _PlantRun:
+    """Run a scene's plant from rest, with its drives switched off.
 
-    Args: `commands`: V, shape (steps, 2); None for drives switched off. `locked`: whether both masses are
-    clamped to the track. `progress`: called several times a second; None for silence.
+    Args: `locked`: whether both masses are clamped to the track. `progress`: called several times a second;
+    None for silence.
     Raises: SceneError: a run that takes too many substeps.
     """
     check_substeps(scene)
-    step = scene.sensor.step
-    count = scene.samples - 1
-    voltages = np.zeros((count, 2)) if commands is None else np.ascontiguousarray(commands, dtype=np.float64)
+    step, count = scene.sensor.step, scene.samples - 1
     times, speeds = scene.rotor.profile
-    parameters = PlantParameters.of(scene)
-    states, flags = np.empty((count + 1, SIZE)), np.empty((count + 1, 2), dtype=np.int64)
-    states[0], flags[0] = rest_state(scene.masses.initial_angle), stuck_flags(LOCKED if locked else STUCK)
+    parameters, flags = PlantParameters.of(scene), stuck_flags(LOCKED if locked else STUCK)
+    states = np.empty((count + 1, SIZE))
+    states[0] = rest_state(scene.masses.initial_angle)
     for begin, end in stretches(count):
-        states[begin : end + 1], flags[begin : end + 1] = run_steps(
-            parameters, times, speeds, states[begin], flags[begin], voltages[begin:end], step, begin
+        off = np.zeros((end - begin, 2))
+        states[begin : end + 1], passed = run_steps(
+            parameters, times, speeds, states[begin], flags, off, step, begin
         )
+        flags = passed[-1]
         if progress is not None:
             progress(end * step, scene.run.time_limit)
     elapsed: FloatArray = np.arange(len(states), dtype=np.float64) * step
-    return _PlantRun(elapsed, np.interp(elapsed, times, speeds), states, flags)
+    return _PlantRun(elapsed, np.interp(elapsed, times, speeds), states)
 
 
 def stretches(samples: int) -> Iterator[tuple[int, int]]:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from check_traces import traces, untrue
 
+from ringbalance.controller.eccentric_mass import study
 from ringbalance.reports import eccentric_evidence
 from ringbalance.reports.eccentric_evidence import parameters
 from ringbalance.reports.figures.eccentric import sampled_poles
@@ -21,6 +22,8 @@ from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import EccentricScene
 
 Record = dict[str, Any]
+UNCERTAIN = ("rotor.stiffness", "imbalance.mass", "masses.friction_arm")
+"""Inputs that the pages name: each is run at both ends of its interval."""
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +33,7 @@ def scene() -> EccentricScene:
     profile = (first, replace(first, time=8.0), replace(first, time=10.0, speed=0.9 * first.speed))
     return replace(
         told,
+        uncertainty=tuple(each for each in told.uncertainty if each.quantity in UNCERTAIN),
         rotor=replace(told.rotor, speed_profile=profile),
         run=replace(told.run, time_limit=11.0),
     )
@@ -39,8 +43,9 @@ def scene() -> EccentricScene:
 def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
     with pytest.MonkeyPatch.context() as patch:
-        # The claims of its paper have tests of their own.
+        # The claims of its paper have tests of their own, and so have the intervals of the study.
         patch.setattr(eccentric_evidence, "load_cases", tuple)
+        patch.setattr(study, "DRAWS", 5)
         write_report(scene, out, scene_text='name = "small"\n')
     return out
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from functools import lru_cache
 from html.parser import HTMLParser
 from importlib.resources import files
 from itertools import pairwise
@@ -47,7 +48,9 @@ class Reader(HTMLParser):
             self.text.append(data)
 
 
+@lru_cache(maxsize=8)
 def read(page: str) -> Reader:
+    """A page as read, shared: not to be changed."""
     reader = Reader()
     reader.feed(page)
     reader.close()

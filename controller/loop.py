@@ -305,7 +305,7 @@ class _Run:
     def _pass(self, advance: Advance) -> None:
         time = self.time + advance.instants
         # A valve may open for less than the clock resolves: the record keeps one entry for one time.
-        later = np.diff(time, prepend=self.time) > 0
+        later = time > np.concatenate([[self.time], time[:-1]])
         self._keep(time[later], advance.fill_ratio[:, later])
         self.state = advance.state
         self.drift = max(self.drift, advance.drift)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable
+from functools import cache
 from string import ascii_uppercase
 from typing import Final
 
@@ -34,6 +35,7 @@ def chamber_letters(chambers: int) -> tuple[str, ...]:
     return tuple(ascii_uppercase[:chambers])
 
 
+@cache
 def chamber_directions(chambers: int) -> ComplexArray:
     """Unit vectors of the chambers' centre lines, e_i = exp(2 pi j i/n); opposite ones are exact negatives.
 
@@ -43,7 +45,9 @@ def chamber_directions(chambers: int) -> ComplexArray:
     half = np.exp(2j * np.pi * np.arange(chambers // 2) / chambers)
     if chambers % 4 == 0:
         half[chambers // 4] = 1j
-    return np.concatenate([half, -half])
+    directions = np.concatenate([half, -half])
+    directions.flags.writeable = False
+    return directions
 
 
 def _check_chambers(chambers: int) -> None:
@@ -62,7 +66,7 @@ def disc_unbalance(*, moment: MomentCurve, fill_ratio: npt.ArrayLike) -> Complex
     half = x.shape[0] // 2
     directions = chamber_directions(x.shape[0])[:half]
     pair = moment.pair_vector(fill_ratio=x[:half], opposite_fill_ratio=x[half:])
-    return np.asarray(np.tensordot(directions, pair, axes=1), dtype=np.complex128)
+    return np.asarray(directions @ pair.reshape(half, -1)).reshape(pair.shape[1:])
 
 
 def wrapped(angle: float) -> float:

@@ -1,33 +1,30 @@
-"""The commands `ringbalance report` and `ringbalance plot`."""
+"""The commands `ringbalance report` and `ringbalance plot`.
+
+What draws and calculates is loaded once the scene is read: a broken one is told of at once, and a worker
+loads the same meanwhile.
+"""
 
 from __future__ import annotations
 
 import os
+from importlib import import_module
 from pathlib import Path
 from typing import Final
 
-from rich.console import Console
-
-from ringbalance.reports.pages.first_page import loop_sentences
-from ringbalance.reports.pictures.process import (
-    FOLDERS,
-    start_drawing,
-    write_fields,
-)
-from ringbalance.reports.report import Report, write_report
-from ringbalance.reports.section import Level
-from ringbalance.reports.summary import lead_sentence
-from ringbalance.reports.traces import untraced
 from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.platform.files import staged
+from ringbalance.scene.platform.processes import beside
 from ringbalance.scene.platform.terminal import activity, messages_console, since_start
+from ringbalance.verification.evidence import Level
 
 DONE: Final = 0
 NOT_SOUND: Final = 1
 MOST_WORKERS: Final = 2
+_PROGRAM: Final = "ringbalance.reports.report"
+_DRAWING: Final = "ringbalance.reports.pictures.process"
 
 
 def report(
@@ -63,18 +60,20 @@ def report(
         raise SceneError.of_option(
             option="--interactive", value=True, problem=problem, allowed="to leave it out"
         )
-    console = messages_console()
-    with activity("report", "reading") as shown:
-        finished = write_report(
+    console, workers = messages_console(), min(MOST_WORKERS, os.cpu_count() or 1)
+    with activity("report", "reading") as shown, beside(workers, loading=_PROGRAM) as pool:
+        finished = import_module(_PROGRAM).write_report(
             with_tolerance(told, tolerance=tolerance, models=models),
             out,
             level=level,
             scene_text=text,
-            workers=min(MOST_WORKERS, os.cpu_count() or 1),
+            workers=pool or 1,
             progress=shown.show,
             interactive=interactive,
         )
-    _summarise(console, finished)
+    for line in finished.summary:
+        console.print(line, markup=False, highlight=False)
+    console.print(f"took {since_start():.0f} s", style="dim", highlight=False)
     print(finished.page)
     return DONE if finished.sound else NOT_SOUND
 
@@ -94,9 +93,10 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
         OSError: the folder cannot be written.
     """
     told = liquid_ring_scene(load_scene(scene))
-    console = messages_console()
-    with staged(out, folders=FOLDERS) as stage, activity("plot", "pressure fields") as shown:
-        drawing = start_drawing(scene=told, fields=write_fields(scene=told, folder=stage), folder=stage)
+    console, process = messages_console(), import_module(_DRAWING)
+    with staged(out, folders=process.FOLDERS) as stage, activity("plot", "pressure fields") as shown:
+        fields = process.write_fields(scene=told, folder=stage)
+        drawing = process.start_drawing(scene=told, fields=fields, folder=stage)
         try:
             shown.show("pictures")
             pictures = drawing.finish()
@@ -106,14 +106,3 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
         console.print(pictures["text"], markup=False, highlight=False)
     print(out)
     return DONE if pictures["drawn"] else NOT_SOUND
-
-
-def _summarise(console: Console, finished: Report) -> None:
-    evidence = finished.evidence
-    balanced = evidence["closed_loop"].get("balanced")
-    lines = [balanced["status"]] if balanced else [*loop_sentences(evidence), lead_sentence(evidence)]
-    for line in lines:
-        console.print(untraced(line), markup=False, highlight=False)
-    if not evidence["pictures"]["drawn"]:
-        console.print(evidence["pictures"]["text"], markup=False, highlight=False)
-    console.print(f"took {since_start():.0f} s", style="dim", highlight=False)

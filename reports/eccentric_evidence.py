@@ -9,7 +9,7 @@ from ringbalance.controller.eccentric_mass.study import eccentric_study
 from ringbalance.reports.evidence import FORMAT, Progress, cases_of_report, scene_record
 from ringbalance.reports.numbers import given, short, with_unit
 from ringbalance.reports.provenance import provenance, versions
-from ringbalance.reports.section import Level, Record
+from ringbalance.reports.section import Record
 from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
 from ringbalance.scene.keys.declaration import Key, keys_of
 from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
@@ -18,6 +18,7 @@ from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.scene.units import DIMENSIONS
 from ringbalance.verification.catalogue import load_cases
+from ringbalance.verification.evidence import Level
 from ringbalance.verification.runner import DRIVEN, paper_scene
 
 

@@ -26,13 +26,14 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.pictures.fields import shown_field
 from ringbalance.reports.provenance import provenance, versions
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene
-from ringbalance.reports.section import Level, Record, Work
+from ringbalance.reports.section import Record, Work
 from ringbalance.reports.sections import begun, collected, completed
 from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.document import merge_saved, results_document
+from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import DRIVEN, cases_under_way
@@ -63,8 +64,9 @@ def collect_evidence(
     tell = progress or (lambda _: None)
     # The claims about the other balancer stand in the reports on it; here only where everything is asked for.
     ids = [case.id for case in load_cases() if level == "heavy" or case.paper != DRIVEN]
+    # Before the cases, the last of which this process takes when it has nothing else to do.
+    apart = begun(scene, level, pool)
     with cases_of_report(ids, scene=scene, level=level, pool=pool) as judged_cases:
-        apart = begun(scene, level, pool)
         tell("pressure field")
         pressure = _pressure(scene)
         tell("calibration")
@@ -168,7 +170,7 @@ def cases_of_report(
         yield partial(finished, iter(()))
         return
     with cases_under_way(
-        wanted, scene=scene, level=level, mutations=level == "heavy", pool=pool
+        wanted, scene=scene, level=level, mutations=level == "heavy", workers=pool
     ) as under_way:
         yield partial(finished, under_way)
 

@@ -16,20 +16,23 @@ from ringbalance.reports.eccentric_evidence import collect_eccentric
 from ringbalance.reports.evidence import Progress, collect_evidence
 from ringbalance.reports.page import DOCUMENTS, case_views, page_content
 from ringbalance.reports.pages.document import evidence_text
+from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
 from ringbalance.reports.pictures.view import VIEW, view_page
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
-from ringbalance.reports.section import Level, Record
+from ringbalance.reports.section import Record
 from ringbalance.reports.sections import section_view, sections_of
+from ringbalance.reports.summary import lead_sentence
 from ringbalance.reports.tables import FOLDER as TABLES
 from ringbalance.reports.tables import csv_tables
+from ringbalance.reports.traces import untraced
 from ringbalance.scene import AnyScene, Scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.processes import Workers, beside, seldom_collected
-from ringbalance.verification.runner import paper_scene
+from ringbalance.verification.evidence import Level
 
 FILES: Final = ("evidence.json", *DOCUMENTS)
 """Of a report, the page last: where it is, all else is."""
@@ -55,6 +58,17 @@ class Report:
             for case in self.evidence["verification"]
         )
         return not failed and any(run["settled"] for run in self.evidence["closed_loop"].values())
+
+    @property
+    def summary(self) -> list[str]:
+        """What to say of it in a few sentences, and why it has no pictures where it has none."""
+        balanced, pictures = self.evidence["closed_loop"].get("balanced"), self.evidence["pictures"]
+        lines = (
+            [balanced["status"]]
+            if balanced
+            else [*loop_sentences(self.evidence), lead_sentence(self.evidence)]
+        )
+        return [untraced(line) for line in lines] + ([] if pictures["drawn"] else [pictures["text"]])
 
 
 @dataclass(kw_only=True)
@@ -104,15 +118,15 @@ def write_report(
     *,
     level: Level = "light",
     scene_text: str = "",
-    workers: int = 1,
+    workers: int | Workers = 1,
     progress: Progress | None = None,
     opengl: OpenGL | None = None,
     interactive: bool = False,
 ) -> Report:
     """Verify, calibrate, simulate and draw a scene into one folder.
 
-    Args: `scene_text`: the scene file's own text, for the appendix. `interactive`: whether a liquid ring's
-    view.html is written, too.
+    Args: `scene_text`: the scene file's own text, for the appendix. `workers`: processes, this one included,
+    or those that are at work already. `interactive`: whether a liquid ring's view.html is written, too.
     Raises: SceneError: a scene that cannot be calibrated or simulated; nothing is written.
     Raises: OSError: the folder cannot be written, or holds an evidence.json that is none; known before the
     work.
@@ -122,11 +136,8 @@ def write_report(
     with (
         seldom_collected(),
         staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage,
-        beside(workers) as pool,
+        beside(workers, loading=__name__) as pool,
     ):
-        if pool is not None:
-            # A worker takes its time to start, and cases come later.
-            pool.submit(paper_scene)
         views = _Views(pool=pool)
         if isinstance(scene, EccentricScene):
             evidence = collect_eccentric(

@@ -13,13 +13,13 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING
 from ringbalance.reports.traces import untraced
 from ringbalance.scene import Scene
+from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
 Cells = Sequence[str]
 _TUNING_RUNS: Final = 500
 _TERM_RUNS: Final = 10
-Level = Literal["light", "heavy"]
 Place = Literal["report", "annex"]
 
 

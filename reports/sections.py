@@ -33,9 +33,10 @@ from ringbalance.reports.pages import model_selection as trade
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside
-from ringbalance.reports.section import Level, Place, Record, Section, Work
+from ringbalance.reports.section import Place, Record, Section, Work
 from ringbalance.scene import Scene
 from ringbalance.scene.platform.processes import Workers
+from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
 
 SECTIONS: Final[tuple[Section, ...]] = (

@@ -6,7 +6,7 @@ import dataclasses
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from functools import lru_cache, partial
 from typing import Any
 
@@ -219,18 +219,17 @@ def cases_under_way(
     scene: AnyScene,
     level: Level = "light",
     mutations: bool = False,
-    workers: int = 1,
-    pool: Workers | None = None,
+    workers: int | Workers | None = 1,
 ) -> Iterator[Iterator[CaseResult]]:
     """Start several cases as `run_cases` does, and do something else while they run.
 
     This process takes part once results are asked for. Leaving early leaves no process behind.
-    Args: `pool`: instead of `workers`, processes that are wanted for more than the cases.
+    Args: `workers`: as `beside` takes them.
     """
     scene = liquid_ring_scene(scene)
     wanted = tuple(case_ids) or tuple(definition.id for definition in load_cases())
     run = partial(run_case, scene=scene, level=level, mutations=mutations)
-    with beside(workers) if pool is None else nullcontext(pool) as crew:
+    with beside(workers) as crew:
         if crew is None:
             yield map(run, wanted)
             return

@@ -161,8 +161,9 @@ class LiquidRing:
             points: equally spaced instants to record beside the closing of each valve, at least 1.
         Raises: ValueError: gas into both chambers of a pair at once.
         """
-        spaced = duration * np.arange(1, points + 1) / points
-        instants = np.unique(np.concatenate([spaced, np.fromiter(gas_times.values(), dtype=np.float64)]))
+        instants = duration * np.arange(1, points + 1) / points
+        if gas_times:
+            instants = np.unique(np.concatenate([instants, list(gas_times.values())]))
         half = self.chambers // 2
         carry = self._pair if self.dynamics is None else self._moving_pair
         paths = [

@@ -168,6 +168,5 @@ SECTION: Final = Section(
     name="consequences",
     title="What a wrong k costs",
     collect=_collect,
-    apart=True,
     show=_view,
 )

@@ -9,7 +9,8 @@ import signal
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
+from importlib import import_module
 from multiprocessing import get_context, parent_process
 from threading import Thread
 from types import TracebackType
@@ -93,9 +94,25 @@ def checked_workers(workers: int) -> int:
     return workers
 
 
-def beside(workers: int) -> AbstractContextManager[Workers | None]:
-    """The other ones of so many processes, this one included; None where there are none."""
-    return nullcontext() if workers == 1 else Workers(workers - 1)
+@contextmanager
+def beside(workers: int | Workers | None, *, loading: str | None = None) -> Iterator[Workers | None]:
+    """The other ones of so many processes, this one included; None where there are none.
+
+    Args: `workers`: those that are at work already stay so afterwards. `loading`: a module that new ones load
+    at once, while this process goes on.
+    """
+    if workers is None or workers == 1 or isinstance(workers, Workers):
+        yield None if isinstance(workers, int) else workers
+        return
+    with Workers(workers - 1) as crew:
+        for _ in range(workers - 1 if loading else 0):
+            crew.submit(_load, loading or "")
+        yield crew
+
+
+def _load(module: str) -> None:
+    """A worker's: a module cannot be sent back."""
+    import_module(module)
 
 
 @contextmanager

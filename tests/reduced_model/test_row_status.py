@@ -82,7 +82,7 @@ def test_both_tables_have_the_same_rings_whatever_is_modelled(table_1_scene: Sce
 
 @pytest.mark.parametrize(
     ("speed", "crest", "expected"),
-    [(314.0, 36e-3, RowStatus.OVER_CREST), (30.0, 31.5e-3, RowStatus.NO_RING)],
+    [(314.0, 36e-3, RowStatus.OVER_CREST), (50.0, 31.5e-3, RowStatus.NO_RING)],
 )
 def test_table_and_document_mark_the_row(
     table_1_scene: Scene, speed: float, crest: float, expected: RowStatus

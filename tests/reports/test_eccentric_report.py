@@ -94,6 +94,7 @@ def test_the_first_page_compares_with_the_locked_rotor(folder: Path, evidence: R
         assert row["quantity"] in page
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_an_unmet_requirement_is_not_called_met(evidence: Record) -> None:
     changed = json.loads(json.dumps(evidence))
     missed = {**changed["requirements"][0], "quantity": "patience", "achieved": None, "verdict": "not met"}
@@ -103,6 +104,7 @@ def test_an_unmet_requirement_is_not_called_met(evidence: Record) -> None:
     assert "0 of 1 requirements are met; not met: patience." in page
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_a_result_that_not_all_drawn_runs_come_to_reads_as_one_sentence(evidence: Record) -> None:
     changed = json.loads(json.dumps(evidence))
     row = {**changed["requirements"][0], "quantity": "settling time", "unit": "s", "achieved": 2.32}
@@ -114,6 +116,7 @@ def test_a_result_that_not_all_drawn_runs_come_to_reads_as_one_sentence(evidence
     assert "none: with an input at the end of its own interval the run never gets there" in page
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_what_a_requirement_depends_on_is_named_with_what_to_do(evidence: Record) -> None:
     changed = json.loads(json.dumps(evidence))
     row = changed["requirements"][1]
@@ -152,6 +155,7 @@ def test_unstable_loops_are_named() -> None:
     assert "stable" in sampled_poles([{**loop, "poles": [[0.5, 0.1]], "stable": True}]).caption
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_a_run_that_did_not_come_to_its_estimates_is_shown(evidence: Record) -> None:
     changed = json.loads(json.dumps(evidence))
     run = changed["closed_loop"]["balanced"]

@@ -19,8 +19,7 @@ from ringbalance.controller.ensemble.monte_carlo import (
 from ringbalance.controller.ensemble.run import EnsemblePlan
 from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.ensemble.transfer import linear_fill
-from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import closed_form, integrator_of
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -112,7 +111,7 @@ def loosest(scene: Scene, model: BalancerModel, velocity: Callable[[float], floa
     Raises: RuntimeError: no tolerance reaches it.
     """
     drives = drives_of(scene, model)
-    integrator = closed_form if has_closed_form(model.flow) else quadrature
+    integrator = integrator_of(model.flow)
     exact = [integrator(drive, np.array([t])).fill[-1] for drive, t in drives]
     for tolerance in TOLERANCES:
         plain = Plain(

@@ -24,7 +24,7 @@ from scipy.integrate import solve_ivp
 from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_motion import begin
 from ringbalance.controller.ensemble.transfer import RELATIVE_ERROR
-from ringbalance.controller.formulas.gas_flow import flow_shape
+from ringbalance.controller.formulas import flow_shape
 from ringbalance.controller.liquid_ring.compiled_march import advance, command
 from ringbalance.controller.liquid_ring.motion import Dynamics, Lift
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE

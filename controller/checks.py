@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from operator import attrgetter
 from typing import Final
 
 from ringbalance.mesh.geometry import chamber_volume
@@ -33,89 +35,62 @@ def check_settings(scene: Scene) -> None:
 
     Raises: SceneError: a number outside its range, or a period shorter than the valve's lag.
     """
-    faults = [
-        scene_fault(scene=scene, table=table, key=key, problem=problem, allowed=allowed)
-        for (table, key), value in _numbers(scene).items()
-        for problem, allowed in _problems(value, positive=(table, key) in _POSITIVE)
-    ]
+    faults = [*_number_faults(scene)]
     lag = scene.gas.valve_lag
-    if lag is not None and scene.controller.period < lag:
-        found = period_covers_lag(scene.controller.period, lag)
-        if found is not None:
-            faults.append(
-                scene_fault(
-                    scene=scene,
-                    table="controller",
-                    key="period",
-                    problem=found.problem,
-                    allowed=found.allowed,
-                )
-            )
+    found = None if lag is None else period_covers_lag(scene.controller.period, lag)
+    if found is not None:
+        faults.append(scene_fault(scene, "controller.period", problem=found.problem, allowed=found.allowed))
     if faults:
         raise SceneError(faults)
 
 
 _POSITIVE: Final = {
-    ("rotor", "influence_coefficient"),
-    ("controller", "assumed_influence_coefficient"),
-    ("controller", "limit"),
-    ("controller", "period"),
-    ("controller", "proportional"),
-    ("controller", "integral_time"),
-    ("controller", "maximum_gas_time"),
-    ("run", "time_limit"),
+    "rotor.influence_coefficient",
+    "controller.assumed_influence_coefficient",
+    "controller.limit",
+    "controller.period",
+    "controller.proportional",
+    "controller.integral_time",
+    "controller.maximum_gas_time",
+    "run.time_limit",
 }
 _NOT_NEGATIVE: Final = {
-    ("rotor", "initial_amplitude"),
-    ("sensor", "amplitude_noise"),
-    ("sensor", "phase_noise"),
-    ("controller", "derivative_time"),
-    ("controller", "minimum_gas_time"),
-    ("gas", "pressure"),
-    ("gas", "valve_lag"),
+    "rotor.initial_amplitude",
+    "sensor.amplitude_noise",
+    "sensor.phase_noise",
+    "controller.derivative_time",
+    "controller.minimum_gas_time",
+    "gas.pressure",
+    "gas.valve_lag",
 }
 
 
-def _numbers(scene: Scene) -> dict[tuple[str, str], float | None]:
-    return {(t, k): getattr(getattr(scene, t), k) for t, k in sorted(_POSITIVE | _NOT_NEGATIVE)}
+def _number_faults(scene: Scene) -> Iterator[Fault]:
+    for path in sorted(_POSITIVE | _NOT_NEGATIVE):
+        value: float | None = attrgetter(path)(scene)
+        positive = path in _POSITIVE
+        if value is None or (math.isfinite(value) and (value > 0 or (value == 0 and not positive))):
+            continue
+        bound = "above 0" if positive else "at least 0"
+        allowed = "a number above 0" if positive else "a number of at least 0"
+        yield scene_fault(scene, path, problem=f"it must be {bound}", allowed=allowed)
 
 
-def _problems(value: float | None, *, positive: bool) -> list[tuple[str, str]]:
-    if value is None or (math.isfinite(value) and (value > 0 or (value == 0 and not positive))):
-        return []
-    allowed = "a number above 0" if positive else "a number of at least 0"
-    return [("it must be above 0" if positive else "it must be at least 0", allowed)]
-
-
-def _fill_faults(scene: Scene, model: BalancerModel) -> list[Fault]:
+def _fill_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:
     largest = model.flow.max_fill_ratio
-    if abs(scene.disc.max_fill_ratio - largest) <= 1e-9:
-        return []
-    problem = f"the {model.name} law was made for another fill"
-    return [
-        scene_fault(
-            scene=scene, table="disc", key="max_fill_ratio", problem=problem, allowed=f"{largest:.6g}"
-        )
-    ]
+    if abs(scene.disc.max_fill_ratio - largest) > 1e-9:
+        problem = f"the {model.name} law was made for another fill"
+        yield scene_fault(scene, "disc.max_fill_ratio", problem=problem, allowed=f"{largest:.6g}")
 
 
-def _volume_faults(scene: Scene, model: BalancerModel) -> list[Fault]:
+def _volume_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:
     # Eq. 4 knows no rib, fillet or gas tube of an imported chamber, which can be much of it.
     by_paper = isinstance(model.flow, PaperLaw) and scene.disc.geometry is not None
     volume = (paper.chamber_volume_paper if by_paper else chamber_volume)(disc=scene.disc)
-    if abs(model.chamber_volume / volume - 1) <= VOLUME_TOLERANCE:
-        return []
-    found = model.chamber_volume
-    problem = (
-        f"a chamber holds {volume * 1e6:.4g} ml here, {found * 1e6:.4g} ml for the {model.name} law: "
-        "that was made for another disc"
-    )
-    return [
-        scene_fault(
-            scene=scene,
-            table="disc",
-            key="axial_width",
-            problem=problem,
-            allowed="that disc, or a law made for this one",
+    if abs(model.chamber_volume / volume - 1) > VOLUME_TOLERANCE:
+        problem = (
+            f"a chamber holds {volume * 1e6:.4g} ml here, {model.chamber_volume * 1e6:.4g} ml for the "
+            f"{model.name} law: that was made for another disc"
         )
-    ]
+        allowed = "that disc, or a law made for this one"
+        yield scene_fault(scene, "disc.axial_width", problem=problem, allowed=allowed)

@@ -18,6 +18,7 @@ from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.search import recommended
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.scene.arrays import finite
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.loop_models import ControllerSettings
@@ -67,7 +68,7 @@ class Side:
     @property
     def time(self) -> float | None:
         """Median of all runs, s; None when fewer than half settled."""
-        return _finite(self.middle("time"))
+        return finite(self.middle("time"))
 
     @property
     def status(self) -> str:
@@ -113,7 +114,7 @@ class Comparison:
             "energy_J": [side.middle("energy") for side in sides],
             "worst_amplitude_m": [side.middle("worst_amplitude") for side in sides],
             "spread": [
-                {key: [_finite(end) for end in side.ends(name)] for key, name in _NUMBERS.items()}
+                {key: [finite(end) for end in side.ends(name)] for key, name in _NUMBERS.items()}
                 for side in sides
             ],
             "runs": [len(side.results) for side in sides],
@@ -224,10 +225,6 @@ def _driven_side(rotor: OneRotor, scene: EccentricScene, *, span: float, runs: i
             )
         )
     return Side(scene=ready, tuned=changes, results=tuple(results))
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 _NUMBERS: Final = {

@@ -15,9 +15,9 @@ from ringbalance.controller.compare import Comparison, Side
 from ringbalance.controller.compare import compare as compare_scenes
 from ringbalance.controller.tuning.dead_time import offset_text
 from ringbalance.reduced_model.calibration import law_by_name
-from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.terminal import activity, results_console
 
 SETTLED = 0
@@ -82,7 +82,7 @@ def _show(comparison: Comparison, console: Console) -> None:
     table = Table("", *(names if len(set(names)) > 1 else [side.scene.source for side in comparison.sides]))
     rows = {
         "balancer": [side.scene.balancer.replace("_", " ") for side in comparison.sides],
-        "tuned": [tuned_text(side) for side in comparison.sides],
+        "tuned": [_tuned_text(side) for side in comparison.sides],
         "settled": [_settled(side) for side in comparison.sides],
         "time to the limit": [_cell(side, "time", 1.0, "s") for side in comparison.sides],
         "left over": [_cell(side, "residual_ratio", 100.0, "%") for side in comparison.sides],
@@ -112,7 +112,7 @@ def _settled(side: Side) -> str:
     return f"{sum(math.isfinite(r.time) for r in side.results)} of {len(side.results)} runs"
 
 
-def tuned_text(side: Side) -> str:
+def _tuned_text(side: Side) -> str:
     """What tuning has changed, as a scene file has it."""
     told = [_written(key, value) for key, value in side.tuned.items() if not key.startswith(_OFFSETS)]
     if len(told) < len(side.tuned) and isinstance(side.scene, Scene):

@@ -17,8 +17,7 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.speed import speed_at
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
 from ringbalance.controller.rotor import wrapped
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.scene.eccentric_models import EccentricRotor, EccentricScene, SpeedPoint
@@ -225,5 +224,5 @@ def _check_rotor(rotor: OneRotor, scene: EccentricScene, found: EccentricRotor) 
 
 
 def _refusal(scene: AnyScene, table: str, key: str, problem: str, allowed: str) -> SceneError:
-    fault = Fault(file=scene.file, table=table, key=key, value="", problem=problem, allowed=allowed)
+    fault = Fault(file=scene.file, table=table, key=key, problem=problem, allowed=allowed)
     return SceneError([fault])

@@ -1,16 +1,23 @@
-"""A finished run as the JSON document that scripts rely on, and as a table of its histories."""
+"""A finished run as the JSON document that scripts rely on, as a table of its histories, and for a person."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
 
+from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.simulation import Injection, Sample, Simulation
-from ringbalance.reduced_model.gas_line import line_document
+from ringbalance.reduced_model.gas_line import line_document, line_text, line_warning
 from ringbalance.reduced_model.selection.registry import neglected_in_injections
+from ringbalance.scene.arrays import FloatArray, finite
+from ringbalance.scene.platform.terminal import two_columns
 
 
 def simulation_document(simulation: Simulation) -> dict[str, Any]:
@@ -34,7 +41,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "loop_factor_limit": simulation.loop.limit,
         "largest_staying_loop_factor": simulation.loop.largest_staying,
         "vibration_rate_m_per_s": simulation.loop.rate,
-        "stationary_deviation_m": _finite(simulation.loop.deviation),
+        "stationary_deviation_m": finite(simulation.loop.deviation),
         "time_s": simulation.time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
@@ -74,8 +81,8 @@ def simulation_history(simulation: Simulation) -> dict[str, Sequence[Any]]:
         "time_s": time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
-        "measured_amplitude_m": [None if m is None else _finite(m.amplitude) for m in seen],
-        "measured_phase_rad": [None if m is None else _finite(m.phase) for m in seen],
+        "measured_amplitude_m": [None if m is None else finite(m.amplitude) for m in seen],
+        "measured_phase_rad": [None if m is None else finite(m.phase) for m in seen],
     }
     for letter, fill in simulation.fill_ratio.items():
         gas = np.zeros(time.size, dtype=np.int64)
@@ -107,11 +114,126 @@ def _samples(samples: tuple[Sample, ...]) -> dict[str, Any]:
     seen = [sample.measurement for sample in samples]
     return {
         "time_s": [sample.time for sample in samples],
-        "amplitude_m": [None if m is None else _finite(m.amplitude) for m in seen],
-        "phase_rad": [None if m is None else _finite(m.phase) for m in seen],
+        "amplitude_m": [None if m is None else finite(m.amplitude) for m in seen],
+        "phase_rad": [None if m is None else finite(m.phase) for m in seen],
         "resting": [sample.command.resting for sample in samples],
     }
 
 
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and np.isfinite(value) else None
+_BARS: Final = "▁▂▃▄▅▆▇█"
+_SPARK_WIDTH: Final = 60
+_MOST_INJECTIONS: Final = 40
+_DECADES: Final = 3.0
+"""Depth of the sparkline below the largest amplitude."""
+
+
+def show(simulation: Simulation, *, console: Console) -> None:
+    """Print a run: summary, amplitude over time, injections."""
+    console.print(Group(*_parts(simulation)))
+
+
+def amplitude_line(time: FloatArray, amplitude: FloatArray, *, end: float) -> Text:
+    """An amplitude at equal steps of time up to `end`, s, by straight lines."""
+    line = _sparkline(np.interp(np.linspace(0.0, end, _SPARK_WIDTH), time, amplitude))
+    return Text.assemble(("amplitude (log) ", "dim"), line, (f"  0 to {end:.3g} s", "dim"))
+
+
+def _sparkline(values: FloatArray) -> str:
+    """Draw values as a line of bars, logarithmic over three decades below the largest."""
+    top = float(np.max(values, initial=0.0))
+    if top == 0:
+        return _BARS[0] * values.size
+    depth = np.log10(np.maximum(values / top, 10.0**-_DECADES)) / _DECADES + 1
+    return "".join(_BARS[round(share * (len(_BARS) - 1))] for share in depth)
+
+
+def _parts(simulation: Simulation) -> Iterable[RenderableType]:
+    colour = "green" if simulation.settled else "yellow"
+    yield Text(simulation.status, style=f"bold {colour}")
+    for warning in (simulation.gas.warning, line_warning(simulation.gas_line)):
+        if warning:
+            yield Text(warning, style="yellow")
+    yield _summary(simulation)
+    closed = [i.time + i.operation.duration for i in simulation.injections]
+    # Until shortly after the last valve has closed.
+    end = min(float(simulation.time[-1]), 1.2 * max(closed, default=math.inf))
+    yield amplitude_line(simulation.time, simulation.amplitude, end=end)
+    if simulation.injections:
+        yield _injections(simulation.injections)
+    yield _terms(simulation)
+    yield Text(neglected_in_injections(simulation.models_used).text, style="dim")
+    if not simulation.model_status.ok:
+        yield Text(simulation.model_status.text, style="yellow")
+
+
+def _summary(simulation: Simulation) -> Table:
+    when = "-" if simulation.settling_time is None else f"{simulation.settling_time:.3f} s"
+    last = {letter: fill[-1] for letter, fill in simulation.fill_ratio.items()}
+    rows = (
+        ("flow law", f"{simulation.law} ({simulation.integrator.replace('_', ' ')})"),
+        ("settling time", when),
+        ("amplitude", f"{_um(simulation.amplitude[0])} -> {_um(simulation.amplitude[-1])}"),
+        ("limit", f"{_um(simulation.limit)} for {simulation.hold_time:.4g} s"),
+        ("loop factor", _loop(simulation)),
+        ("valve-open time", f"{_gas_time(simulation):.3f} s in {len(simulation.injections)} injections"),
+        ("gas energy", f"{simulation.energy:.4g} J of work on the liquid"),
+        ("gas consumption", simulation.gas.text),
+        ("gas line", line_text(simulation.gas_line)),
+        ("overshoots", str(simulation.overshoots)),
+        ("misadjustments", str(simulation.misadjustments)),
+        *([("shortened injections", str(simulation.shortened))] if simulation.shortened else []),
+        ("fill ratios", "  ".join(f"{letter} {fill:.4f}" for letter, fill in last.items())),
+    )
+    return two_columns(rows)
+
+
+def _loop(simulation: Simulation) -> str:
+    loop = simulation.loop
+    if loop.value is None or loop.deviation is None:
+        return "none: this algorithm has no gain"
+    left = f"noise leaves {_um(loop.deviation)}" if math.isfinite(loop.deviation) else "nothing holds it"
+    return f"{loop.value:.3g} of at most {loop.limit:.3g}, {left}"
+
+
+def _gas_time(simulation: Simulation) -> float:
+    return math.fsum(injection.operation.duration for injection in simulation.injections)
+
+
+def _injections(injections: tuple[Injection, ...]) -> Table:
+    table = Table(title="injections", title_justify="left")
+    for name in ("time, s", "chamber", "gas, s", "fill before", "fill after"):
+        table.add_column(name, justify="center" if name == "chamber" else "right")
+    table.add_column("regime")
+    for injection in injections[:_MOST_INJECTIONS]:
+        operation = injection.operation
+        table.add_row(
+            f"{injection.time:.3f}",
+            injection.chamber,
+            f"{operation.duration:.4f}",
+            f"{operation.fill_before:.5f}",
+            f"{operation.fill_after:.5f}",
+            _regime(injection),
+        )
+    if len(injections) > _MOST_INJECTIONS:
+        table.caption = f"and {len(injections) - _MOST_INJECTIONS} more: see --json"
+    return table
+
+
+def _terms(simulation: Simulation) -> Table:
+    table = Table(title="terms", title_justify="left")
+    for name in ("term", "model", "why"):
+        table.add_column(name)
+    for used in simulation.models_used:
+        table.add_row(used.term, used.model, used.why)
+    return table
+
+
+def _regime(injection: Injection) -> str:
+    operation = injection.operation
+    names = dict.fromkeys((operation.regime_start.label, operation.regime_end.label))
+    event = "" if operation.event in {Event.NONE, Event.BLOCKED} else f" ({operation.event.value})"
+    return " to ".join(names) + event
+
+
+def _um(length: float) -> str:
+    return f"{length * 1e6:.4g} um"

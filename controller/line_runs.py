@@ -17,7 +17,7 @@ from ringbalance.scene.models import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class LineRun:
+class _LineRun:
     """One run with one end of the range."""
 
     end: str
@@ -29,7 +29,7 @@ class LineRun:
     run: Simulation
 
 
-def line_runs(scene: Scene, model: BalancerModel) -> tuple[LineRun, ...]:
+def line_runs(scene: Scene, model: BalancerModel) -> tuple[_LineRun, ...]:
     """Runs with all terms of an injection modelled; none where the scene gives its gas line, or the law no
     forces."""
     ends = line_ends(scene)
@@ -48,12 +48,12 @@ def line_runs(scene: Scene, model: BalancerModel) -> tuple[LineRun, ...]:
         terms = (*own, FILLING, LAG)
         run = simulate(replace(scene, gas=gas), model, modelled=terms)
         found.append(
-            LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)
+            _LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)
         )
     return tuple(found)
 
 
-def line_runs_text(runs: Sequence[LineRun]) -> str:
+def line_runs_text(runs: Sequence[_LineRun]) -> str:
     """How the runs end, in one sentence; empty without any."""
     if not runs:
         return ""
@@ -67,7 +67,7 @@ def _end(run: Simulation) -> str:
     return f"{run.verdict.value}, {1e6 * run.amplitude[-1]:.3g} um at the end"
 
 
-def line_runs_document(runs: Sequence[LineRun]) -> list[dict[str, Any]]:
+def line_runs_document(runs: Sequence[_LineRun]) -> list[dict[str, Any]]:
     """For JSON, in SI."""
     return [
         {

@@ -12,17 +12,21 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
-from ringbalance.controller.formulas.stopping import Cause, has_held, has_risen, stop_cause
-from ringbalance.controller.judgement import misadjustments, noise_floor, overshoots
-from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
+from ringbalance.controller.formulas import Cause, has_held, has_risen, stop_cause
+from ringbalance.controller.liquid_ring.integrators import integrator_of
 from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
-from ringbalance.controller.outcome import VERDICTS, Facts
+from ringbalance.controller.outcome import Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
-from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
+from ringbalance.controller.simulation import (
+    Injection,
+    Outcome,
+    Sample,
+    Simulation,
+    misadjustments,
+)
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
-from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
+from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
@@ -86,7 +90,7 @@ def simulate(
     check_fit(scene, balancer)
     if modelled and integrator is not None:
         raise ValueError("an integrator carries the flow law alone: give it, or terms to model")
-    quasi_steady = integrator or (closed_form if has_closed_form(balancer.flow) else quadrature)
+    quasi_steady = integrator or integrator_of(balancer.flow)
     asked = () if integrator is not None else modelled
     used = run_models(scene=scene, model=balancer, asked=asked)
     residual = residual_fill_ratio(scene, law=balancer.flow) if residual_fill is None else residual_fill
@@ -109,9 +113,9 @@ def simulate(
         exact=sensor is None and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0,
         state=DiscState.initial(disc=scene.disc),
     )
-    cause = run.go(progress or _silent)
+    run.cause = run.go(progress or (lambda _, __: None))
     name = getattr(quasi_steady, "__name__", "custom") if dynamics is None else RUNGE_KUTTA
-    return _record(run, cause, integrator=name, used=used)
+    return _record(run, integrator=name, used=used)
 
 
 def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> BalancerModel:
@@ -122,58 +126,31 @@ def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> Balanc
     raise ValueError("give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither")
 
 
-def _silent(_: float, __: float) -> None:
-    """No progress wanted."""
-
-
 @dataclass(kw_only=True)
-class _Run:
+class _Run(Facts):
     """What changes during one run; lives inside one call of `simulate`."""
 
-    scene: Scene
-    loop: LoopFactor
     to_time_limit: bool
-    plant: LiquidRing
     controller: Controller[Any]
     sensor: Sensor
     exact: bool
-    state: DiscState
-    time: float = 0.0
     times: list[FloatArray] = field(default_factory=list)
     fills: list[FloatArray] = field(default_factory=list)
     vibrations: list[ComplexArray] = field(default_factory=list)
-    samples: list[Sample] = field(default_factory=list)
-    injections: list[Injection] = field(default_factory=list)
     last_usable: Measurement | None = None
     operated: bool = False
     rises: int = 0
     idle: int = 0
-    drift: float = 0.0
     seen: tuple[tuple[float, ...], complex] | None = None
     """The fills last looked at, and their vibration: most waits change nothing."""
-    since: float = math.inf
-    """s, from which on the true amplitude has not been above the limit; infinite while it is."""
-    held_since: float = math.inf
-    """The same of the first time that it held."""
-    shortened: int = 0
-    """Injections shortened or left out so that the driven chamber keeps its residual fill."""
-    refused: tuple[str, ...] = ()
-    """Chambers of those in the last command."""
     at_residual: frozenset[int] = frozenset()
-    """Chambers whose last injection was one of those, and that no injection has filled since."""
+    """Chambers whose last injection was shortened or left out, and that no injection has filled since."""
     cut: bool = False
     """Whether the time limit has shortened a valve-open time or a wait."""
 
     @property
     def remaining(self) -> float:
         return self.scene.run.time_limit - self.time
-
-    @property
-    def floor(self) -> float:
-        return noise_floor(
-            amplitude_noise=self.scene.sensor.amplitude_noise,
-            initial_amplitude=self.scene.rotor.initial_amplitude,
-        )
 
     def go(self, progress: Progress) -> Cause:
         """Cycle until there is a cause to stop."""
@@ -216,7 +193,7 @@ class _Run:
         if measurement is None or not measurement.usable(needs_phase=False):
             return
         if self.last_usable is not None and self.operated:
-            higher = has_risen(self.last_usable.amplitude, measurement.amplitude, self.floor)
+            higher = has_risen(self.last_usable.amplitude, measurement.amplitude, self.noise_floor)
             self.rises = self.rises + 1 if higher else 0
         self.last_usable, self.operated = measurement, False
 
@@ -229,7 +206,7 @@ class _Run:
                 self.controller.rises_tolerated,
                 first is not None
                 and last is not None
-                and has_risen(first.amplitude, last.amplitude, self.floor),
+                and has_risen(first.amplitude, last.amplitude, self.noise_floor),
                 self.idle,
                 IDLE_OPERATIONS + self.plant.chambers,
                 command.resting and self.exact and self.state.rests and not (self.cut or self.to_time_limit),
@@ -325,59 +302,34 @@ class _Run:
             self.since = min(self.since, float(time[0]))
 
 
-def _record(run: _Run, cause: Cause, *, integrator: str, used: tuple[ModelUsed, ...]) -> Simulation:
+def _record(run: _Run, *, integrator: str, used: tuple[ModelUsed, ...]) -> Simulation:
     """Judge a finished run and freeze it."""
     time, fills = np.concatenate(run.times), np.concatenate(run.fills, axis=1)
     seen = np.concatenate(run.vibrations)
-    facts = _facts(run, cause, np.abs(seen))
-    outcome = facts.outcome
-    settled = outcome is Outcome.SETTLED
+    run.amplitude = np.abs(seen)
+    settled = run.outcome is Outcome.SETTLED
     return Simulation(
         scene=run.scene,
         model=run.plant.model,
         balancer="liquid_ring",
         integrator=integrator,
-        outcome=outcome,
-        verdict=VERDICTS[outcome],
+        outcome=run.outcome,
         settled=settled,
-        settling_time=facts.settling_time if settled else None,
+        settling_time=run.settling_time if settled else None,
         hold_time=run.scene.controller.hold_time,
         loop=run.loop,
-        status=facts.status,
+        status=run.status,
         time=time,
-        amplitude=np.abs(seen),
+        amplitude=run.amplitude,
         phase=np.angle(seen),
         fill_ratio=dict(zip(chamber_letters(run.plant.chambers), fills, strict=True)),
-        injections=facts.injections,
-        samples=facts.samples,
-        overshoots=facts.overshoots,
+        injections=tuple(run.injections),
+        samples=tuple(run.samples),
+        overshoots=run.overshoots,
         shortened=run.shortened,
-        misadjustments=misadjustments(run.samples, floor=run.floor),
-        noise_floor=run.floor,
-        energy=math.fsum(injection.operation.energy for injection in facts.injections),
+        misadjustments=misadjustments(run.samples, floor=run.noise_floor),
+        noise_floor=run.noise_floor,
+        energy=math.fsum(injection.operation.energy for injection in run.injections),
         terms_modelled=terms_modelled(used),
         models_used=used,
-    )
-
-
-def _facts(run: _Run, cause: Cause, amplitude: FloatArray) -> Facts:
-    limit = run.scene.controller.limit
-    return Facts(
-        scene=run.scene,
-        plant=run.plant,
-        state=run.state,
-        cause=cause,
-        time=run.time,
-        initial_amplitude=float(amplitude[0]),
-        final_amplitude=float(amplitude[-1]),
-        loop=run.loop,
-        since=run.since,
-        held_since=run.held_since,
-        noise_floor=run.floor,
-        drift=run.drift,
-        overshoots=overshoots(run.samples, limit=limit),
-        samples=tuple(run.samples),
-        injections=tuple(run.injections),
-        shortened=run.shortened,
-        refused=run.refused,
     )

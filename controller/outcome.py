@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
-from ringbalance.controller.formulas.stopping import NOTICEABLE, Cause, has_grown
-from ringbalance.controller.judgement import NOISE_DEVIATIONS
+import numpy as np
+
+from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import (
     BEYOND_CAPACITY,
@@ -19,10 +20,18 @@ from ringbalance.controller.liquid_ring.reach import (
     starting_pressure,
 )
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.controller.simulation import Injection, Outcome, Sample, Verdict
+from ringbalance.controller.simulation import (
+    NOISE_DEVIATIONS,
+    Injection,
+    Outcome,
+    Sample,
+    noise_floor,
+    overshoots,
+)
 from ringbalance.controller.tuning.dead_time import standing_remedy
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
 from ringbalance.controller.tuning.recommendation import recommended_gain
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 MICROMETRE: Final = 1e-6
@@ -32,37 +41,54 @@ NO_SAMPLE: Final = "no usable sample"
 """Reason that every algorithm gives for doing nothing on a dropped sample or a NaN."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True)
 class Facts:
-    """What a finished run knows about itself."""
+    """What a run knows about itself; `cause` and `amplitude` are set when it has ended."""
 
     scene: Scene
     plant: LiquidRing
     state: DiscState
-    """At the end."""
-    cause: Cause
-    time: float
-    """s, at the end."""
-    initial_amplitude: float
-    """m."""
-    final_amplitude: float
-    """m."""
     loop: LoopFactor
-    since: float
-    """s, from which on the true amplitude was not above the limit; infinite when it ends above."""
-    held_since: float
+    time: float = 0.0
+    """s."""
+    since: float = math.inf
+    """s, from which on the true amplitude has not been above the limit; infinite while it is."""
+    held_since: float = math.inf
     """The same of the first time that it held for the hold time."""
-    noise_floor: float
-    """m."""
-    drift: float
+    drift: float = 0.0
     """Largest change of a fill ratio while the gas was off."""
-    overshoots: int
-    samples: tuple[Sample, ...]
-    injections: tuple[Injection, ...]
-    shortened: int
+    samples: list[Sample] = field(default_factory=list)
+    injections: list[Injection] = field(default_factory=list)
+    shortened: int = 0
     """Injections shortened or left out so that the driven chamber keeps its residual fill."""
-    refused: tuple[str, ...]
+    refused: tuple[str, ...] = ()
     """Letters of the driven chambers of those in the last command."""
+    cause: Cause = Cause.NONE
+    amplitude: FloatArray = field(default_factory=lambda: np.empty(0))
+    """True vibration, m zero-to-peak."""
+
+    @property
+    def initial_amplitude(self) -> float:
+        """m."""
+        return float(self.amplitude[0])
+
+    @property
+    def final_amplitude(self) -> float:
+        """m."""
+        return float(self.amplitude[-1])
+
+    @property
+    def noise_floor(self) -> float:
+        """Rise of the amplitude between two samples that noise alone does not explain, m."""
+        return noise_floor(
+            amplitude_noise=self.scene.sensor.amplitude_noise,
+            initial_amplitude=self.scene.rotor.initial_amplitude,
+        )
+
+    @property
+    def overshoots(self) -> int:
+        """Times that the residual turned between samples while above the limit."""
+        return overshoots(self.samples, limit=self.scene.controller.limit)
 
     @property
     def unreachable_amplitude(self) -> float:
@@ -366,10 +392,3 @@ _TEXTS: Final[Mapping[Outcome, Callable[[Facts], str]]] = {
     Outcome.NO_SAMPLES: _no_samples,
     Outcome.TOO_MANY_SAMPLES: _too_many,
 }
-VERDICTS: Final[Mapping[Outcome, Verdict]] = dict.fromkeys(Outcome, Verdict.NOT_SETTLED) | {
-    Outcome.SETTLED: Verdict.SETTLED,
-    Outcome.HOVERING: Verdict.HOVERING,
-    Outcome.UNSTABLE: Verdict.UNSTABLE,
-    Outcome.DIVERGING: Verdict.UNSTABLE,
-}
-"""What each outcome says of the loop."""

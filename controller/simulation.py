@@ -1,23 +1,113 @@
-"""The record of one closed-loop run, and how a run can end."""
+"""The record of one closed-loop run, its gas, how it can end, and what is counted in its samples."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from itertools import pairwise
+from typing import Final
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.gas_use import GasUse
+from ringbalance.controller.formulas import has_risen, has_turned
 from ringbalance.controller.liquid_ring.plant import Operation
+from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.controller.tuning.loop_factor import LoopFactor
+from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.results import Status
 from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+
+_LITRE = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class GasUse:
+    """Gas of a run."""
+
+    fillings: int
+    normal_volume: float
+    """Gas from the supply: what the chambers held above ambient pressure when their valves closed, all of
+    which is vented, and gas that passed through, normal m^3."""
+    energy: float
+    """Least work that compresses it, p V ln(p_1/p_a) a filling, J."""
+    run_dry: int
+    """Injections that ran their chamber dry."""
+    passed_through: float
+    """Upper bound on the gas that passed through those, normal m^3; part of `normal_volume`."""
+    residual_fill_ratio: float
+    """Fill of a driven chamber below which gas enters its port."""
+    below_residual: int
+    """Injections that left their chamber below it, those that ran it dry included."""
+
+    @property
+    def text(self) -> str:
+        """Consumption in one phrase."""
+        litres = self.normal_volume / _LITRE
+        work = f"{self.energy / 1e3:.1f} kJ of compression"
+        return f"{litres:.1f} normal litres, {work} in {self.fillings} fillings"
+
+    @property
+    def warning(self) -> str:
+        """Empty when no gas entered a port."""
+        if not self.below_residual:
+            return ""
+        dry = (
+            f", {self.run_dry} of them ran it dry: up to {self.passed_through / _LITRE:.3g} normal litres of "
+            "gas passed through the tube into the opposite chamber"
+            if self.run_dry
+            else ""
+        )
+        return (
+            f"{self.below_residual} of {self.fillings} injections left their chamber below a fill ratio of "
+            f"{self.residual_fill_ratio:.3g}, where gas enters the port{dry}; open the valve for less time "
+            "or fill in more liquid"
+        )
+
+    @classmethod
+    def of(cls, *, scene: Scene, model: BalancerModel, operations: Sequence[Operation]) -> GasUse:
+        """Gas consumption of the operations of a run.
+
+        Gas through a chamber that has run dry is bounded by a choked nozzle of the tube's section and by the
+        line.
+        Source: (p_1 - p_a) V of each filling at closing; `compression_work`, `nozzle_flow`.
+        """
+        gas = scene.gas
+        supply = gas.pressure + gas.ambient_pressure
+        through = nozzle_flow(pressure=supply, area=model.tube_area, temperature=gas.temperature)
+        line = GasLine.of(gas)
+        if line is not None:
+            # Filled volume over the time constant is the most that the line passes.
+            through = min(through, supply / line.time_constant(volume=1.0))
+        passed = through * math.fsum(operation.run_dry for operation in operations)
+        dead = gas.dead_volume or 0.0
+        content = math.fsum(
+            # A vented chamber is full of ambient gas, which no supply has to deliver.
+            done.closing_pressure * ((1 - done.fill_after) * model.chamber_volume + dead)
+            for done in operations
+        )
+        total = content + passed
+        residual = residual_fill_ratio(scene, law=model.flow)
+        return cls(
+            fillings=len(operations),
+            normal_volume=normal_volume(pressure_volume=total, temperature=gas.temperature),
+            energy=compression_work(
+                pressure_volume=total, pressure=supply, ambient_pressure=gas.ambient_pressure
+            ),
+            run_dry=sum(operation.run_dry > 0 for operation in operations),
+            residual_fill_ratio=residual,
+            below_residual=sum(
+                done.run_dry > 0 or done.fill_after < residual - NEAR_RESIDUAL for done in operations
+            ),
+            passed_through=normal_volume(pressure_volume=passed, temperature=gas.temperature),
+        )
 
 
 class Outcome(StrEnum):
@@ -49,6 +139,15 @@ class Verdict(StrEnum):
     NOT_SETTLED = "not settled"
     UNSTABLE = "unstable"
     """A small residual grows, or the amplitude did."""
+
+
+_VERDICTS: Final[Mapping[Outcome, Verdict]] = {
+    Outcome.SETTLED: Verdict.SETTLED,
+    Outcome.HOVERING: Verdict.HOVERING,
+    Outcome.UNSTABLE: Verdict.UNSTABLE,
+    Outcome.DIVERGING: Verdict.UNSTABLE,
+}
+"""What an outcome says of the loop; any other: not settled."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +183,6 @@ class Simulation:
     integrator: str
     """How operations were carried through time."""
     outcome: Outcome
-    verdict: Verdict
     settled: bool
     """Whether the amplitude held within the limit for the hold time and is expected to stay."""
     settling_time: float | None
@@ -120,6 +218,11 @@ class Simulation:
     terms_modelled: tuple[str, ...]
     """Names of the terms that are modelled beyond the flow law; empty: it alone carries the operations."""
 
+    @property
+    def verdict(self) -> Verdict:
+        """What the outcome says of the loop."""
+        return _VERDICTS.get(self.outcome, Verdict.NOT_SETTLED)
+
     # Most runs are one of many, of which nobody asks what follows.
     @property
     def law(self) -> str:
@@ -151,3 +254,41 @@ class Simulation:
     def model_status(self) -> Status:
         """Whether the models of the chamber hold over the range of fills."""
         return chamber_status(self.scene)
+
+
+ROUND_OFF: Final = 1e-9
+"""Relative to the initial amplitude: a smaller rise is arithmetic."""
+NOISE_DEVIATIONS: Final = 3.0
+
+
+def noise_floor(*, amplitude_noise: float, initial_amplitude: float) -> float:
+    """Rise of the amplitude between two samples that noise alone does not explain.
+
+    3 sqrt(2) sigma: three standard deviations of the difference of two samples.
+    Args: `amplitude_noise`: sigma, m. `initial_amplitude`: m; a billionth of it guards against round-off.
+    Returns: m.
+    """
+    return NOISE_DEVIATIONS * math.sqrt(2) * amplitude_noise + ROUND_OFF * initial_amplitude
+
+
+def overshoots(samples: Sequence[Sample], *, limit: float) -> int:
+    """Times that the residual turned by more than 90 degrees between usable samples while above the limit.
+
+    Args: `samples`: of one run, in order. `limit`: m.
+    """
+    seen = [m for s in samples if (m := s.measurement) is not None and m.usable(needs_phase=True)]
+    return sum(b.amplitude > limit and has_turned(a.phase, b.phase) for a, b in pairwise(seen))
+
+
+def misadjustments(samples: Sequence[Sample], *, floor: float) -> int:
+    """Operations after which the measured amplitude was higher by more than the noise floor.
+
+    Args: `samples`: of one run, in order; one without a usable amplitude is passed over. `floor`: m.
+    """
+    count, before, operated = 0, math.inf, False
+    for sample in samples:
+        if sample.measurement is not None and sample.measurement.usable(needs_phase=False):
+            count += operated and has_risen(before, sample.measurement.amplitude, floor)
+            before, operated = sample.measurement.amplitude, False
+        operated = operated or bool(sample.command.valves)
+    return count

@@ -10,14 +10,13 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import MODEL_CAUSES
-from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
+from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
@@ -90,7 +89,7 @@ def _widths(scene: AnyScene) -> Mapping[str, float]:
 def _values(scene: AnyScene) -> dict[str, float]:
     """Value, SI, of every quantity that may be uncertain and that the scene has."""
     if not isinstance(scene, Scene):
-        return {name: eccentric_value(scene, name) for name in fitted_names(scene)}
+        return {name: eccentric_value(scene, name) for name in _fitted_names(scene)}
     values = {name: nominal_value(scene=scene, quantity=name) for name in UNCERTAIN_QUANTITIES}
     return {name: value for name, value in values.items() if value is not None}
 
@@ -133,7 +132,7 @@ def exact_inputs(result: FitResult) -> list[str]:
     ]
 
 
-def fitted_names(scene: EccentricScene) -> tuple[str, ...]:
+def _fitted_names(scene: EccentricScene) -> tuple[str, ...]:
     """All that can be fitted."""
     found: list[str] = []
     for table, content in ECCENTRIC_MASS.tables.items():
@@ -150,8 +149,8 @@ def _eccentric_parameter(scene: EccentricScene, name: str) -> Parameter:
 
     Raises: FitError: no such quantity, or a value that is zero.
     """
-    if name not in fitted_names(scene):
-        raise FitError.unknown(name, fitted_names(scene))
+    if name not in _fitted_names(scene):
+        raise FitError.unknown(name, _fitted_names(scene))
     start, is_angle = eccentric_value(scene, name), name == "imbalance.phase"
     if start <= 0 and not is_angle:
         raise FitError(f"{name} is zero: give a value above zero to fit it")
@@ -174,7 +173,7 @@ def _eccentric_widths(scene: EccentricScene) -> dict[str, float]:
     stated = {each.quantity: each for each in scene.uncertainty}
     widths = {
         name: stated[path].absolute(eccentric_value(scene, name))
-        for name in fitted_names(scene)
+        for name in _fitted_names(scene)
         if (path := name.split("[")[0]) in stated
     }
     return {name: width for name, width in widths.items() if width > 0}

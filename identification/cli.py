@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ringbalance.identification.criticism.review import Review
+from ringbalance.identification.data.kinds import template as template_of
 from ringbalance.identification.data.reading import read_observations
-from ringbalance.identification.data.template import template as template_of
-from ringbalance.identification.documents import fit_document
+from ringbalance.identification.documents import fit_document, fit_view
 from ringbalance.identification.fitting import Loss, problem_of
 from ringbalance.identification.fitting import fit as fit_scene
 from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.saving import save_result
-from ringbalance.identification.show import fit_view
-from ringbalance.scene.faults import Fault, SceneError, did_you_mean
+from ringbalance.scene.faults import SceneError, did_you_mean
 from ringbalance.scene.loader import read_scene
 from ringbalance.scene.platform.files import check_file
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
@@ -78,8 +77,7 @@ def fit(
         with activity("fit", "several starts, profiles of the likelihood ..."):
             result = fit_scene(given, data=observations, parameters=names, loss=loss)
     except FitError as error:
-        fault = Fault(file=given.file, table="", key="", value="", problem=str(error), allowed="")
-        raise SceneError([fault]) from error
+        raise SceneError.of_file(given.file, str(error)) from error
     told, following = Review.of(result), next_measurement(result, chosen)
     if json:
         document = fit_document(result, data=observations, told=told, following=following)
@@ -112,8 +110,7 @@ def _keep_inputs(save: Path, inputs: Sequence[Path]) -> None:
 
 
 def _usage(file: str, problem: str) -> SceneError:
-    text = f"{problem}: {_USAGE}"
-    return SceneError([Fault(file=file, table="", key="", value="", problem=text, allowed="")])
+    return SceneError.of_file(file, f"{problem}: {_USAGE}")
 
 
 def _names(text: str) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.identification.balancers import both_sides, held_for, informed, models_for, parameters_for
 from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
 from ringbalance.identification.intervals import Profile, covariance, profiles
 from ringbalance.identification.likelihood import Block, Problem

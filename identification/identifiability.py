@@ -206,13 +206,13 @@ def _combination(
     return Combination(
         names=tuple(p.name for p, one in zip(parameters, used, strict=True) if one),
         exponents=tuple(float(x) for x in row[used]),
-        text=power_text([p.symbol for p, one in zip(parameters, used, strict=True) if one], row[used]),
+        text=_power_text([p.symbol for p, one in zip(parameters, used, strict=True) if one], row[used]),
         value=math.exp(float(row @ t)),
         relative_uncertainty=width,
     )
 
 
-def power_text(symbols: Sequence[str], exponents: FloatArray) -> str:
+def _power_text(symbols: Sequence[str], exponents: FloatArray) -> str:
     """Product of powers, such as "lambda^2/(k + 1)"."""
     above = [_power(s, e) for s, e in zip(symbols, exponents, strict=True) if e > 0]
     below = [_power(s, -e) for s, e in zip(symbols, exponents, strict=True) if e < 0]

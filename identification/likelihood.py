@@ -24,7 +24,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.parameters import Parameter
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.predict.predicted import PredictedKind

@@ -15,7 +15,7 @@ import numpy as np
 
 from ringbalance.identification.balancers import both_sides
 from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.result import FitResult
@@ -53,7 +53,7 @@ class NextMeasurement:
     """What to measure next for one parameter."""
 
     parameter: str
-    gains: tuple[Gain, ...]
+    gains: tuple[_Gain, ...]
     """Best first."""
 
     @property
@@ -80,7 +80,7 @@ def next_measurement(result: FitResult, parameter: str | None = None) -> NextMea
     result.parameter(chosen)
     which, slopes = names.index(chosen), np.concatenate(result.optimum.of_all)
     information = slopes.T @ slopes
-    gains = expected_gains(information, parameter=which, candidates=_candidates(result))
+    gains = _expected_gains(information, parameter=which, candidates=_candidates(result))
     return NextMeasurement(parameter=chosen, gains=gains)
 
 
@@ -100,7 +100,7 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
     problem, t = best.residuals.problem, best.t
     scene, measured = problem.scene_at(t), {block.observations.kind: block for block in problem.blocks}
     of_kinds = {kind: measured[kind].observations if kind in measured else None for kind in _grids(scene)}
-    offered = [offered_rows(scene, kind, before) for kind, before in of_kinds.items()]
+    offered = [_offered_rows(scene, kind, before) for kind, before in of_kinds.items()]
     asked = replace(problem, blocks=tuple(Block.of(each) for each in offered if len(each)))
     changed = [(problem.scene, both_sides(problem.scene, n, sd)[1]) for n, sd in result.held.items()]
     by_parameters, by_held = asked.quick_slopes(t), asked.held_effects(t, changed)
@@ -115,7 +115,7 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
         assumed = "" if before is not None else f" (noise of {100 * ASSUMED_NOISE:g} % assumed)"
         for i in range(count):
             yield Candidate(
-                text=f"{words_of(block.observations, i)}{assumed}",
+                text=f"{_words_of(block.observations, i)}{assumed}",
                 derivatives=scale[i::count, None] * rows[i::count],
             )
 
@@ -186,7 +186,7 @@ def _ring_grids(scene: Scene) -> dict[str, Grid]:
     }
 
 
-def offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> Observations:
+def _offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> Observations:
     """All rows of a kind's grid, each a series of its own; what is measured is that of the data's middle."""
     grid = dict(_grids(scene)[kind])
     if measured is not None:
@@ -222,7 +222,7 @@ def _middles(kind: str, measured: Observations | None) -> tuple[Mapping[str, flo
     )
 
 
-def words_of(offered: Observations, row: int) -> str:
+def _words_of(offered: Observations, row: int) -> str:
     """Such as "transfer with fill ratio 0.25, pressure 0.7 MPa, valve-open time 200 ms"."""
     said = []
     for column in KINDS[offered.kind].columns:
@@ -247,7 +247,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gain:
+class _Gain:
     """What a candidate does to one parameter."""
 
     candidate: str
@@ -261,9 +261,9 @@ class Gain:
         return 1.0 if self.after == self.before else self.after / self.before
 
 
-def expected_gains(
+def _expected_gains(
     information: FloatArray, *, parameter: int, candidates: Iterable[Candidate]
-) -> tuple[Gain, ...]:
+) -> tuple[_Gain, ...]:
     """Gains of all candidates, largest first.
 
     sigma'^2 = [(F + J^T J)^-1]_ii against sigma^2 = [F^-1]_ii.
@@ -272,7 +272,7 @@ def expected_gains(
     """
     before = _deviation(information, parameter)
     gains = [
-        Gain(
+        _Gain(
             candidate=each.text,
             before=before,
             after=_deviation(information + each.derivatives.T @ each.derivatives, parameter),

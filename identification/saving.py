@@ -16,7 +16,7 @@ from itertools import combinations
 from pathlib import Path, PurePath
 from typing import Any, Final
 
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, FittedParameter
@@ -56,11 +56,11 @@ def save_result(
     folder: Path,
     said: Sequence[str] = (),
 ) -> Path:
-    """Write the scene that a fit found, see `save_fitted`.
+    """Write the scene that a fit found, see `_save_fitted`.
 
     Args: `folder`: of the scene file that was fitted. `said`: what the criticism of the fit says.
     """
-    text = found_from(text, folder=folder, to=path.parent)
+    text = _found_from(text, folder=folder, to=path.parent)
     files = [
         MeasuredFile(file=PurePath(each.file).name, kind=each.kind, rows=len(each), sha256=each.sha256)
         for each in data
@@ -77,10 +77,10 @@ def save_result(
         *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
     ]
     fitted = [each for each in result.parameters if each.name not in START]
-    return save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
+    return _save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
 
 
-def found_from(text: str, *, folder: Path, to: Path) -> str:
+def _found_from(text: str, *, folder: Path, to: Path) -> str:
     """A scene whose mesh, if it names one, is found from another folder."""
     document = tomllib.loads(text)
     mesh = document.get("disc", {}).get("mesh")
@@ -110,7 +110,7 @@ def _short(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
 
 
-def save_fitted(
+def _save_fitted(
     path: Path,
     *,
     text: str,
@@ -125,12 +125,12 @@ def save_fitted(
     Raises: SceneError: the fitted values make no scene, such as a crest outside the port. OSError: the file
         cannot be written.
     """
-    content = fitted_scene(text, fitted=fitted, files=files, findings=findings)
+    content = _fitted_scene(text, fitted=fitted, files=files, findings=findings)
     scene_from(content=content, file=str(path))
     return write_whole(path, content.decode())
 
 
-def fitted_scene(
+def _fitted_scene(
     text: str,
     *,
     fitted: Sequence[FittedParameter],

@@ -11,7 +11,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
-from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
+from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.operating.crest_margin import DirectedState

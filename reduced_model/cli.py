@@ -8,8 +8,8 @@ from pathlib import Path
 from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.show import calibration_view
-from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.loader import load_scene
+from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.files import check_file
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 

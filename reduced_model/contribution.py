@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from ringbalance.scene.accuracy import FINEST
+from ringbalance.scene.narrowing import FINEST
 
 NEGLIGIBLE: Final = 1e-3
 """Of the tolerance: a smaller contribution is left out unchecked."""

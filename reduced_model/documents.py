@@ -18,8 +18,7 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
 from ringbalance.reduced_model.chamber.gravity import closed_ring
-from ringbalance.reduced_model.chamber.imported_walls import share_across
-from ringbalance.reduced_model.chamber.values import paper_closed_forms
+from ringbalance.reduced_model.chamber.values import paper_closed_forms, share_across
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import BoolArray, FloatArray
@@ -96,14 +95,9 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
         | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
         | _curve(chamber.moment, at, "moment", "kg_m")
         | {name: _listed(values) for name, values in paper_columns(calibration, fills).items()}
-        | _across(scene, fills)
+        | {"moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills)))}
         | {"lambda_per_transferred_mass_m": _listed(calibration.lambda_over_fill(fill_ratio=fills))}
     )
-
-
-def _across(scene: Scene, fills: FloatArray) -> dict[str, Any]:
-    """Angle from the middle of a chamber to the moment of liquid moved at the fills; zero for a sector."""
-    return {"moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills)))}
 
 
 def _check(check: ElementCheck) -> dict[str, Any]:
@@ -198,12 +192,12 @@ def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
     """What limits a chamber at the reported fill ratios."""
     scene, chamber = calibration.scene, calibration.chamber
     fills, computed = chamber.reported_fill_ratio, chamber.ring.closed[list(chamber.reported)]
-    return row_status(scene, fill_ratio=fills, closed=computed & closed_ring(scene, fills))
+    return _row_status(scene, fill_ratio=fills, closed=computed & closed_ring(scene, fills))
 
 
 def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[RowStatus, ...]:
     """What limits a velocity out of a chamber at fill ratios, under the scene's gas pressure."""
-    return row_status(
+    return _row_status(
         calibration.scene,
         fill_ratio=fill_ratio,
         closed=closed_ring(calibration.scene, fill_ratio),
@@ -308,7 +302,7 @@ REMEDIES: Final[Mapping[RowStatus, str]] = MappingProxyType(
 )
 
 
-def row_status(
+def _row_status(
     scene: Scene, *, fill_ratio: FloatArray, closed: BoolArray, residual: float = 0.0
 ) -> tuple[RowStatus, ...]:
     """Status of each fill ratio x; an empty chamber is limited by its residual liquid alone.

@@ -30,7 +30,7 @@ DEFAULT_CRITICAL_RATIO: Final = 0.3
 
 
 @dataclass(frozen=True, kw_only=True)
-class LineEnd:
+class _LineEnd:
     """One gas line that answers are given for."""
 
     name: str
@@ -75,7 +75,7 @@ class LineAnswer:
         return self.smallest_correction is not None and self.smallest_correction > self.largest_correction
 
 
-def line_ends(scene: Scene) -> tuple[LineEnd, ...]:
+def line_ends(scene: Scene) -> tuple[_LineEnd, ...]:
     """The scene's gas line, or the slow and the fast end of the default range of what it does not give."""
     gas = scene.gas
     if gas.conductance is not None and gas.valve_lag is not None:
@@ -83,13 +83,13 @@ def line_ends(scene: Scene) -> tuple[LineEnd, ...]:
     return _end(gas, "slow", 0), _end(gas, "fast", 1)
 
 
-def _end(gas: Gas, name: str, place: int) -> LineEnd:
+def _end(gas: Gas, name: str, place: int) -> _LineEnd:
     line = GasLine.with_conductance(
         gas,
         conductance=DEFAULT_CONDUCTANCES[place] if gas.conductance is None else gas.conductance,
         critical_ratio=DEFAULT_CRITICAL_RATIO if gas.critical_ratio is None else gas.critical_ratio,
     )
-    return LineEnd(
+    return _LineEnd(
         name=name, line=line, valve_lag=DEFAULT_LAGS[place] if gas.valve_lag is None else gas.valve_lag
     )
 
@@ -157,7 +157,7 @@ def _largest_standing(times: Sequence[float]) -> float:
     return max(abs(one + other * turn) for one, other in zip(times, [*times[1:], times[0]], strict=True))
 
 
-def _answer(scene: Scene, end: LineEnd, fills: Fills, injection: ShortInjection | None) -> LineAnswer:
+def _answer(scene: Scene, end: _LineEnd, fills: Fills, injection: ShortInjection | None) -> LineAnswer:
     line, limit, volume = end.line, scene.controller.limit, fills.gas_volume(scene)
     opening = correction = dead = standing = None
     if injection is not None:

@@ -304,7 +304,7 @@ class ShortInjection:
     def _moved(self, before: _Moved, steady: float, push: float, time: float) -> _Moved:
         _, velocities, frictions = self._losses
         friction = float(np.interp(max(before.velocity, steady), velocities, frictions))
-        velocity, metres = ridden(velocity=before.velocity, push=push, friction=friction, time=time)
+        velocity, metres = _ridden(velocity=before.velocity, push=push, friction=friction, time=time)
         return replace(before, metres=before.metres + metres, time=before.time + time, velocity=velocity)
 
     def _braked(self, before: _Moved) -> _Moved:
@@ -313,7 +313,7 @@ class ShortInjection:
         return self._moved(before, 0.0, push, math.inf) if push and before.velocity else before
 
 
-def ridden(*, velocity: float, push: float, friction: float, time: float) -> tuple[float, float]:
+def _ridden(*, velocity: float, push: float, friction: float, time: float) -> tuple[float, float]:
     """Velocity, m/s, and way, m, after a time under du/dt = B - c u^2, until it rests.
 
     With q = sqrt(B c), w = sqrt(B/c) and v = u/w, u becomes w (v + tanh qt)/(1 + v tanh qt) on a way

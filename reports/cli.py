@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Final
 
 from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
-from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import SceneError
+from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.processes import beside
 from ringbalance.scene.platform.terminal import activity, messages_console, since_start

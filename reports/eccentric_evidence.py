@@ -10,9 +10,8 @@ from ringbalance.reports.evidence import FORMAT, Progress, cases_of_report, scen
 from ringbalance.reports.numbers import given, short, with_unit
 from ringbalance.reports.provenance import provenance, versions
 from ringbalance.reports.section import Record
-from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
+from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene, SpeedPoint
 from ringbalance.scene.keys.declaration import Key, keys_of
-from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.platform.processes import Workers

@@ -60,6 +60,8 @@ _FIRST_INJECTIONS: Final = 12
 """Injections that are listed."""
 _PICTURE_WIDTH: Final = 1000
 _PICTURE_QUALITY: Final = 80
+_PICTURE_EFFORT: Final = 2
+"""Of 6; more saves a twentieth of the bytes in twice the time."""
 
 
 def _page_figures(evidence: Record) -> Record:
@@ -327,7 +329,7 @@ def _data_address(content: bytes) -> str:
     packed = io.BytesIO()
     with Image.open(io.BytesIO(content)) as picture:
         picture.thumbnail((_PICTURE_WIDTH, _PICTURE_WIDTH))
-        picture.save(packed, format="WEBP", quality=_PICTURE_QUALITY)
+        picture.save(packed, format="WEBP", quality=_PICTURE_QUALITY, method=_PICTURE_EFFORT)
     return "data:image/webp;base64," + base64.b64encode(packed.getvalue()).decode("ascii")
 
 

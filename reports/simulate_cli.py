@@ -8,21 +8,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.controller.document import simulation_document, simulation_history
-from ringbalance.controller.eccentric_mass.document import eccentric_document, eccentric_history
+from ringbalance.controller.document import show, simulation_document, simulation_history
+from ringbalance.controller.eccentric_mass.document import (
+    eccentric_document,
+    eccentric_history,
+    show_eccentric,
+)
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
-from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.controller.line_runs import line_runs, line_runs_document, line_runs_text
 from ringbalance.controller.loop import simulate as run_loop
-from ringbalance.controller.show import show
 from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reports.figures import deferred
-from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene, checked_law
+from ringbalance.scene.narrowing import AnyScene, Models, checked_law, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.terminal import Activity, activity, results_console
 

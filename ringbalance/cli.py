@@ -6,7 +6,9 @@ Results go to standard output, everything else to standard error.
 
 from __future__ import annotations
 
+import atexit
 import difflib
+import gc
 import os
 import sys
 import traceback
@@ -182,6 +184,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Before numpy is imported, and whatever the user set: one thread gives the same sums on every machine.
     os.environ.update(dict.fromkeys(THREAD_COUNTS, "1"))
     drop_unusable_size(os.environ)
+    # An interpreter that ends looks for garbage in all that it holds, which its process gives back anyway.
+    atexit.register(gc.freeze)
     if refusal := prepare_streams() or interpreter_error():
         _say(f"ringbalance: {refusal}")
         return BAD_INPUT

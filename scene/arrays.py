@@ -1,6 +1,8 @@
-"""Arrays as every room has them: their types, and what numpy has only at the price of a slow start."""
+"""Arrays and numbers as every room has them: types, and what numpy has only at the price of a slow start."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -21,3 +23,8 @@ def distinct(values: npt.ArrayLike) -> FloatArray:
 def clipped(values: npt.ArrayLike, low: float, high: float) -> FloatArray:
     """As np.clip, which takes three times as long for a few numbers."""
     return np.minimum(np.maximum(values, low), high)
+
+
+def finite(value: float | None) -> float | None:
+    """A number as JSON can hold it: None for one that is not finite."""
+    return value if value is not None and math.isfinite(value) else None

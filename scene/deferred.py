@@ -14,7 +14,7 @@ from typing import Any, Final
 _HOME: Final = MappingProxyType(
     {
         "CHECKS": "ringbalance.scene.rules.eccentric",
-        "ECCENTRIC_MASS": "ringbalance.scene.keys.eccentric_schema",
+        "ECCENTRIC_MASS": "ringbalance.scene.eccentric_models",
         "EccentricScene": "ringbalance.scene.eccentric_models",
         "with_chamber": "ringbalance.scene.chamber_file.loading",
     }

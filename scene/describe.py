@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from ringbalance.scene import deferred
 from ringbalance.scene.faults import Fault, toml_text
-from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of, shown
+from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Bend, Scene
@@ -135,10 +135,10 @@ def in_usual_unit(path: str, value: float) -> float:
     return float(format_quantity(value, dimension, usual_unit(path), digits=_EXACT).split(" ")[0])
 
 
-def scene_fault(*, scene: Scene, table: str, key: str, problem: str, allowed: str) -> Fault:
+def scene_fault(scene: Scene, path: str, *, problem: str, allowed: str) -> Fault:
     """The error about a value of a loaded scene that only a later room finds; raise `SceneError` with it."""
-    path = f"{table}.{key}"
-    line = _LINES.get(path) or _Line(path=path, shown=shown(key), dimension="")
+    table, key = path.split(".")
+    line = _LINES.get(path) or _Line(path=path, shown=Shown(key), dimension="")
     written = toml_text(_written(line, _value(scene, path)))
     return Fault(file=scene.file, table=table, key=key, value=written, problem=problem, allowed=allowed)
 

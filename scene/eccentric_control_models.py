@@ -3,11 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, Protocol
+from functools import partial
+from typing import Annotated, Any, Literal
 
 from ringbalance.scene.keys.declaration import derived, standard
-from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, angle_of_turn, each_of, quantity
-from ringbalance.scene.keys.quantities import (
+from ringbalance.scene.keys.fields import (
+    NOT_NEGATIVE,
+    POSITIVE,
     Damping,
     Gate,
     Length,
@@ -24,6 +26,9 @@ from ringbalance.scene.keys.quantities import (
     Unbalance,
     Velocity,
     Weight,
+    angle_of_turn,
+    each_of,
+    quantity,
 )
 
 Discretisation = Literal["exact", "euler"]
@@ -34,29 +39,6 @@ _FINEST_POSITION = 1e-6
 _FINEST_VELOCITY = 1e-5
 _FINEST_RATE = 1e-3
 _LONGEST_WAIT = 30.0
-
-
-class _Corner(Protocol):
-    """One corner of a speed profile."""
-
-    @property
-    def speed(self) -> float: ...
-
-
-def _a_tenth(radius: float) -> float:
-    return radius / 10
-
-
-def _assumed_position_noise(noise: float) -> float:
-    return max(noise, _FINEST_POSITION)
-
-
-def _assumed_velocity_noise(noise: float) -> float:
-    return max(noise, _FINEST_VELOCITY)
-
-
-def _assumed_rate_noise(noise: float) -> float:
-    return max(noise, _FINEST_RATE)
 
 
 def _capacity(mass: float, radius: float) -> float:
@@ -80,8 +62,8 @@ def _settling(damping: float, rotor: float, mass: float) -> float:
     return _LONGEST_WAIT if damping * _LONGEST_WAIT <= 8 * whole else 8 * whole / damping
 
 
-def _two_turns(profile: Sequence[_Corner]) -> float:
-    """Time of two turns of the rotor at the start, s."""
+def _two_turns(profile: Sequence[Any]) -> float:
+    """Time of two turns of the rotor at the start of a speed profile, s."""
     speeds = [abs(corner.speed) for corner in profile]
     fastest = speeds[0] or max(speeds) if speeds else 0.0
     return 4 * math.pi / fastest if fastest else 1.0
@@ -110,7 +92,7 @@ class ImbalanceFilter:
             "position_noise of [sensor], at least 1 um",
             "standard deviation that the filter assumes",
             "sensor.position_noise",
-            rule=_assumed_position_noise,
+            rule=partial(max, _FINEST_POSITION),
         ),
     ]
     velocity_noise: Annotated[
@@ -119,7 +101,7 @@ class ImbalanceFilter:
             "velocity_noise of [sensor], at least 10 um/s",
             "standard deviation that the filter assumes",
             "sensor.velocity_noise",
-            rule=_assumed_velocity_noise,
+            rule=partial(max, _FINEST_VELOCITY),
         ),
     ]
     velocity_walk: Annotated[
@@ -197,7 +179,7 @@ class FrictionFilter:
             "encoder_rate_noise of [sensor], at least 0.001 rad/s",
             "standard deviation that the filter assumes",
             "sensor.encoder_rate_noise",
-            rule=_assumed_rate_noise,
+            rule=partial(max, _FINEST_RATE),
         ),
     ]
     rate_walk: Annotated[Rate, standard("0.01 rad/s", "random walk of the speed of a mass within 1 s")]
@@ -216,7 +198,7 @@ class FrictionFilter:
             "a tenth of guide_radius",
             "standard deviation of the friction arm before the first update",
             "masses.guide_radius",
-            rule=_a_tenth,
+            rule=lambda radius: radius / 10,
         ),
     ]
     drive_speed: Annotated[

@@ -2,7 +2,8 @@
 
 Angles are radians in the rotor's frame, positive with the rotation; amplitudes are zero-to-peak.  A walk is
 the standard deviation gathered within 1 s, so its square is a spectral density: unit^2 / s.  What a
-field's key takes and means stands in its annotation, see `ringbalance.scene.keys.declaration`.
+field's key takes and means stands in its annotation, see `ringbalance.scene.keys.declaration`.  At the end
+the tables of such a file; all is loaded for such a file only.
 """
 
 from dataclasses import dataclass
@@ -19,9 +20,10 @@ from ringbalance.scene.eccentric_control_models import (
     Lqr,
     Supervisor,
 )
-from ringbalance.scene.keys.declaration import UNCERTAIN, listed, needed, standard, unused
-from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, quantity
-from ringbalance.scene.keys.quantities import (
+from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, needed, standard, unused
+from ringbalance.scene.keys.fields import (
+    NOT_NEGATIVE,
+    POSITIVE,
     Angle,
     Angles,
     Arms,
@@ -37,7 +39,9 @@ from ringbalance.scene.keys.quantities import (
     Teeth,
     Turn,
     Velocity,
+    quantity,
 )
+from ringbalance.scene.keys.schema import Schema, Table
 from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.origins import SceneFile
 
@@ -68,7 +72,7 @@ class EccentricRotor:
     speed_profile: Annotated[
         tuple[SpeedPoint, ...],
         needed("list of { time, speed }; the speed is linear in between, and constant before and after"),
-        listed('[{ time = "0 s", speed = "100 rpm" }, ...]'),
+        Listed('[{ time = "0 s", speed = "100 rpm" }, ...]'),
     ]
 
     @property
@@ -177,3 +181,23 @@ class EccentricScene(SceneFile):
         corners = pairwise(self.rotor.speed_profile)
         changes = [here.time for here, after in corners if here.speed != after.speed]
         return changes[0] if changes and 0 < changes[0] < self.run.time_limit else None
+
+
+_TABLES = {
+    "rotor": Table.of(EccentricRotor, "the rotor on its bearing, and its speed"),
+    "imbalance": Table.of(Imbalance, "the imbalance to be balanced"),
+    "masses": Table.of(EccentricMasses, "the two eccentric masses on their track"),
+    "motor": Table.of(Motor, "motor and gears of each mass"),
+    "sensor": Table.of(EccentricSensor, "the sensors; exact when left out"),
+    "imbalance_filter": Table.of(ImbalanceFilter, "the Kalman filter that finds the imbalance"),
+    "friction_filter": Table.of(FrictionFilter, "the extended Kalman filter that finds the friction"),
+    "lqr": Table.of(Lqr, "the regulator that moves the masses"),
+    "fine_tuning": Table.of(FineTuning, "the search by trial for a smaller vibration"),
+    "supervisor": Table.of(Supervisor, "the order of the stages, and when each ends"),
+}
+ECCENTRIC_MASS = Schema.of(
+    _TABLES,
+    balancer=needed('"eccentric_mass" for eccentric masses'),
+    scene=EccentricScene,
+)
+"""A scene whose balancer is two eccentric masses."""

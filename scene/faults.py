@@ -22,15 +22,15 @@ class Fault:
 
     file: str
     """The scene file, as it was named."""
-    table: str
+    table: str = ""
     """Table in the file, such as "disc"; empty for the top level and for the file itself."""
-    key: str
+    key: str = ""
     """Key in the table; empty when the whole table or file is in error."""
-    value: str
+    value: str = ""
     """What stands there, as TOML has it; "missing" when nothing does; empty when it does not apply."""
     problem: str
     """What is wrong."""
-    allowed: str
+    allowed: str = ""
     """What would be accepted; empty when the problem says it all."""
 
     def __str__(self) -> str:
@@ -67,17 +67,15 @@ class SceneError(Exception):
         return type(self), (self.faults,)
 
     @classmethod
+    def of_file(cls, file: str, problem: str, allowed: str = "") -> SceneError:
+        """The error of a file that cannot be used at all."""
+        return cls([Fault(file=file, problem=problem, allowed=allowed)])
+
+    @classmethod
     def of_option(cls, *, option: str, value: object, problem: str, allowed: str) -> SceneError:
         """The error of a command-line option that cannot be used."""
-        fault = Fault(
-            file="command line",
-            table="",
-            key=option,
-            value=toml_text(value),
-            problem=problem,
-            allowed=allowed,
-        )
-        return cls([fault])
+        value = toml_text(value)
+        return cls([Fault(file="command line", key=option, value=value, problem=problem, allowed=allowed)])
 
 
 def closest(word: str, known: Iterable[str]) -> str:

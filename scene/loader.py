@@ -189,7 +189,7 @@ def bundled_scene(name: str) -> Path:
     stem = name.removesuffix(".toml")
     if stem not in names:
         problem = f"no scene of that name comes with the program{did_you_mean(stem, names)}"
-        raise SceneError([_whole(name, problem, ", ".join(names))])
+        raise SceneError.of_file(name, problem, ", ".join(names))
     return folder / f"{stem}.toml"
 
 
@@ -206,23 +206,19 @@ def _sorted(faults: Iterable[Fault], schema: Schema) -> list[Fault]:
     return sorted(faults, key=place)
 
 
-def _whole(file: str, problem: str, allowed: str = "", *, key: str = "", value: str = "") -> Fault:
-    return Fault(file=file, table="", key=key, value=value, problem=problem, allowed=allowed)
-
-
 def _content(name: str, file: str) -> bytes:
     try:
         with open(name, "rb") as stream:
             content = stream.read(_LARGEST_FILE + 1)
     except FileNotFoundError as error:
-        raise SceneError([_whole(file, "there is no such file")]) from error
+        raise SceneError.of_file(file, "there is no such file") from error
     except IsADirectoryError as error:
-        raise SceneError([_whole(file, "this is a folder, not a scene file", "a TOML file")]) from error
+        raise SceneError.of_file(file, "this is a folder, not a scene file", "a TOML file") from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise SceneError([_whole(file, f"the file cannot be read: {reason}")]) from error
+        raise SceneError.of_file(file, f"the file cannot be read: {reason}") from error
     if len(content) > _LARGEST_FILE:
-        raise SceneError([_whole(file, "the file is larger than any scene", "a TOML file up to 1 MiB")])
+        raise SceneError.of_file(file, "the file is larger than any scene", "a TOML file up to 1 MiB")
     return content
 
 
@@ -232,8 +228,8 @@ def _document(content: bytes, file: str) -> Mapping[str, Any]:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         problem = f"line {line} is not UTF-8 text; save the file with UTF-8 encoding"
-        raise SceneError([_whole(file, problem)]) from error
+        raise SceneError.of_file(file, problem) from error
     except (ValueError, RecursionError) as error:
         reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
         problem = f"this is not TOML: {' '.join(reason.split())}"
-        raise SceneError([_whole(file, problem)]) from error
+        raise SceneError.of_file(file, problem) from error

@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import ComplexArray
-from ringbalance.scene.keys.declaration import UNCERTAIN, derived, needed, shown, standard, unused
+from ringbalance.scene.keys.declaration import UNCERTAIN, Shown, derived, needed, standard, unused
 from ringbalance.scene.keys.derivations import trial_sequence
-from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, chamber_letters, quantity, whole
-from ringbalance.scene.keys.quantities import (
+from ringbalance.scene.keys.fields import (
+    NOT_NEGATIVE,
+    POSITIVE,
     Angle,
     Influence,
     Length,
@@ -22,15 +23,13 @@ from ringbalance.scene.keys.quantities import (
     Time,
     TimePerChamber,
     Turn,
+    chamber_letters,
+    quantity,
+    whole,
 )
 
 Shaft = Literal["horizontal", "vertical"]
 ControllerKind = Literal["target_vector", "trial", "law_based"]
-
-
-def _hold_time(period: float) -> float:
-    """Of samples below a limit half of the time by chance, ten in a row are so once in a thousand."""
-    return 10 * period
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,13 +37,13 @@ class Environment:
     """Gravity and how the shaft lies in it."""
 
     shaft: Annotated[
-        Shaft, standard("horizontal", "how the shaft lies in the field of gravity"), shown("shaft")
+        Shaft, standard("horizontal", "how the shaft lies in the field of gravity"), Shown("shaft")
     ]
     gravity: Annotated[
         float,
         quantity("acceleration", NOT_NEGATIVE),
         standard("9.80665 m/s^2", "acceleration of gravity; zero for none"),
-        shown("gravity", "m/s^2"),
+        Shown("gravity", "m/s^2"),
     ]
 
 
@@ -65,7 +64,7 @@ class Rotor:
     """The rotor as the balancer sees it: V1 = V0 + K U with K = influence_coefficient at minus lag_angle."""
 
     speed: Annotated[
-        float, quantity("speed", POSITIVE), needed("speed of the rotor"), UNCERTAIN, shown("speed", "rpm")
+        float, quantity("speed", POSITIVE), needed("speed of the rotor"), UNCERTAIN, Shown("speed", "rpm")
     ]
     influence_coefficient: Annotated[
         Influence,
@@ -74,7 +73,7 @@ class Rotor:
             "zero-to-peak vibration per unbalance; the default is inferred for the paper's rotor",
         ),
         UNCERTAIN,
-        shown("influence coefficient", "um/(g*mm)"),
+        Shown("influence coefficient", "um/(g*mm)"),
     ]
     lag_angle: Annotated[
         Turn,
@@ -83,18 +82,18 @@ class Rotor:
             "by which the vibration lags behind the unbalance; the default is assumed for the paper's rotor",
         ),
         UNCERTAIN,
-        shown("lag angle", "deg"),
+        Shown("lag angle", "deg"),
     ]
     initial_amplitude: Annotated[
-        float, shown("vibration at the start", "um", note="zero-to-peak", dimension="length")
+        float, Shown("vibration at the start", "um", note="zero-to-peak", dimension="length")
     ]
     """m, zero-to-peak."""
-    initial_phase: Annotated[float, shown("its phase", "deg", dimension="angle")]
+    initial_phase: Annotated[float, Shown("its phase", "deg", dimension="angle")]
     """rad, of the vibration."""
     mass: Annotated[
         PositiveMass | None,
         unused("no balance quality grade is stated", "of the rotor; for grades of ISO 21940-11 only"),
-        shown("mass", "kg"),
+        Shown("mass", "kg"),
     ] = None
 
     @property
@@ -130,10 +129,10 @@ class Sensor:
     amplitude_noise: Annotated[
         Length,
         standard("0 um", "standard deviation of the measured amplitude"),
-        shown("amplitude noise", "um"),
+        Shown("amplitude noise", "um"),
     ]
     phase_noise: Annotated[
-        Angle, standard("0 deg", "standard deviation of the measured phase"), shown("phase noise", "deg")
+        Angle, standard("0 deg", "standard deviation of the measured phase"), Shown("phase noise", "deg")
     ]
 
 
@@ -146,51 +145,52 @@ class ControllerSettings:
         standard(
             "target_vector", "algorithm; law_based takes the valve-open time straight from the flow law"
         ),
-        shown("algorithm"),
+        Shown("algorithm"),
     ]
     limit: Annotated[
         PositiveLength,
         standard("0.05 um", "amplitude below which the controller rests"),
-        shown("limit", "um"),
+        Shown("limit", "um"),
     ]
     period: Annotated[
         PositiveTime,
         standard(
             "0.5 s", "wait after the gas closes, before the next sample; a run takes at most 10 000 samples"
         ),
-        shown("period", "s"),
+        Shown("period", "s"),
     ]
+    # Of samples below a limit half of the time by chance, ten in a row are so once in a thousand.
     hold_time: Annotated[
         PositiveTime,
         derived(
             "10 times period",
             "the run is settled once the amplitude has stayed at or below limit for this long",
             "controller.period",
-            rule=_hold_time,
+            rule=lambda period: 10 * period,
         ),
-        shown("hold time", "s"),
+        Shown("hold time", "s"),
     ]
     proportional: Annotated[
         float,
         quantity("gain", POSITIVE),
         standard("0.08 s/um", "Kc, valve-open time per vibration amplitude"),
-        shown("proportional gain Kc", "s/um"),
+        Shown("proportional gain Kc", "s/um"),
     ]
     integral_time: Annotated[
         PositiveTime | None,
         unused("no integral part", "Ti"),
-        shown("integral time Ti", "min", absent="no integral part"),
+        Shown("integral time Ti", "min", absent="no integral part"),
     ]
     derivative_time: Annotated[
-        Time, standard("0 s", "Td; zero for no derivative part"), shown("derivative time Td", "min")
+        Time, standard("0 s", "Td; zero for no derivative part"), Shown("derivative time Td", "min")
     ]
     minimum_gas_time: Annotated[
-        Time, standard("1 ms", "a shorter command is not executed"), shown("shortest valve-open time", "ms")
+        Time, standard("1 ms", "a shorter command is not executed"), Shown("shortest valve-open time", "ms")
     ]
     maximum_gas_time: Annotated[
         PositiveTime,
         standard("5 s", "a longer command is cut to this"),
-        shown("longest valve-open time", "s"),
+        Shown("longest valve-open time", "s"),
     ]
     assumed_influence_coefficient: Annotated[
         Influence,
@@ -199,12 +199,12 @@ class ControllerSettings:
             "value used by the controller",
             "rotor.influence_coefficient",
         ),
-        shown("influence coefficient assumed", "um/(g*mm)"),
+        Shown("influence coefficient assumed", "um/(g*mm)"),
     ]
     assumed_lag_angle: Annotated[
         Turn,
         derived("lag_angle of [rotor]", "value used by the controller", "rotor.lag_angle"),
-        shown("lag angle assumed", "deg"),
+        Shown("lag angle assumed", "deg"),
     ]
     sequence: Annotated[
         tuple[str, ...],
@@ -215,7 +215,7 @@ class ControllerSettings:
             "disc.chambers",
             rule=trial_sequence,
         ),
-        shown("order of trials", only_for="trial"),
+        Shown("order of trials", only_for="trial"),
     ]
     gas_time_offset: Annotated[
         TimePerChamber | None,
@@ -224,27 +224,27 @@ class ControllerSettings:
             "target_vector and law_based: added to every valve-open time, such as the dead time in which gas "
             "fills the chamber and liquid rises to the crest; `ringbalance tune` recommends it",
         ),
-        shown("added to valve-open times", "ms", absent="nothing"),
+        Shown("added to valve-open times", "ms", absent="nothing"),
     ] = None
     first_trial: Annotated[
         PositiveTime,
         standard("50 ms", "trial algorithm: valve-open time of a chamber's first trial"),
-        shown("first trial", "ms", only_for="trial"),
+        Shown("first trial", "ms", only_for="trial"),
     ]
     long_step: Annotated[
         PositiveTime,
         standard("100 ms", "trial algorithm: valve-open time while the amplitude is large"),
-        shown("long step", "ms", only_for="trial"),
+        Shown("long step", "ms", only_for="trial"),
     ]
     short_step: Annotated[
         PositiveTime,
         standard("5 ms", "trial algorithm: valve-open time below fine_below"),
-        shown("short step", "ms", only_for="trial"),
+        Shown("short step", "ms", only_for="trial"),
     ]
     fine_below: Annotated[
         PositiveLength,
         standard("0.8 um", "trial algorithm: amplitude below which short steps are used"),
-        shown("short steps below", "um", only_for="trial"),
+        Shown("short steps below", "um", only_for="trial"),
     ]
 
     @property
@@ -263,9 +263,9 @@ class RunSettings:
     """Seed and end of a simulation."""
 
     seed: Annotated[
-        int, whole(0, 2**63 - 1, highest_text="2^63 - 1"), standard(0, "of all random numbers"), shown("seed")
+        int, whole(0, 2**63 - 1, highest_text="2^63 - 1"), standard(0, "of all random numbers"), Shown("seed")
     ]
-    time_limit: Annotated[PositiveTime, standard("120 s", "end of a simulation"), shown("time limit", "s")]
+    time_limit: Annotated[PositiveTime, standard("120 s", "end of a simulation"), Shown("time limit", "s")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -275,20 +275,20 @@ class Requirement:
     settling_time: Annotated[
         PositiveTime | None,
         unused("none is required", "time within which the run must have settled"),
-        shown("settling time required", "s"),
+        Shown("settling time required", "s"),
     ] = None
     residual: Annotated[
         PositiveLength | None,
         unused("limit of [controller]", "vibration amplitude (zero-to-peak) that may remain"),
-        shown("residual amplitude allowed", "um"),
+        Shown("residual amplitude allowed", "um"),
     ] = None
     grade: Annotated[
         PositiveVelocity | None,
         unused("none is required", 'balance quality grade of ISO 21940-11: "2.5 mm/s" for G 2.5'),
-        shown("balance quality grade", "mm/s"),
+        Shown("balance quality grade", "mm/s"),
     ] = None
     correction_moment: Annotated[
         PositiveUnbalance | None,
         unused("none is required", "largest unbalance that must be corrected"),
-        shown("unbalance to be corrected", "g*mm"),
+        Shown("unbalance to be corrected", "g*mm"),
     ] = None

@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
-from ringbalance.scene.keys.declaration import UNCERTAIN, derived, listed, needed, shown, standard, unused
+from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, Shown, derived, needed, standard, unused
 from ringbalance.scene.keys.derivations import even_number_of_chambers
-from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, chamber_count, number, quantity
-from ringbalance.scene.keys.quantities import (
+from ringbalance.scene.keys.fields import (
+    NOT_NEGATIVE,
+    POSITIVE,
     FillRatio,
     Length,
     OneLine,
@@ -24,6 +25,9 @@ from ringbalance.scene.keys.quantities import (
     ProperFraction,
     Temperature,
     Time,
+    chamber_count,
+    number,
+    quantity,
 )
 from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
 from ringbalance.scene.origins import SceneFile
@@ -35,6 +39,9 @@ DissolvedGas = Literal["none", "saturated"]
 PressurePlace = Literal["chamber", "shaft"]
 Entrance = Literal["sharp", "rounded", "projecting"]
 GasProcess = Literal["isothermal", "adiabatic"]
+_OUTRIGHT = derived(
+    "that of the known liquid", "wins when given; its uncertainty is then 0 unless [uncertainty] has one"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,16 +49,16 @@ class Disc:
     """The balancing disc: equal annular chambers between radial plates."""
 
     outer_radius: Annotated[
-        PositiveLength, needed("R2 of the chambers"), UNCERTAIN, shown("outer radius R2", "mm")
+        PositiveLength, needed("R2 of the chambers"), UNCERTAIN, Shown("outer radius R2", "mm")
     ]
     inner_radius: Annotated[
-        PositiveLength, needed("R1 of the chambers"), UNCERTAIN, shown("inner radius R1", "mm")
+        PositiveLength, needed("R1 of the chambers"), UNCERTAIN, Shown("inner radius R1", "mm")
     ]
     axial_width: Annotated[
         PositiveLength,
         needed("B, inner width of the chambers along the shaft"),
         UNCERTAIN,
-        shown("axial width B", "mm"),
+        Shown("axial width B", "mm"),
     ]
     central_angle: Annotated[
         PositiveAngle,
@@ -60,7 +67,7 @@ class Disc:
             "for an opening between the plates at inner_radius of 1/2000 of outer_radius - inner_radius"
         ),
         UNCERTAIN,
-        shown("central angle of a chamber", "deg"),
+        Shown("central angle of a chamber", "deg"),
     ]
     chambers: Annotated[
         int,
@@ -71,7 +78,7 @@ class Disc:
             "disc.central_angle",
             rule=even_number_of_chambers,
         ),
-        shown("chambers"),
+        Shown("chambers"),
     ]
     plate_thickness: Annotated[
         Length,
@@ -80,14 +87,14 @@ class Disc:
             "strip that a plate takes on each side of a chamber: half of the plate between two chambers",
         ),
         UNCERTAIN,
-        shown("plate thickness t", "mm", note="on each side of a chamber"),
+        Shown("plate thickness t", "mm", note="on each side of a chamber"),
     ]
     max_fill_ratio: Annotated[
         FillRatio,
         standard(
             0.5, "liquid of a pair, as a share of the volume of one chamber; depth at least 1e-8 outer_radius"
         ),
-        shown("greatest fill ratio", note="liquid of a pair, per chamber volume"),
+        Shown("greatest fill ratio", note="liquid of a pair, per chamber volume"),
     ]
     initial_fill: Annotated[
         FillRatio,
@@ -97,7 +104,7 @@ class Disc:
             "disc.max_fill_ratio",
             rule=lambda fill_ratio: fill_ratio / 2,
         ),
-        shown("fill ratio at the start"),
+        Shown("fill ratio at the start"),
     ]
     lambda_factor: Annotated[
         float | None,
@@ -108,9 +115,9 @@ class Disc:
             "`ringbalance fit` writes it",
         ),
         UNCERTAIN,
-        shown("measured factor on lambda"),
+        Shown("measured factor on lambda"),
     ] = None
-    geometry: Annotated[ChamberGeometry | None, shown("geometry of a chamber")] = None
+    geometry: Annotated[ChamberGeometry | None, Shown("geometry of a chamber")] = None
     """One chamber as a mesh file gives it, no key; None for the sector between plates that the keys give."""
 
     @property
@@ -129,45 +136,33 @@ class Liquid:
             "density and kinematic_viscosity are needed",
             "a known liquid (see below), or a label for a custom one",
         ),
-        shown("liquid"),
+        Shown("liquid"),
     ]
     temperature: Annotated[
         Temperature | None,
         derived(
             "needed for a known liquid, unless its data are for one temperature only", "of the liquid at work"
         ),
-        shown("temperature", "degC", absent="not given"),
+        Shown("temperature", "degC", absent="not given"),
     ]
-    density: Annotated[
-        float,
-        quantity("density", POSITIVE),
-        derived(
-            "that of the known liquid",
-            "wins when given; its uncertainty is then 0 unless [uncertainty] has one",
-        ),
-        UNCERTAIN,
-        shown("density", "kg/m^3"),
-    ]
+    density: Annotated[float, quantity("density", POSITIVE), _OUTRIGHT, UNCERTAIN, Shown("density", "kg/m^3")]
     kinematic_viscosity: Annotated[
         float,
         quantity("kinematic_viscosity", POSITIVE),
-        derived(
-            "that of the known liquid",
-            "wins when given; its uncertainty is then 0 unless [uncertainty] has one",
-        ),
+        _OUTRIGHT,
         UNCERTAIN,
-        shown("kinematic viscosity", "mm^2/s"),
+        Shown("kinematic viscosity", "mm^2/s"),
     ]
     vapour_pressure: Annotated[
         Pressure,
         derived("that of the known liquid; 0 Pa for a custom one", "absolute"),
         UNCERTAIN,
-        shown("vapour pressure", "kPa", note="absolute"),
+        Shown("vapour pressure", "kPa", note="absolute"),
     ]
     dissolved_gas: Annotated[
         DissolvedGas,
         standard("saturated", "gas that low pressure at the siphon crest can release from the liquid"),
-        shown("dissolved gas"),
+        Shown("dissolved gas"),
     ]
     density_uncertainty: float
     """Expanded uncertainty (95 %), relative to the density."""
@@ -189,7 +184,7 @@ class Bend:
 class Tube:
     """The connecting tube from the port of one chamber, over a crest, to the port of the opposite one."""
 
-    bore: Annotated[PositiveLength, needed("inner diameter d"), UNCERTAIN, shown("bore d", "mm")]
+    bore: Annotated[PositiveLength, needed("inner diameter d"), UNCERTAIN, Shown("bore d", "mm")]
     port_radius: Annotated[
         PositiveLength,
         derived(
@@ -198,7 +193,7 @@ class Tube:
             "disc.outer_radius",
         ),
         UNCERTAIN,
-        shown("port radius", "mm"),
+        Shown("port radius", "mm"),
     ]
     hump_radius: Annotated[
         PositiveLength | None,
@@ -207,13 +202,13 @@ class Tube:
             "smallest radius on the path from port to port",
         ),
         UNCERTAIN,
-        shown("siphon crest radius", "mm", absent="none: always a full siphon"),
+        Shown("siphon crest radius", "mm", absent="none: always a full siphon"),
     ]
     hump_position: Annotated[
         ProperFraction,
         standard(0.5, "share of the path, from the driven chamber, at which the siphon crest lies"),
         UNCERTAIN,
-        shown("siphon crest position", note="share of the path"),
+        Shown("siphon crest position", note="share of the path"),
     ]
     hump_shape: Annotated[
         HumpShape,
@@ -221,7 +216,7 @@ class Tube:
             "arc",
             "between its straight legs the tube follows the circle of hump_radius, or touches it at a point",
         ),
-        shown("siphon crest shape"),
+        Shown("siphon crest shape"),
     ]
     hump_gas: Annotated[
         HumpGas,
@@ -229,7 +224,7 @@ class Tube:
             "vented",
             "bound for the priming pressure: gas beyond the siphon crest is vented, or must be pushed out",
         ),
-        shown("gas beyond the siphon crest"),
+        Shown("gas beyond the siphon crest"),
     ]
     length: Annotated[
         PositiveLength,
@@ -238,16 +233,16 @@ class Tube:
             "length of the centre line, bends included",
         ),
         UNCERTAIN,
-        shown("length", "mm", note="bends included"),
+        Shown("length", "mm", note="bends included"),
     ]
     roughness: Annotated[
         Length,
         standard("1.5 um", "absolute roughness of the wall; that of drawn tubing when left out"),
         UNCERTAIN,
-        shown("roughness", "um"),
+        Shown("roughness", "um"),
     ]
     entrance: Annotated[
-        Entrance, standard("sharp", "shape of the edge at which the liquid enters"), shown("entrance")
+        Entrance, standard("sharp", "shape of the edge at which the liquid enters"), Shown("entrance")
     ]
     entrance_radius: Annotated[
         PositiveLength,
@@ -261,22 +256,22 @@ class Tube:
     bends: Annotated[
         tuple[Bend, ...],
         standard([], "list of { angle, radius } in order from the driven chamber"),
-        listed('[{ angle = "90 deg", radius = "3 mm" }, ...]'),
-        shown("bends"),
+        Listed('[{ angle = "90 deg", radius = "3 mm" }, ...]'),
+        Shown("bends"),
     ]
     extra_loss: Annotated[
         float,
         number(NOT_NEGATIVE),
         standard(0.0, "any further loss coefficient, on the velocity head in the tube"),
         UNCERTAIN,
-        shown("further loss coefficient"),
+        Shown("further loss coefficient"),
     ]
     drag_coefficient: Annotated[
         float | None,
         number(POSITIVE),
         unused("k is calculated from the tube and the liquid", "prescribes k, as the paper does"),
         UNCERTAIN,
-        shown("drag coefficient k", absent="calculated"),
+        Shown("drag coefficient k", absent="calculated"),
     ]
     models: TubeModels = FINEST_MODELS
     """Of its loss; no key."""
@@ -295,7 +290,7 @@ class Gas:
         Pressure,
         needed("gauge pressure in the driven chamber while its valve is open"),
         UNCERTAIN,
-        shown("gas pressure", "MPa", note="gauge"),
+        Shown("gas pressure", "MPa", note="gauge"),
     ]
     measured_at: Annotated[
         PressurePlace,
@@ -303,21 +298,21 @@ class Gas:
             "chamber",
             "where `pressure` holds: on the liquid, or on the shaft's axis; spinning gas adds to it there",
         ),
-        shown("gas pressure measured at"),
+        Shown("gas pressure measured at"),
     ]
     inlet_radius: Annotated[
         PositiveLength | None,
         unused("not compared with the level", "radius at which gas enters the chambers; never under liquid"),
-        shown("gas inlet radius", "mm"),
+        Shown("gas inlet radius", "mm"),
     ] = None
     ambient_pressure: Annotated[
         PositivePressure,
         standard("101.325 kPa", "absolute pressure of the surroundings"),
         UNCERTAIN,
-        shown("ambient pressure", "kPa", note="absolute"),
+        Shown("ambient pressure", "kPa", note="absolute"),
     ]
     temperature: Annotated[
-        Temperature, standard("20 degC", "of the gas before the valve"), shown("gas temperature", "degC")
+        Temperature, standard("20 degC", "of the gas before the valve"), Shown("gas temperature", "degC")
     ]
     conductance: Annotated[
         float | None,
@@ -327,7 +322,7 @@ class Gas:
             "sonic conductance C (ISO 6358) of valve and line; needs critical_ratio",
         ),
         UNCERTAIN,
-        shown("sonic conductance C", "l/(s*bar)", absent="none: the chamber fills at once"),
+        Shown("sonic conductance C", "l/(s*bar)", absent="none: the chamber fills at once"),
     ]
     critical_ratio: Annotated[
         ProperFraction | None,
@@ -336,20 +331,20 @@ class Gas:
             "critical pressure ratio b (ISO 6358) of valve and line; needs conductance",
         ),
         UNCERTAIN,
-        shown("critical pressure ratio b"),
+        Shown("critical pressure ratio b"),
     ]
     dead_volume: Annotated[
         float | None,
         quantity("volume", NOT_NEGATIVE),
         unused("no volume besides the chamber's", "gas volume between valve and chamber"),
         UNCERTAIN,
-        shown("dead volume", "ml"),
+        Shown("dead volume", "ml"),
     ]
     valve_lag: Annotated[
         Time | None,
         unused("the valves open and close at once", "time from the command to the valve's motion"),
         UNCERTAIN,
-        shown("valve lag", "ms"),
+        Shown("valve lag", "ms"),
     ]
     process: Annotated[
         GasProcess,
@@ -358,7 +353,7 @@ class Gas:
             "whether a chamber's gas keeps its temperature while it fills and vents, or takes no heat; "
             "matters with conductance only",
         ),
-        shown("gas in the chambers", note="matters with a conductance only"),
+        Shown("gas in the chambers", note="matters with a conductance only"),
     ]
 
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from ringbalance.scene.keys.declaration import listed, needed, shown, standard, unused
-from ringbalance.scene.keys.fields import Bounds, number, numbers, whole
-from ringbalance.scene.keys.quantities import OneLine
+from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
+from ringbalance.scene.keys.fields import Bounds, OneLine, number, numbers, whole
 from ringbalance.scene.loop_models import RunSettings
 
 Number = Annotated[float, number(Bounds())]
@@ -62,12 +61,12 @@ class Measured:
     files: Annotated[
         tuple[MeasuredFile, ...],
         standard([], "files of measurements"),
-        listed('[{ file = "run.csv", kind = "injection", rows = 40, sha256 = "..." }, ...]'),
+        Listed('[{ file = "run.csv", kind = "injection", rows = 40, sha256 = "..." }, ...]'),
     ] = ()
     quantities: Annotated[
         tuple[MeasuredQuantity, ...],
         standard([], "quantities before and after"),
-        listed(
+        Listed(
             '[{ quantity = "tube.bore", unit = "mm", before = 1.5, value = 1.48, verdict = "identified" }, '
             "...]"
         ),
@@ -75,7 +74,7 @@ class Measured:
     findings: Annotated[
         tuple[MeasuredFinding, ...],
         standard([], "what else was found"),
-        listed('[{ about = "residuals", text = "..." }, ...]'),
+        Listed('[{ about = "residuals", text = "..." }, ...]'),
     ] = ()
 
 
@@ -98,7 +97,7 @@ class SceneFile:
 
     name: str
     run: RunSettings
-    tolerance: Annotated[float, shown("tolerance", "%", dimension="share")]
+    tolerance: Annotated[float, Shown("tolerance", "%", dimension="share")]
     """Relative: bounds discretisation and left-out terms."""
     source: str
     """File name without its folder; for the evidence, which is the same wherever the file stands."""

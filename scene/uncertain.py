@@ -7,14 +7,16 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from ringbalance.scene.chamber_file.record import STRETCHED
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import InputUncertainty, Scene
+
+if TYPE_CHECKING:
+    from ringbalance.scene.eccentric_models import EccentricScene
 
 NORMAL_95: Final = 1.959963984540054
 """Expanded uncertainty (95 %) of a normal distribution in standard deviations."""

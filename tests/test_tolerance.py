@@ -12,7 +12,7 @@ import pytest
 from ringbalance import cli
 from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
 from ringbalance.scene import Scene, SceneError, bundled_scene, load_scene
-from ringbalance.scene.accuracy import FINEST, with_tolerance
+from ringbalance.scene.narrowing import FINEST, with_tolerance
 
 PAPER = str(bundled_scene("liquid_ring_paper"))
 COMMANDS = (

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from ringbalance.identification.balancers import models_for
 from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.scene import AnyScene, bundled_scene, load_scene, write_whole
 from ringbalance.scene.arrays import ComplexArray, FloatArray

@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ringbalance.scene import known_liquids, write_whole
+from ringbalance.scene.eccentric_models import ECCENTRIC_MASS
 from ringbalance.scene.faults import toml_text
 from ringbalance.scene.keys.declaration import Entries, Key
-from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.units import DIMENSIONS
 

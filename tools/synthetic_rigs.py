@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.identification.balancers import model_errors, with_model_error
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from ringbalance.controller.formulas.control_law import valve_time
+from ringbalance.controller.formulas import valve_time
 
 StateT = TypeVar("StateT")
 
@@ -71,22 +71,18 @@ class Controller(Protocol[StateT]):
         ...
 
 
-def valve_commands(
+def opening(
     times: tuple[tuple[int, float], ...],
     *,
     minimum_gas_time: float,
     maximum_gas_time: float,
     offsets: tuple[float, ...] = (),
-) -> tuple[ValveCommand, ...]:
+) -> Command:
     """Valves that open for (chamber, time) and the chamber's offset: a shorter time is not executed, a longer
     one is cut, s."""
-    valves = (
-        ValveCommand(
-            chamber=chamber,
-            duration=valve_time(
-                share, offsets[chamber] if offsets else 0.0, minimum_gas_time, maximum_gas_time
-            ),
-        )
+    durations = (
+        (chamber, valve_time(share, offsets[chamber] if offsets else 0.0, minimum_gas_time, maximum_gas_time))
         for chamber, share in times
     )
-    return tuple(valve for valve in valves if valve.duration > 0)
+    valves = tuple(ValveCommand(chamber=chamber, duration=time) for chamber, time in durations if time > 0)
+    return Command(valves=valves, reason="" if valves else "the valve-open time is below the minimum")

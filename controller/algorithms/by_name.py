@@ -8,9 +8,8 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.algorithms.target_vector import TargetVector
 from ringbalance.controller.algorithms.trial import Trial
-from ringbalance.controller.liquid_ring.closed_form import closed_form, has_closed_form
+from ringbalance.controller.liquid_ring.integrators import integrator_of
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
@@ -35,9 +34,8 @@ def controller_of(scene: Scene, model: BalancerModel | None = None) -> Controlle
             raise ValueError("the law-based algorithm needs a model, such as calibrate(scene).model")
         return law_based_of(scene, model)
     fault = scene_fault(
-        scene=scene,
-        table="controller",
-        key="kind",
+        scene,
+        "controller.kind",
         problem="this version does not simulate this algorithm",
         allowed='"target_vector", "trial", "law_based"',
     )
@@ -83,7 +81,7 @@ def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
             model=model,
             chambers=scene.disc.chambers,
             gas_pressure=scene.gas.pressure,
-            integrator=closed_form if has_closed_form(model.flow) else quadrature,
+            integrator=integrator_of(model.flow),
             residual_fill=residual_fill_ratio(scene, law=model.flow),
         ),
         initial=DiscState.initial(disc=scene.disc),

@@ -1,20 +1,25 @@
 """The law-based algorithm: valve-open times straight from the flow law, and it learns the influence
-coefficient."""
+coefficient.
+
+From a wanted balancing moment to the fills of the pairs it goes by `pair_changes` and `fill_for_moment`.
+"""
 
 from __future__ import annotations
 
 import cmath
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand, valve_commands
-from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
-from ringbalance.controller.liquid_ring.opening import gas_time
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand, opening
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
+from ringbalance.controller.liquid_ring.reach import gas_time
 from ringbalance.controller.liquid_ring.transfer import Drive
-from ringbalance.controller.rotor import disc_unbalance
+from ringbalance.controller.rotor import chamber_directions, disc_unbalance
+from ringbalance.reduced_model.law.model import MomentCurve
+from ringbalance.scene.arrays import FloatArray
 
 PRIOR_STANDARD_DEVIATION: Final = 0.5
 """Standard deviation, relative, of the assumed influence coefficient before the first operation."""
@@ -25,7 +30,7 @@ MAGNITUDE_RANGE: Final = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class InfluenceEstimate:
+class _InfluenceEstimate:
     """Estimate of K in V1 = V0 + K U."""
 
     value: complex
@@ -41,7 +46,7 @@ class InfluenceEstimate:
         noise_variance: float,
         law_standard_deviation: float,
         assumed_magnitude: float,
-    ) -> InfluenceEstimate:
+    ) -> _InfluenceEstimate:
         """Learn from one operation, dV = K dU + noise, by a Kalman filter of one complex number.
 
         gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with R =
@@ -58,7 +63,7 @@ class InfluenceEstimate:
         gain = p * moment_change.conjugate() / (expected + rest)
         value = _held(k + gain * (vibration_change - k * moment_change), k, assumed_magnitude)
         left = p * rest / (expected + rest)
-        return InfluenceEstimate(value=value, variance=max(left, abs(law_standard_deviation * value) ** 2))
+        return _InfluenceEstimate(value=value, variance=max(left, abs(law_standard_deviation * value) ** 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +72,7 @@ class _LawBasedState:
 
     disc: DiscState
     """The chambers' liquid as the law has it, when the valves last opened."""
-    influence: InfluenceEstimate
+    influence: _InfluenceEstimate
     previous: Measurement | None = None
     """The last usable sample."""
     valves: tuple[ValveCommand, ...] = ()
@@ -131,7 +136,7 @@ class LawBased:
 
     def start(self) -> _LawBasedState:
         variance = abs(PRIOR_STANDARD_DEVIATION * self.influence) ** 2
-        estimate = InfluenceEstimate(value=self.influence, variance=variance)
+        estimate = _InfluenceEstimate(value=self.influence, variance=variance)
         return _LawBasedState(disc=self.initial, influence=estimate)
 
     def step(self, state: _LawBasedState, measurement: Measurement | None) -> tuple[_LawBasedState, Command]:
@@ -140,15 +145,13 @@ class LawBased:
         seen = self._seen(state, measurement)
         if measurement.amplitude <= self.limit:
             return seen, Command(resting=True)
-        asked = self._gas_times(seen, _vector(measurement))
-        valves = valve_commands(
-            asked,
+        command = opening(
+            self._gas_times(seen, _vector(measurement)),
             minimum_gas_time=self.minimum_gas_time,
             maximum_gas_time=self.maximum_gas_time,
             offsets=self.offsets,
         )
-        reason = "" if valves else "the valve-open time is below the minimum"
-        return replace(seen, valves=valves), Command(valves=valves, reason=reason)
+        return replace(seen, valves=command.valves), command
 
     def _seen(self, state: _LawBasedState, now: Measurement) -> _LawBasedState:
         """Follow the liquid to the sample's time, and learn from the response."""
@@ -250,3 +253,88 @@ def _held(value: complex, before: complex, assumed: float) -> complex:
         return before / abs(before) * assumed / MAGNITUDE_RANGE
     bounded = min(max(magnitude, assumed / MAGNITUDE_RANGE), assumed * MAGNITUDE_RANGE)
     return value * (bounded / magnitude)
+
+
+SCAN: Final = 33
+ROUNDS: Final = 11
+END_STEP: Final = 1e-3
+"""Share of the range of x over which a slope at its end is taken."""
+
+
+def pair_changes(*, wanted: complex, bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
+    """Split a change of the disc's moment over its pairs, each within the bounds of its change, kg m.
+
+    The change goes to the two directions on either side of it; what a pair cannot give goes to the pairs that
+    are left; what no pair can give is asked, by its component, of those already at their ends, for the fills
+    are only assumed.
+    Source: section 4.2 of the liquid-ring paper, by oblique components for other numbers of chambers.
+    """
+    axes = [complex(e) for e in chamber_directions(2 * len(bounds))[: len(bounds)]]
+    fixed: dict[int, float] = {}
+    sense: dict[int, float] = {}
+    free = dict.fromkeys(range(len(bounds)), 0.0)
+    while free:
+        left = wanted - sum(fixed[p] * axes[p] for p in fixed)
+        free = _shares(left, {p: axes[p] for p in free})
+        over = {p: min(max(c, bounds[p][0]), bounds[p][1]) for p, c in free.items()}
+        over = {p: c for p, c in over.items() if c != free[p]}
+        if not over:
+            break
+        sense |= {p: free[p] - bound for p, bound in over.items()}
+        fixed |= over
+        free = {p: c for p, c in free.items() if p not in over}
+    missing = wanted - sum(c * axes[p] for p, c in (fixed | free).items())
+    more = {p: c + _onward((missing * axes[p].conjugate()).real, sense[p]) for p, c in fixed.items()}
+    return tuple((free | more)[p] for p in range(len(bounds)))
+
+
+def _onward(component: float, sense: float) -> float:
+    """Only in the sense in which the pair was asked for more than it has."""
+    return component if component * sense > 0 else 0.0
+
+
+def _shares(wanted: complex, axes: dict[int, complex]) -> dict[int, float]:
+    """Components along the two neighbouring directions; along the axis when only one is there."""
+    none = dict.fromkeys(axes, 0.0)
+    if len(axes) == 1:
+        return {p: (wanted * e.conjugate()).real for p, e in axes.items()}
+    ends = [(p, s, s * e) for p, e in axes.items() for s in (1.0, -1.0)]
+    ends.sort(key=lambda end: float(np.angle(end[2])) % (2 * np.pi))
+    slack = -1e-12 * abs(wanted)
+    for (p, s, a), (q, t, b) in zip(ends, [*ends[1:], ends[0]], strict=True):
+        between = (a.conjugate() * b).imag
+        first = (wanted.conjugate() * b).imag / between
+        second = (a.conjugate() * wanted).imag / between
+        if min(first, second) >= slack:
+            return none | {p: s * max(first, 0.0), q: t * max(second, 0.0)}
+    return none
+
+
+def fill_for_moment(
+    *, moment: MomentCurve, wanted: float, total: float, lowest: float, highest: float
+) -> float:
+    """Fill ratio of the positive chamber at which a pair has a moment, kg m, growing with that fill.
+
+    Beyond the ends it continues straight, so that it may lie outside [lowest, highest].
+    """
+
+    def of(x: FloatArray) -> FloatArray:
+        other = np.clip(total - x, lowest, highest)
+        return moment.pair_moment(fill_ratio=x, opposite_fill_ratio=other)
+
+    if highest <= lowest:
+        return lowest
+    step = END_STEP * (highest - lowest)
+    ends = of(np.array([lowest, lowest + step, highest - step, highest]))
+    if wanted <= ends[0]:
+        return lowest + float((wanted - ends[0]) / (ends[1] - ends[0])) * step
+    if wanted >= ends[3]:
+        return highest + float((wanted - ends[3]) / (ends[3] - ends[2])) * step
+    low, high = lowest, highest
+    for _ in range(ROUNDS):
+        x = np.linspace(low, high, SCAN)
+        above = of(x) >= wanted
+        above[0], above[-1] = False, True
+        first = int(np.argmax(above))
+        low, high = float(x[first - 1]), float(x[first])
+    return high

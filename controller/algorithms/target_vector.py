@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, valve_commands
-from ringbalance.controller.formulas.control_law import vector_gas_time, vector_shares
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, opening
+from ringbalance.controller.formulas import vector_gas_time, vector_shares
 
 OnReversal = Literal["reset", "accumulate"]
 
@@ -17,7 +17,7 @@ NEVER: Final = Measurement(time=math.inf, amplitude=0.0, phase=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class TargetVectorState:
+class _TargetVectorState:
     """Everything that the algorithm remembers between samples."""
 
     integral: float = 0.0
@@ -76,16 +76,16 @@ class TargetVector:
         """Two: this algorithm lowers the amplitude with every operation unless its beliefs are wrong."""
         return 2
 
-    def start(self) -> TargetVectorState:
-        return TargetVectorState()
+    def start(self) -> _TargetVectorState:
+        return _TargetVectorState()
 
     def step(
-        self, state: TargetVectorState, measurement: Measurement | None
-    ) -> tuple[TargetVectorState, Command]:
+        self, state: _TargetVectorState, measurement: Measurement | None
+    ) -> tuple[_TargetVectorState, Command]:
         if measurement is None or not measurement.usable(needs_phase=True):
             return state, Command(reason="no usable sample")
         if measurement.amplitude <= self.limit:
-            return TargetVectorState(), Command(resting=True)
+            return _TargetVectorState(), Command(resting=True)
         wanted, integral = self._pid(state, measurement)
         shares = components(
             chambers=self.chambers,
@@ -93,16 +93,15 @@ class TargetVector:
             length=min(max(wanted, 0.0), self.maximum_gas_time),
             at_residual=measurement.at_residual,
         )
-        valves = valve_commands(
+        command = opening(
             shares,
             minimum_gas_time=self.minimum_gas_time,
             maximum_gas_time=self.maximum_gas_time,
             offsets=self.offsets,
         )
-        reason = "" if valves else "the valve-open time is below the minimum"
-        return replace(state, integral=integral, previous=measurement), Command(valves=valves, reason=reason)
+        return replace(state, integral=integral, previous=measurement), command
 
-    def _pid(self, state: TargetVectorState, now: Measurement) -> tuple[float, float]:
+    def _pid(self, state: _TargetVectorState, now: Measurement) -> tuple[float, float]:
         """Unlimited valve-open time of the vector and the integral to remember."""
         before = state.previous or NEVER
         return vector_gas_time(

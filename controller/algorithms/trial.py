@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, valve_commands
+from ringbalance.controller.algorithms.algorithm import Command, Measurement, opening
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrialState:
+class _TrialState:
     """Everything that the algorithm remembers between samples."""
 
     position: int = 0
@@ -53,25 +53,24 @@ class Trial:
         """One round through the sequence: a rise is how this algorithm learns."""
         return len(self.sequence)
 
-    def start(self) -> TrialState:
-        return TrialState()
+    def start(self) -> _TrialState:
+        return _TrialState()
 
-    def step(self, state: TrialState, measurement: Measurement | None) -> tuple[TrialState, Command]:
+    def step(self, state: _TrialState, measurement: Measurement | None) -> tuple[_TrialState, Command]:
         if measurement is None or not measurement.usable(needs_phase=False):
             return state, Command(reason="no usable sample")
         amplitude = measurement.amplitude
         if amplitude <= self.limit:
-            return TrialState(position=state.position), Command(resting=True)
+            return _TrialState(position=state.position), Command(resting=True)
         fell = state.previous is not None and amplitude < state.previous
         rose = state.previous is not None and not fell
         position = (state.position + rose) % len(self.sequence)
-        valves = valve_commands(
+        command = opening(
             ((self.sequence[position], self._gas_time(amplitude, first=not fell)),),
             minimum_gas_time=self.minimum_gas_time,
             maximum_gas_time=self.maximum_gas_time,
         )
-        reason = "" if valves else "the valve-open time is below the minimum"
-        return TrialState(position=position, previous=amplitude), Command(valves=valves, reason=reason)
+        return _TrialState(position=position, previous=amplitude), command
 
     def _gas_time(self, amplitude: float, *, first: bool) -> float:
         fine = amplitude < self.fine_below

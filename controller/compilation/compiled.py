@@ -191,6 +191,8 @@ def _digest() -> str:
 def compiled_sources() -> tuple[Path, ...]:
     """Every source of this room that holds functions that are compiled, and the machinery's own."""
     machinery = Path(__file__).parent
-    whole = (machinery, machinery.parent / "formulas")
+    formulas = machinery.parent / "formulas.py"
     sources = sorted(machinery.parent.rglob("*.py"))
-    return tuple(path for path in sources if path.parent in whole or _MARK in path.read_bytes())
+    return tuple(
+        path for path in sources if path.parent == machinery or path == formulas or _MARK in path.read_bytes()
+    )

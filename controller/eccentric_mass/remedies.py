@@ -15,8 +15,8 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     start_estimate,
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise
+from ringbalance.controller.eccentric_mass.plant.open_loop import longest_run
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.substep_limit import longest_run
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
 from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
@@ -76,7 +76,7 @@ def expected_deviation(scene: EccentricScene, *, speed: float, duration: float |
     return float(found[-1])
 
 
-def friction_floor(scene: EccentricScene, *, speed: float) -> float:
+def _friction_floor(scene: EccentricScene, *, speed: float) -> float:
     """Standard deviation, m, that a friction arm's estimate keeps for ever.
 
     P = s_mu sqrt(s_w^2 + 2 c s_mu r)/c with c = b W^2/(J + J_add), the walks of arm and rate and the density
@@ -139,7 +139,7 @@ def _gates(scene: EccentricScene, speed: float) -> list[str]:
         found.append(f"the imbalance filter cannot reach its gate at this speed: {remedy.text}")
     for arm in scene.masses.friction_arm:
         allowed = _friction_allowed(scene, arm=arm, speed=speed)
-        if friction_floor(scene, speed=speed) > allowed:
+        if _friction_floor(scene, speed=speed) > allowed:
             text = _friction_remedy(scene, arm=arm, speed=speed).text
             found.append(f"the friction filter cannot reach its gate: {text}")
             break
@@ -159,7 +159,7 @@ def _friction_remedy(scene: EccentricScene, *, arm: float, speed: float) -> Reme
     gate.
     """
     target = _ATTAINED * _friction_allowed(scene, arm=arm, speed=speed)
-    if friction_floor(scene, speed=speed) > _ROUNDED * target:
+    if _friction_floor(scene, speed=speed) > _ROUNDED * target:
         return _remedy(scene, *_slower_walks(scene, target, speed=speed))
     longer = 4 * scene.supervisor.friction_time
     total = scene.run.time_limit + longer
@@ -330,7 +330,7 @@ def _imbalance_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
 def _friction_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
     scene, speed = facts.scene, float(facts.speed[-1])
     arm = min(scene.masses.friction_arm)
-    found, gate = [_friction_remedy(scene, arm=arm, speed=speed)], 2 * friction_floor(scene, speed=speed)
+    found, gate = [_friction_remedy(scene, arm=arm, speed=speed)], 2 * _friction_floor(scene, speed=speed)
     if scene.friction_filter.gate * arm < gate < 0.5 * arm:
         found.append(_remedy(scene, ("friction_filter.gate", gate / arm)))
     return tuple(found)

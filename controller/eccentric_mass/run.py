@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
+from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, check_substeps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation, found_beforehand, remedies_of
 from ringbalance.controller.eccentric_mass.run_loop import Record, recorded
-from ringbalance.controller.eccentric_mass.run_record import EccentricEstimates, EccentricRun, StageSpan
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, StageSpan
 from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings, believed_whirl
@@ -39,7 +38,7 @@ def simulate_eccentric(
     """
     check_substeps(scene)
     record, findings, innovation = recorded(
-        scene, seed, progress or _silent, settings or StrategySettings.of(scene)
+        scene, seed, progress or (lambda _, __: None), settings or StrategySettings.of(scene)
     )
     cause = Cause(int(record.cause[-1]))
     times, speeds = scene.rotor.profile
@@ -70,12 +69,7 @@ def simulate_eccentric(
         voltage=np.ascontiguousarray(record.voltage.T),
         drive_off=record.hold == RELEASED,
         energy=record.energy,
-        estimates=EccentricEstimates(
-            imbalance=record.imbalance,
-            imbalance_covariance=record.imbalance_covariance,
-            friction_arm=record.friction_arm,
-            friction_variance=record.friction_variance,
-        ),
+        estimates=record,
         stages=_stages(record.stage, time),
         targets=_targets(scene, record),
         unbalanced_amplitude=_unbalanced(scene, float(speed[-1])),
@@ -86,10 +80,6 @@ def locked_run(scene: EccentricScene, *, progress: Progress | None = None) -> Ec
     """The run of the same rotor with the masses clamped where they start: without balancing."""
     clamped = replace(scene, supervisor=replace(scene.supervisor, strategy="locked"))
     return simulate_eccentric(clamped, progress=progress)
-
-
-def _silent(_: float, __: float) -> None:
-    """No progress wanted."""
 
 
 def _facts(

@@ -8,14 +8,22 @@ from typing import NamedTuple
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.plant.friction import STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant, stretches
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import electrical_energy, rest_state, stuck_flags
-from ringbalance.controller.eccentric_mass.plant.speed import speed_at, turned
-from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Cause, Findings
-from ringbalance.controller.eccentric_mass.strategy.records import EccentricMeasurement, StrategyState
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at, turned
+from ringbalance.controller.eccentric_mass.plant.plant import (
+    STUCK,
+    electrical_energy,
+    rest_state,
+    stuck_flags,
+)
+from ringbalance.controller.eccentric_mass.strategy.plan import (
+    RELEASED,
+    Cause,
+    EccentricMeasurement,
+    Findings,
+    StrategyState,
+)
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray

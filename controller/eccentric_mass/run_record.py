@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.run_loop import Record
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 
@@ -59,20 +60,6 @@ class StageSpan:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EccentricEstimates:
-    """The filters' estimates, sample by sample; constant outside their stages."""
-
-    imbalance: FloatArray
-    """Along the rotor's axes, kg m, shape (n, 2)."""
-    imbalance_covariance: FloatArray
-    """kg^2 m^2, shape (n, 2, 2)."""
-    friction_arm: FloatArray
-    """m, shape (n, 2)."""
-    friction_variance: FloatArray
-    """m^2, shape (n, 2)."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class EccentricRun:
     """One run of the whole strategy on the plant."""
 
@@ -112,7 +99,8 @@ class EccentricRun:
     """Whether both drives are off, shape (n,)."""
     energy: FloatArray
     """Electrical, taken from the supply since the start, J, shape (n,)."""
-    estimates: EccentricEstimates
+    estimates: Record
+    """Those of the filters are constant outside their stages."""
     stages: tuple[StageSpan, ...]
     targets: Targets | None
     """For the imbalance as it was estimated; None when it never came to that."""

@@ -30,7 +30,7 @@ _DECADES: Final = 30.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class SampledLoop:
+class _SampledLoop:
     """One loop of the drives."""
 
     name: str
@@ -66,11 +66,11 @@ class SampledLoop:
 class RecommendedGains:
     """Sampled poles of a scene's loops, and values of its keys that make them stable and strong enough."""
 
-    regulator: SampledLoop
+    regulator: _SampledLoop
     """Of all stages but the friction stage: `lqr.state_weight`."""
-    speed: SampledLoop
+    speed: _SampledLoop
     """Of the friction stage: `friction_filter.speed_gain`."""
-    pair: SampledLoop
+    pair: _SampledLoop
     """Of the angle between the masses in the friction stage: `friction_filter.pair_gain`."""
     step: float
     """Longest hold of the voltage that leaves every loop its margin with the scene's gains, s."""
@@ -78,7 +78,7 @@ class RecommendedGains:
     """At least the scene's, rad/s: with the lower of both speed gains it overcomes friction with a margin."""
 
     @property
-    def loops(self) -> tuple[SampledLoop, SampledLoop, SampledLoop]:
+    def loops(self) -> tuple[_SampledLoop, _SampledLoop, _SampledLoop]:
         """Regulator, speed and pair."""
         return self.regulator, self.speed, self.pair
 
@@ -113,14 +113,14 @@ def advised(
     return scene, changes
 
 
-def _regulator(scene: EccentricScene) -> SampledLoop:
+def _regulator(scene: EccentricScene) -> _SampledLoop:
     weight, inputs = scene.lqr.state_weight, scene.lqr.input_weight
 
     def poles(state_weight: float, step: float, margin: float) -> ComplexArray:
         position, rate = lqr_gain(track_model(scene), state_weight=state_weight, input_weight=inputs)
         return _poles(scene, step, margin * position, margin * rate)
 
-    return SampledLoop(
+    return _SampledLoop(
         name="regulator",
         key="lqr.state_weight",
         value=weight,
@@ -132,14 +132,14 @@ def _regulator(scene: EccentricScene) -> SampledLoop:
     )
 
 
-def _speed(scene: EccentricScene) -> SampledLoop:
+def _speed(scene: EccentricScene) -> _SampledLoop:
     """One pole, that of the rate."""
     gain, per_volt = scene.friction_filter.speed_gain, PlantParameters.of(scene).drive_gain
 
     def poles(value: float, step: float) -> ComplexArray:
         return _poles(scene, step, 0.0, per_volt * value, eased=True)
 
-    return SampledLoop(
+    return _SampledLoop(
         name="speed control",
         key="friction_filter.speed_gain",
         value=gain,
@@ -151,7 +151,7 @@ def _speed(scene: EccentricScene) -> SampledLoop:
     )
 
 
-def _pair(scene: EccentricScene) -> SampledLoop:
+def _pair(scene: EccentricScene) -> _SampledLoop:
     """The angle between the masses gets each drive's error; recommended beside the lower speed gain."""
     told, per_volt = scene.friction_filter, PlantParameters.of(scene).drive_gain
 
@@ -159,7 +159,7 @@ def _pair(scene: EccentricScene) -> SampledLoop:
         return _poles(scene, step, 2 * per_volt * pair, per_volt * speed, eased=True)
 
     slower = min(told.speed_gain, _speed(scene).recommended)
-    return SampledLoop(
+    return _SampledLoop(
         name="pair control",
         key="friction_filter.pair_gain",
         value=told.pair_gain,

@@ -14,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
-from ringbalance.controller.eccentric_mass.plant.open_loop import Progress
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
@@ -91,7 +90,7 @@ class Requirement:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EccentricStudy:
+class _EccentricStudy:
     """What a report shows of one scene."""
 
     scene: EccentricScene
@@ -115,22 +114,18 @@ class EccentricStudy:
         }
 
 
-def eccentric_study(
-    scene: EccentricScene, *, seed: int | None = None, progress: Progress | None = None
-) -> EccentricStudy:
-    """Run a scene balanced and locked, and judge its loops and requirements; seed as in the run.
+def eccentric_study(scene: EccentricScene) -> _EccentricStudy:
+    """Run a scene balanced and locked, and judge its loops and requirements.
 
     A scene that states uncertainties is run again with all inputs drawn, which gives the intervals, and with
     each input at both ends of its own, which tells what they come from.
     """
     tuning = tune_eccentric(scene, runs=0)
-    run = simulate_eccentric(scene, seed=seed, progress=progress)
-    locked = locked_run(scene, progress=progress)
-    number = scene.run.seed if seed is None else seed
-    moved, drawn = _moved_runs(scene, _judged, seed=number), _drawn_runs(scene, _judged, seed=number)
+    run, locked = simulate_eccentric(scene), locked_run(scene)
+    moved, drawn = _moved_runs(scene), _drawn_runs(scene)
     rows = (_with_intervals(row, moved, drawn) for row in _of_run(scene, run))
     requirements = (*rows, *_of_loops(tuning.gains))
-    return EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
+    return _EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
 
 
 def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
@@ -229,19 +224,17 @@ def _largest_balanced(run: EccentricRun) -> float | None:
     return float(np.max(run.amplitude[run.time >= last.start]))
 
 
-def _moved_runs(
-    scene: EccentricScene, judge: Callable[[EccentricScene, EccentricRun], Judged], *, seed: int
-) -> dict[str, list[Judged]]:
+def _moved_runs(scene: EccentricScene) -> dict[str, list[Judged]]:
     """What a run comes to with one input at either end of its stated interval, by the input's path.
 
     With any uncertainty stated, `NOISE` has the runs with further seeds. Empty: none is stated.
     """
     if not scene.uncertainty:
         return {}
-    settings = StrategySettings.of(scene)
+    settings, seed = StrategySettings.of(scene), scene.run.seed
 
     def came_to(plant: EccentricScene, number: int) -> Judged:
-        return judge(plant, simulate_eccentric(plant, seed=number, settings=settings))
+        return _judged(plant, simulate_eccentric(plant, seed=number, settings=settings))
 
     moved = {
         each.quantity: [came_to(plant, seed) for plant in _both_ends(scene, each)]
@@ -250,13 +243,11 @@ def _moved_runs(
     return moved | {NOISE: [came_to(scene, seed + more) for more in range(1, _SEEDS + 1)]}
 
 
-def _drawn_runs(
-    scene: EccentricScene, judge: Callable[[EccentricScene, EccentricRun], Judged], *, seed: int
-) -> list[Judged]:
+def _drawn_runs(scene: EccentricScene) -> list[Judged]:
     """What runs come to with all stated inputs, and the noise, drawn at once; empty: none is stated."""
     if not scene.uncertainty:
         return []
-    settings = StrategySettings.of(scene)
+    settings, seed = StrategySettings.of(scene), scene.run.seed
     plants = (
         (
             eccentric_drawn(scene, np.random.default_rng(np.random.SeedSequence(number, spawn_key=(1,)))),
@@ -264,7 +255,7 @@ def _drawn_runs(
         )
         for number in range(seed + 1, seed + 1 + DRAWS)
     )
-    return [judge(plant, simulate_eccentric(plant, seed=n, settings=settings)) for plant, n in plants]
+    return [_judged(plant, simulate_eccentric(plant, seed=n, settings=settings)) for plant, n in plants]
 
 
 def interval(value: float, drawn: Sequence[float]) -> tuple[float, float]:

@@ -11,8 +11,8 @@ from typing import Final
 from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_records import Record
 from ringbalance.controller.ensemble.transfer import gas_off, gas_on
-from ringbalance.controller.formulas.paths import piece_rise
-from ringbalance.controller.liquid_ring.opening import FILL_ERROR, TIME_ERROR
+from ringbalance.controller.formulas import piece_rise
+from ringbalance.controller.liquid_ring.reach import FILL_ERROR, TIME_ERROR
 
 _piece_rise: Final = in_place(piece_rise)
 

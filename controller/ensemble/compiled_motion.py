@@ -16,7 +16,7 @@ from ringbalance.controller.liquid_ring.compiled_march import (
     opening_within,
     rests,
 )
-from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
+from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.records import P, X
 from ringbalance.scene.arrays import FloatArray
 

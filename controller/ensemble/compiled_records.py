@@ -10,9 +10,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.ensemble.moment import MOMENT_NODES
 from ringbalance.controller.rotor import MAX_CHAMBERS
 
+MOMENT_NODES: Final = 4097
+"""Of the table of a pair's moment."""
 Record = Any
 """One element of an array with one of the types below; compiled code changes it in place."""
 

@@ -19,8 +19,7 @@ from ringbalance.controller.ensemble.compiled_disc import (
 from ringbalance.controller.ensemble.compiled_motion import begin, inject
 from ringbalance.controller.ensemble.compiled_noise import noise_pair, uniform_radii
 from ringbalance.controller.ensemble.compiled_records import Record
-from ringbalance.controller.formulas.control_law import valve_time, vector_gas_time, vector_shares
-from ringbalance.controller.formulas.stopping import (
+from ringbalance.controller.formulas import (
     AT_REST,
     HELD,
     NONE,
@@ -31,8 +30,11 @@ from ringbalance.controller.formulas.stopping import (
     has_risen,
     has_turned,
     stop_cause,
+    valve_time,
+    vector_gas_time,
+    vector_shares,
 )
-from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL
+from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.scene.arrays import FloatArray
 
 _CERTAIN: Final = 1 + 1e-9
@@ -179,7 +181,7 @@ def _react(shared: Record, run: Record, noise: tuple[float, float], noise_before
 
 @in_place
 def _watch(shared: Record, run: Record, seen_before: float) -> None:
-    """Overshoots, rises and misadjustments, as `judgement` counts them."""
+    """Overshoots, rises and misadjustments, as `simulation` counts them."""
     if run.samples == 1:
         run.first_seen = run.seen_amplitude
     elif run.seen_amplitude > shared.limit:

@@ -180,9 +180,8 @@ def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
     longest = scene.run.time_limit
     if longest / scene.controller.period > 50_000:
         fault = scene_fault(
-            scene=scene,
-            table="controller",
-            key="period",
+            scene,
+            "controller.period",
             problem="an ensemble takes at most 50000 samples in run.time_limit",
             allowed=f"at least {longest / 50_000:.3g} s",
         )

@@ -4,28 +4,67 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.ensemble.compiled_noise import noise_key
-from ringbalance.controller.ensemble.compiled_records import GAS_LINE, RUN
+from ringbalance.controller.ensemble.compiled_records import GAS_LINE, MOMENT_NODES, RUN
 from ringbalance.controller.ensemble.compiled_sample import run_members
-from ringbalance.controller.ensemble.moment import MomentTable
 from ringbalance.controller.ensemble.samples import LARGEST_RATIO, Members
 from ringbalance.controller.ensemble.transfer import PairTransfer
-from ringbalance.controller.judgement import noise_floor
+from ringbalance.controller.formulas import piece_rise
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
 from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATIONS, TAIL_POINTS
 from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.simulation import noise_floor
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_by_velocity
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
+
+
+class MomentTable(NamedTuple):
+    """Moment of a pair over the fill of its positive chamber, cubic between equally spaced nodes."""
+
+    lowest: float
+    """Smallest x."""
+    step: float
+    """Distance of the nodes."""
+    value: ComplexArray
+    """Along the pair's axis and across it, kg m, shape (n,)."""
+    slope: ComplexArray
+    """kg m per step, shape (n,)."""
+
+    def at(self, fill: FloatArray) -> ComplexArray:
+        """Moment of the pair, kg m, for fills of the positive chamber."""
+        place = np.clip((fill - self.lowest) / self.step, 0.0, self.value.size - 1.0)
+        cell = np.minimum(place.astype(np.intp), self.value.size - 2)
+        t = place - cell
+        y0, d0 = self.value[cell], self.slope[cell]
+        rise, d1 = self.value[cell + 1] - y0, self.slope[cell + 1]
+        return np.asarray(y0 + piece_rise(t, rise, d0, d1))
+
+    @classmethod
+    def of(cls, *, model: BalancerModel, total: float) -> MomentTable:
+        """Tabulate a balancer's moment of a pair whose two fill ratios sum to `total`."""
+        largest = model.flow.max_fill_ratio
+        lowest, highest = max(0.0, total - largest), min(total, largest)
+        step = (highest - lowest) / (MOMENT_NODES - 1)
+
+        def of(x: FloatArray) -> ComplexArray:
+            held = np.clip(x, lowest, highest)
+            return model.moment.pair_vector(fill_ratio=held, opposite_fill_ratio=total - held)
+
+        x = np.linspace(lowest, highest, MOMENT_NODES)
+        before, after = np.maximum(x - step / 2, lowest), np.minimum(x + step / 2, highest)
+        slope = (of(after) - of(before)) / (after - before) * step
+        return cls(lowest=float(lowest), step=float(step), value=of(x), slope=slope)
+
 
 NOTES: Final = GAS_POINTS + 1 + TAIL_POINTS
 """Instants of an injection and its wait, with the earlier closing of two valves."""

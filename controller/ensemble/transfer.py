@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.ensemble.compiled_records import DRY, OFF, ON, PATH_NODES, SHARED, Record
-from ringbalance.controller.formulas.paths import linear_course, piece_part, piece_rise
-from ringbalance.controller.liquid_ring.closed_form import LinearSquaredVelocity
+from ringbalance.controller.formulas import linear_course, piece_part, piece_rise
+from ringbalance.controller.liquid_ring.integrators import LinearSquaredVelocity
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError
 from ringbalance.controller.liquid_ring.records import PLANT

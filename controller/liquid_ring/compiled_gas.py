@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from ringbalance.controller.compilation.compiled import in_place, inlined
-from ringbalance.controller.formulas.gas_flow import LAMINAR_RATIO, flow_shape, flow_shape_slope
+from ringbalance.controller.formulas import LAMINAR_RATIO, flow_shape, flow_shape_slope
 from ringbalance.controller.liquid_ring.records import P, Record, X
 from ringbalance.scene.arrays import FloatArray
 

@@ -67,6 +67,27 @@ _RESTING: Final = int(Regime.BLOCKED)
 
 
 @in_place
+def carry(
+    plant: Record,
+    motions: Record,
+    chamber: int,
+    duration: float,
+    notes: FloatArray,
+    count: int,
+    w: FloatArray,
+) -> float:
+    """The one way in from Python, so that what both of these need is made into machine code once.
+
+    Lets a time pass for `motions[0]` as `advance` does, with its fills in row 1 of `notes`; or, given a
+    driven chamber, which is not below zero, finds its `opening_within` on `motions[1]`.  Returns: a time, s.
+    """
+    if chamber >= 0:
+        return opening_within(plant, motions, 0, 1, chamber, duration, w)
+    advance(plant, motions[0], duration, notes, 1, count, w)
+    return duration
+
+
+@in_place
 def command(plant: Record, motion: Record, chamber: int, duration: float) -> None:
     """A valve opens and closes a lag after its command, which begins a new record of what it does."""
     x = shown(plant, motion, motion.state[X])

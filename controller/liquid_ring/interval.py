@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.compiled_lift import resume, stands
-from ringbalance.controller.liquid_ring.compiled_march import advance, opening_within
+from ringbalance.controller.liquid_ring.compiled_march import carry
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
 from ringbalance.controller.liquid_ring.records import EVENTS, MOTION, WORK, WORKSPACE, P, U
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
+
+_NONE: Final = -1
+"""Instead of a driven chamber."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +49,7 @@ def pass_time(
     plant = dynamics.kept_plant(total=total)
     state = packed(plant, fill=fill, primed=primed, motion=motion)
     notes = np.stack([instants, instants])
-    advance(plant[0], state[0], float(instants[-1]), notes, 1, instants.size, np.zeros(WORKSPACE))
+    carry(plant[0], state, _NONE, float(instants[-1]), notes, instants.size, np.zeros(WORKSPACE))
     lowest, highest = max(0.0, total - dynamics.max_fill_ratio), min(total, dynamics.max_fill_ratio)
     return Passage(
         fills=np.clip(notes[1], lowest, highest),
@@ -69,7 +73,8 @@ def longest_opening(
     """Longest valve-open time, at most `duration`, s, whose injection and tail leave the residual fill."""
     plant = dynamics.kept_plant(total=total)
     states = np.concatenate([packed(plant, fill=fill, primed=primed, motion=motion)] * 2)
-    return opening_within(plant[0], states, 0, 1, chamber, duration, np.zeros(WORKSPACE))
+    w = np.zeros(WORKSPACE)
+    return carry(plant[0], states, chamber, duration, w, 0, w)
 
 
 def packed(plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Motion) -> npt.NDArray[np.void]:

@@ -21,7 +21,7 @@ from ringbalance.physics.gas import (
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.heads import entrance_fraction
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.reduced_model.tube.regime import SiphonCrest

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ringbalance.controller.formulas.stopping import NOTICEABLE
+from ringbalance.controller.formulas import NOTICEABLE
 from ringbalance.controller.liquid_ring.interval import longest_opening, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, Record, Switch
-from ringbalance.controller.liquid_ring.opening import NEAR_RESIDUAL, opening_within
+from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL, opening_within
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.flow_law import Regime

@@ -20,11 +20,10 @@ from ringbalance.controller.tuning.tune import tune as tune_scene
 from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.selection.registry import neglected_in_injections
-from ringbalance.scene.accuracy import Models, with_tolerance
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
-from ringbalance.scene.narrowing import checked_law
-from ringbalance.scene.platform.terminal import activity, results_console
+from ringbalance.scene.narrowing import Models, checked_law, with_tolerance
+from ringbalance.scene.platform.terminal import activity, results_console, two_columns
 
 TUNED = 0
 NOT_TUNED = 1
@@ -85,12 +84,7 @@ def _show(tuning: Tuning, console: Console) -> None:
     # Runs that settle with the scene's own line have shown what its smallest correction left open.
     if warning and not tuning.reachable:
         console.print(Text(warning, style="yellow"))
-    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-    table.add_column(style="dim")
-    table.add_column()
-    for name, value in _rows(tuning).items():
-        table.add_row(name, value)
-    console.print(table)
+    console.print(two_columns(_rows(tuning).items()))
     parts = Table(title="uncertainty of the loop factor (95 %)", title_justify="left")
     for name in ("part", "relative", "from"):
         parts.add_column(name)

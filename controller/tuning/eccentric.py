@@ -31,7 +31,7 @@ _LONGER: Final = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class EccentricSettling:
+class _EccentricSettling:
     """Settling with the recommended gains, over the stated uncertainty and the sensors' noise."""
 
     times: SettlingTimes
@@ -52,7 +52,7 @@ class EccentricTuning:
     gains: RecommendedGains
     tuned: Mapping[str, float]
     """Keys that the runs had lowered or raised to the recommended value, SI."""
-    settling: EccentricSettling | None
+    settling: _EccentricSettling | None
     """None: not asked for, or the masses are locked."""
 
     @property
@@ -79,11 +79,11 @@ def tune_eccentric(
     ready, changes = advised(scene, gains)
     settling = None
     if runs and scene.supervisor.strategy != "locked":
-        settling = eccentric_settling(ready, runs=runs, told=told or _silent)
+        settling = _eccentric_settling(ready, runs=runs, told=told or (lambda _: None))
     return EccentricTuning(scene=scene, gains=gains, tuned=changes, settling=settling)
 
 
-def eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> EccentricSettling:
+def _eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> _EccentricSettling:
     """Run a scene with its plant drawn from the stated uncertainty; the strategy keeps the scene's values.
 
     Few runs first, and more where these leave it open that 95 % settle.
@@ -98,7 +98,7 @@ def eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> E
         short = min(_until_rest(done), span)
         if number + 1 == min(FIRST_RUNS, runs) and _times(done).settled.high < QUANTILES["p95"]:
             break
-    return EccentricSettling(
+    return _EccentricSettling(
         times=_times(done),
         span=span,
         outcomes=dict(Counter(run.outcome.value for run in done).most_common()),
@@ -137,10 +137,6 @@ def _advice(done: list[EccentricRun]) -> str:
     return next(run.status for run in failed if run.outcome is usual)
 
 
-def _silent(_: str) -> None:
-    """No progress wanted."""
-
-
 def _of_loops(gains: RecommendedGains) -> str:
     unstable = ", ".join(loop.name for loop in gains.loops if not loop.stable)
     high = [loop for loop in gains.loops if loop.value > loop.recommended]
@@ -152,7 +148,7 @@ def _of_loops(gains: RecommendedGains) -> str:
     return f"{found}: {cure} the voltage for at most {gains.step:.4g} s"
 
 
-def _of_runs(settling: EccentricSettling | None) -> str:
+def _of_runs(settling: _EccentricSettling | None) -> str:
     if settling is None:
         return ""
     times = settling.times
@@ -196,7 +192,7 @@ def eccentric_tuning_document(tuning: EccentricTuning) -> dict[str, Any]:
     }
 
 
-def _settling_document(settling: EccentricSettling | None) -> dict[str, Any]:
+def _settling_document(settling: _EccentricSettling | None) -> dict[str, Any]:
     if settling is None:
         return {}
     times = settling.times
@@ -239,7 +235,7 @@ def show_eccentric_tuning(tuning: EccentricTuning, console: Console) -> None:
         _show_settling(tuning, tuning.settling, console)
 
 
-def _show_settling(tuning: EccentricTuning, settling: EccentricSettling, console: Console) -> None:
+def _show_settling(tuning: EccentricTuning, settling: _EccentricSettling, console: Console) -> None:
     drawn = ", ".join(each.quantity for each in tuning.scene.uncertainty) or "nothing, the scene states none"
     for name, value in (settling.times.rows(settling.span) | {"drawn from their uncertainty": drawn}).items():
         console.print(f"{name}: {value}")

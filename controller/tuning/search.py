@@ -43,7 +43,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tried:
+class _Tried:
     """What became of a candidate in a few short runs."""
 
     change: str
@@ -61,7 +61,7 @@ class Search:
     """Whether all of its few runs settle."""
     needs: float | None
     """s, in which they have settled and held; None: they have not."""
-    tried: tuple[Tried, ...]
+    tried: tuple[_Tried, ...]
     limit: float | None = None
     """Lowest limit of the vibration that 95 % of many runs reach where the scene's is not reached, m."""
     valve: float | None = None
@@ -99,7 +99,7 @@ def _faster(bare: Candidate, offset: Candidate, model: BalancerModel, known: Fac
     """Of two the one of which more of a few runs settle, or as many with the slowest sooner."""
 
     def rank(each: Candidate) -> tuple[float, float]:
-        found = tried(each.scene, model, known.widths, told=lambda _: None)
+        found = tried(each.scene, model, known.widths)
         return found.settled.value, -(found.quantiles["p95"] or math.inf)
 
     return max(bare, offset, key=rank)
@@ -126,7 +126,7 @@ def search(
     Args: `settled`: fraction of many runs that settle in the scene's time limit with `base`, which is all
         right only where a few runs show that more time would do.
     """
-    rows: list[Tried] = []
+    rows: list[_Tried] = []
     best, most = base, -1.0
 
     def candidates() -> Iterator[Candidate]:
@@ -147,12 +147,12 @@ def search(
 
 
 def _try(
-    each: Candidate, model: BalancerModel, known: FactorUncertainty, rows: list[Tried], told: Progress
+    each: Candidate, model: BalancerModel, known: FactorUncertainty, rows: list[_Tried], told: Progress
 ) -> SettlingTimes:
     what = each.change or "the recommended gain alone"
     told(f"{what} ...")
-    found = tried(each.scene, model, known.widths, told=lambda _: None)
-    rows.append(Tried(change=what, settled=found.settled.value, runs=found.runs))
+    found = tried(each.scene, model, known.widths)
+    rows.append(_Tried(change=what, settled=found.settled.value, runs=found.runs))
     return found
 
 
@@ -213,7 +213,7 @@ def with_ways_out(
         what = ", ".join(t for t in (text, each.change) if t)
         told(f"{what} ...")
         many = many_runs(each.scene, model, known.widths, members=members, runs=runs, told=lambda _: None)
-        rows.append(Tried(change=what, settled=many.settled.value, runs=many.runs))
+        rows.append(_Tried(change=what, settled=many.settled.value, runs=many.runs))
         return many
 
     def settles(each: Candidate, text: str) -> bool:

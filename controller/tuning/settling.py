@@ -108,7 +108,7 @@ def many_runs(
     return found
 
 
-def tried(scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, told: Progress) -> SettlingTimes:
+def tried(scene: Scene, model: BalancerModel, widths: MemberUncertainty) -> SettlingTimes:
     """A few runs, in time for some tens of commands, whatever the scene's time limit."""
     settings = scene.controller
     command = settings.period + settings.minimum_gas_time + max(settings.offsets(scene.disc.chambers))
@@ -116,7 +116,7 @@ def tried(scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, told
     span = settings.hold_time + 2 * first + _TRIED_SAMPLES * command
     short = replace(scene, run=replace(scene.run, time_limit=span))
     few = FIRST_MEMBERS // 2 if settings.kind == "target_vector" else FIRST_RUNS // 2
-    return _runs(short, model, widths, number=few, told=told)
+    return _runs(short, model, widths, number=few, told=lambda _: None)
 
 
 def _runs(

@@ -1,4 +1,4 @@
-"""Tuning of a liquid ring's controller: its gain, margins, smallest correction and settling times."""
+"""Tuning of a liquid ring's controller: its gain, margins, smallest correction, settling times and status."""
 
 from __future__ import annotations
 
@@ -11,23 +11,33 @@ import numpy as np
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.checks import check_settings
 from ringbalance.controller.liquid_ring.plant import DiscState
+from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, RUNS_BACK
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
 from ringbalance.controller.tuning.loop_factor import (
     LoopFactor,
+    Margins,
     loop_factor,
+    loop_margins,
     vibration_rates,
     with_driving_gas,
 )
-from ringbalance.controller.tuning.margins import Margins, loop_margins
 from ringbalance.controller.tuning.recommendation import Contribution, FactorUncertainty, factor_uncertainty
-from ringbalance.controller.tuning.search import Candidate, Search, recommended, search, with_ways_out
+from ringbalance.controller.tuning.search import (
+    LIMITS,
+    VALVES,
+    Candidate,
+    Search,
+    recommended,
+    search,
+    with_ways_out,
+)
 from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
-from ringbalance.controller.tuning.status import over_capacity, status_of, valves_reach
 from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.gas_line import LineAnswer, line_answers, line_document
+from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed, neglected_in_injections
+from ringbalance.scene.arrays import finite
 from ringbalance.scene.models import Scene
 
 
@@ -91,7 +101,7 @@ def tune(
     settling times are given for it.
     Raises: SceneError: settings without a meaning, or a rotor too slow to form a ring.
     """
-    told = progress or _silent
+    told = progress or (lambda _: None)
     check_settings(scene)
     check_ring(scene)
     told("uncertainty ...")
@@ -133,7 +143,7 @@ def _judged(
     lines = line_answers(tuned, model)
     beyond = _beyond_capacity(scene, model)
     settles = settling is not None and settling.quantiles["p95"] is not None
-    reaches = settles or valves_reach(tuned, zone=zone, smallest=smallest)
+    reaches = settles or _valves_reach(tuned, zone=zone, smallest=smallest)
     within = flows and loop.stays and reaches and beyond <= settings.limit
     # The law-based algorithm asks for the time in which the law moves the whole residual.
     gain = (1.0 / loop.rate if settings.kind == "law_based" else settings.proportional) if flows else None
@@ -159,8 +169,8 @@ def _judged(
         gas_line=lines,
         settling=settling,
         models_used=run_models(scene=tuned, model=model),
-        status=over_capacity(scene, beyond)
-        or status_of(tuned, loop, zone=zone, smallest=smallest, settling=settling, best=best, found=found),
+        status=_over_capacity(scene, beyond)
+        or _status_of(tuned, loop, zone=zone, smallest=smallest, settling=settling, best=best, found=found),
     )
 
 
@@ -179,10 +189,6 @@ def _line_reaches(lines: tuple[LineAnswer, ...], *, settles: bool) -> bool | Non
     if not any(above):
         return True
     return settles if all(answer.end == "given" for answer in lines) else None
-
-
-def _silent(_: str) -> None:
-    """No progress wanted."""
 
 
 def _margins(scene: Scene, loop: LoopFactor, known: FactorUncertainty) -> Margins:
@@ -212,10 +218,10 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "loop_factor_limit": loop.limit,
         "present": {"loop_factor": tuning.present.value, "unstable": tuning.present.unstable},
         "vibration_rate_m_per_s": loop.rate,
-        "stationary_deviation_m": _finite(loop.deviation),
+        "stationary_deviation_m": finite(loop.deviation),
         "margins": None
         if margins is None
-        else {name: _finite(value) for name, value in asdict(margins).items()}
+        else {name: finite(value) for name, value in asdict(margins).items()}
         | {"left_gain_factor": margins.left_gain_factor, "left_phase": margins.left_phase},
         "uncertainty": [asdict(part) for part in tuning.contributions],
         "first_gas_time_s": tuning.first_gas_time,
@@ -247,5 +253,98 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
     }
 
 
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
+def _over_capacity(scene: Scene, beyond: float) -> str:
+    """Empty within capacity."""
+    limit, start, um = scene.controller.limit, scene.rotor.initial_amplitude, 1e6
+    if beyond <= limit:
+        return ""
+    return (
+        f"capacity exceeded: with the liquid at its best {beyond * um:.4g} um remain of {start * um:.4g} um, "
+        f"limit {limit * um:.4g} um: {BEYOND_CAPACITY}"
+    )
+
+
+def _valves_reach(scene: Scene, *, zone: float, smallest: float) -> bool:
+    """Whether valve-open times of these effects, m, leave the limit sure to be reached."""
+    limit = scene.controller.limit
+    return zone <= limit and smallest <= largest_correction(limit, chambers=scene.disc.chambers)
+
+
+def _status_of(
+    scene: Scene,
+    loop: LoopFactor,
+    *,
+    zone: float,
+    smallest: float,
+    settling: SettlingTimes | None,
+    best: Candidate | None,
+    found: Search | None,
+) -> str:
+    """Of a scene as recommended, whose nominal unbalance is within the disc's capacity; lengths in m."""
+    limit, um = scene.controller.limit, 1e6
+    if loop.rate == 0.0:
+        return "no gain: the gas drives no liquid at the balanced fills: raise gas.pressure"
+    if best is None or settling is None or not loop.stays:
+        return (
+            f"no gain keeps the amplitude within {limit * um:.4g} um: the sensor's noise is "
+            f"{scene.sensor.amplitude_noise * um:.4g} um: raise controller.limit or average the sensor"
+        )
+    also = f", with {best.change}" if best.change else ""
+    reached = settling.quantiles["p95"]
+    if reached is not None:
+        return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
+    if not _valves_reach(scene, zone=zone, smallest=smallest) and not settling.out_of_capacity:
+        return (
+            f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "
+            f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none transfers liquid: "
+            f"{_ways_out(found)}"
+        )
+    return _unsettled(scene, settling, also=also, found=found)
+
+
+def _unsettled(scene: Scene, settling: SettlingTimes, *, also: str, found: Search | None) -> str:
+    """Of runs that settle too seldom, by what explains them. Args: `also`: a change that is recommended."""
+    share = (
+        f"{settling.told(settling.settled.value)} settle within the time limit of "
+        f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
+    )
+    if settling.explained_by(settling.beyond_capacity):
+        return (
+            f"{share}; {settling.told(settling.beyond_capacity)} would need more moment than the disc "
+            f"can form above its residual fill: {BEYOND_CAPACITY}"
+        )
+    if found is not None and found.needs is not None and found.needs_more_than(scene.run.time_limit):
+        return f"{share}; they need some {found.needs:.2g} s: raise run.time_limit"
+    if settling.explained_by(settling.beyond_pressure):
+        return (
+            f"{share}, nor by other gains; in {settling.told(settling.beyond_pressure)} the gas does not "
+            f"drive the liquid far enough at {scene.gas.pressure / 1e6:.3g} MPa: raise gas.pressure"
+        )
+    if settling.explained_by(settling.drifted):
+        return (
+            f"{share}, nor by other gains and pressures; in {settling.told(settling.drifted)} the full tube "
+            f"lets liquid run back while the gas is off: {RUNS_BACK}"
+        )
+    others = "" if found is None or found.settles else ", nor by other gains and pressures"
+    return f"{share}{others}: {_ways_out(found)}"
+
+
+def _ways_out(found: Search | None) -> str:
+    """What lets 95 % of as many runs settle."""
+    if found is None:
+        return "raise controller.limit"
+    ways = [
+        text.format(value)
+        for value, text in (
+            (found.opening and 1e3 * found.opening, "lower controller.minimum_gas_time to {:.3g} ms"),
+            (found.limit and 1e6 * found.limit, "raise controller.limit to {:.3g} um"),
+            (found.valve, "take a valve and line {:.3g} times as fast"),
+        )
+        if value is not None
+    ]
+    if ways:
+        return ", or ".join(ways)
+    return (
+        f"neither a limit {LIMITS[-1]:.3g} times as high nor a valve and line {VALVES[-1]:.3g} times as fast "
+        "would do: state less uncertainty under [uncertainty] when the machine is known better"
+    )

@@ -13,13 +13,44 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
 from scipy.special import chdtrc, ndtr, ndtri, stdtr
 
-from ringbalance.identification.criticism.linear_fit import LinearFit
-from ringbalance.scene.arrays import BoolArray, FloatArray, distinct
+from ringbalance.identification.likelihood import basis_of
+from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray, distinct
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearFit:
+    """Residuals and derivatives at the solution, each row in units of its own standard deviation."""
+
+    residuals: FloatArray
+    """(measured - predicted)/sigma, and of priors (value before - fitted)/sigma, shape (n,)."""
+    derivatives: FloatArray
+    """Of the predictions by the parameters, over sigma, shape (n, p)."""
+    block: StringArray
+    """What a row is of, such as "injection amplitude_after", shape (n,); rows of one block share a noise."""
+    data: BoolArray
+    """Whether a row is a measurement; else it is a prior."""
+    known_noise: BoolArray
+    """Whether its sigma was given; else it was estimated from the residuals of its block."""
+
+    @cached_property
+    def _basis(self) -> FloatArray:
+        """Orthonormal basis of what the parameters can do to the predictions."""
+        return basis_of(self.derivatives)
+
+    def beyond_parameters(self, rows: FloatArray) -> FloatArray:
+        """What no change of the parameters can describe of changes of the predictions, shape (n, ...)."""
+        return np.asarray(rows - self._basis @ (self._basis.T @ rows))
+
+    def freedom(self, chosen: BoolArray) -> float:
+        """Degrees of freedom that some rows have left: their number less the parameters they determine."""
+        return float(np.count_nonzero(chosen) - np.sum(self._basis[chosen] ** 2))
+
 
 LEVEL: Final = 0.05
 """Chance that a model that is right is said to fail."""
@@ -208,12 +239,12 @@ def _runs(fit: LinearFit, order: FloatArray | None) -> Iterator[_Test]:
                 test="runs",
                 block=block,
                 against="order",
-                p_value=runs_probability(plus, signs.size - plus, runs),
+                p_value=_runs_probability(plus, signs.size - plus, runs),
                 text=f"residuals of {block} keep their sign: {runs} runs in {signs.size} measurements",
             )
 
 
-def runs_probability(plus: int, minus: int, runs: int) -> float:
+def _runs_probability(plus: int, minus: int, runs: int) -> float:
     """Probability of at most so many runs among signs in random order.
 
     Source: Wald and Wolfowitz, Ann. Math. Statist. 11 (1940) 147, recalled; the counting is elementary.

@@ -12,16 +12,14 @@ from typing import Final
 import numpy as np
 
 from ringbalance.identification.criticism.law_comparison import LawComparison
-from ringbalance.identification.criticism.linear_fit import LinearFit
-from ringbalance.identification.criticism.patterns import Criticism
+from ringbalance.identification.criticism.patterns import Criticism, LinearFit
 from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.predict.device import Device
 from ringbalance.identification.result import FitResult
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.tables.fit import table_from_samples
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
 from ringbalance.scene.arrays import FloatArray, StringArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
@@ -134,7 +132,7 @@ def _typical_velocity(scene: Scene, problem: Problem, blocks: list[Block]) -> fl
     return abs(float(flow.velocity)) or 1.0
 
 
-def power_of(law: CalibratedLaw, velocity: float, exponent: float) -> CalibratedLaw:
+def _power_of(law: CalibratedLaw, velocity: float, exponent: float) -> CalibratedLaw:
     """Heads in proportion to a power of the velocity, those of the law at one velocity, m/s."""
     heads = law.heads
     near, far = heads.hump_head, heads.return_hump_head
@@ -159,7 +157,7 @@ def _straight(table: HermiteTable, velocity: float, exponent: float) -> HermiteT
 def _other_law(law: CalibratedLaw, *, name: str, velocity: float) -> CalibratedLaw:
     """The other law of a name, from the fitted one; a power has the same loss at a velocity, m/s."""
     if name in EXPONENTS:
-        return power_of(law, velocity, EXPONENTS[name])
+        return _power_of(law, velocity, EXPONENTS[name])
     if name == UNBROKEN:
         heads = replace(law.heads, hump_head=None, return_hump_head=None)
         return replace(law, path=replace(law.path, hump_pressure=None), heads=heads)

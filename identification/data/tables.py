@@ -115,7 +115,7 @@ class Table:
 
 def data_fault(file: str, place: str, problem: str, *, value: str = "", allowed: str = "") -> Fault:
     """One error of a file of measurements. Args: `place`: such as 'line 3' or 'kind'; may be empty."""
-    return Fault(file=file, table="", key=place, value=value, problem=problem, allowed=allowed)
+    return Fault(file=file, key=place, value=value, problem=problem, allowed=allowed)
 
 
 def file_name(path: Path) -> str:

@@ -21,7 +21,7 @@ from ringbalance.controller.liquid_ring.interval import packed
 from ringbalance.controller.liquid_ring.motion import Motion
 from ringbalance.controller.liquid_ring.records import WORKSPACE, X
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.reduced_model.chamber.range import mean_gravity
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw

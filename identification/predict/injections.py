@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
 from ringbalance.scene.arrays import FloatArray, IntArray

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.injections import INJECTION
 from ringbalance.identification.predict.positionings import POSITIONING

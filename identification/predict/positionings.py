@@ -11,11 +11,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import rest_state
-from ringbalance.identification.data.observations import Observations
+from ringbalance.controller.eccentric_mass.plant.plant import LOCKED, STUCK, rest_state
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.predicted import PredictedKind
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.uncertain import NORMAL_95
 

@@ -17,8 +17,7 @@ from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
 from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import RingValues
-from ringbalance.reduced_model.tables.fit import table_from_samples
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

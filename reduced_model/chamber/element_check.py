@@ -178,9 +178,8 @@ def scene_ring(
     if np.all(ring.solved):
         return ring
     fault = scene_fault(
-        scene=scene,
-        table="disc",
-        key="central_angle",
+        scene,
+        "disc.central_angle",
         problem=f"the pressure in a chamber of this shape cannot be solved ({ring.status.text})",
         allowed="a wider chamber, or a thinner plate_thickness",
     )

@@ -52,9 +52,8 @@ def check_ring(scene: Scene) -> None:
     if abs(scene.rotor.speed) > lowest:
         return
     fault = scene_fault(
-        scene=scene,
-        table="rotor",
-        key="speed",
+        scene,
+        "rotor.speed",
         problem="so slow that gravity keeps the liquid from forming a ring",
         allowed=f"above {lowest * 30 / math.pi:.4g} rpm",
     )

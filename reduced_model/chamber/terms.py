@@ -8,8 +8,12 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
-from ringbalance.reduced_model.chamber.imported_walls import drawing_shares, share_across
-from ringbalance.reduced_model.chamber.values import by_closed_form, by_quadrature
+from ringbalance.reduced_model.chamber.values import (
+    by_closed_form,
+    by_quadrature,
+    drawing_shares,
+    share_across,
+)
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
@@ -86,7 +90,7 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
     Source: sum of the estimates, errors of one sign at worst.
     """
     found, wet = {}, fills > 0
-    common = wall_layers(scene, fills[wet])[0] + wave_mean(scene, fills[wet])
+    common = wall_layers(scene, fills[wet])[0] + _wave_mean(scene, fills[wet])
     drawn = drawing_shares(scene.disc, fills[wet])
     aside = np.hypot(1.0, share_across(scene.disc, fills[wet])) - 1
     own = {"pressures": drawn.wall_pressure, "moments": drawn.moment + aside}
@@ -136,7 +140,7 @@ def _swing(square: FloatArray) -> FloatArray:
     return np.asarray(np.minimum(1 / np.maximum(np.abs(1 - 1 / square), 1e-9), LARGEST_SWING))
 
 
-def wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
+def _wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
     """Bound of what waves do to the means over a turn, relative: (eta/h)^2/4, at most 1.
 
     In shallow waves the mean square of the velocity is g_c <eta^2>/h, of which Bernoulli's equation takes

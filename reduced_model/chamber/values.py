@@ -1,4 +1,4 @@
-"""Wall pressure, moment and lambda of a chamber: at one fill by each model, and along the fill."""
+"""Wall pressure, moment and lambda of a chamber, at one fill by each model and along it; what a mesh adds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.mesh.cut.faceting import drawing_error
+from ringbalance.mesh.cut.table import chamber_table
 from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.physics.pressure.hydrostatics import displaced_by_gravity
 from ringbalance.physics.results import Estimate, Status, StatusCode
@@ -15,7 +17,7 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, turn_samples
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import Disc, Scene
 
 _EPSILON: Final = float(np.finfo(np.float64).eps)
 _QUADRATURE: Final = 1e-10
@@ -189,3 +191,38 @@ def _spilling_ring(scene: Scene, fill_ratio: FloatArray) -> BoolArray:
     else:
         innermost = a - delta * np.hypot(np.cos(alpha) - np.sin(alpha) / alpha, np.sin(alpha))
     return np.asarray(innermost < disc.inner_radius * (1 - 1e-9))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _DrawingShares:
+    """Relative expanded uncertainties (95 %) by facets for curved walls, and by integration."""
+
+    volume: float
+    wall_pressure: FloatArray
+    moment: FloatArray
+    """Of the moment or of lambda, whichever is larger."""
+
+
+def drawing_shares(disc: Disc, fills: FloatArray) -> _DrawingShares:
+    """Shares at fill ratios above zero; zeros for the sector of the keys."""
+    if disc.geometry is None:
+        return _DrawingShares(volume=0.0, wall_pressure=np.zeros(fills.shape), moment=np.zeros(fills.shape))
+    table, error = chamber_table(disc.geometry), drawing_error(disc.geometry, fill_ratio=fills)
+    a = np.sqrt(table.level_of(fills * table.volume))
+    return _DrawingShares(
+        volume=error.volume / table.volume,
+        wall_pressure=error.wall_square / table.at_radius(a, 3),
+        moment=np.maximum(error.moment / table.at_radius(a, 1), error.centroid / table.surface(a)[1]),
+    )
+
+
+def share_across(disc: Disc, fills: FloatArray) -> FloatArray:
+    """Moment across the chamber's middle over that along it, dW/dU, of liquid that moves at a fill ratio.
+
+    That of a pair's moment lies between those of the fills which it moves through.
+    Returns: Tangent of the angle between both, the shape of `fills`.
+    """
+    if disc.geometry is None:
+        return np.zeros(fills.shape)
+    _, along, across = chamber_table(disc.geometry).surface(surface_radius(disc=disc, fill_ratio=fills))
+    return np.asarray(across / along)

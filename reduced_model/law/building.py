@@ -11,11 +11,9 @@ from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_rad
 from ringbalance.physics.gas import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
-from ringbalance.reduced_model.chamber.imported_walls import share_across
-from ringbalance.reduced_model.chamber.values import RingValues
+from ringbalance.reduced_model.chamber.values import RingValues, share_across
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
-from ringbalance.reduced_model.tables.fit import flat_table, table_from_samples
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime
-from ringbalance.reduced_model.law.storage import save_record
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, save_record
+from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import TubeEnds, TubePath

@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime
+from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, save_record
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.law.storage import save_record
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene

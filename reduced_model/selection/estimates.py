@@ -35,8 +35,8 @@ from ringbalance.reduced_model.chamber.terms import (
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.gas_line import line_ends
-from ringbalance.reduced_model.selection.loss_models import CONSTANT_MODELS
 from ringbalance.reduced_model.selection.range_flow import (
+    CONSTANT_MODELS,
     SHARES,
     RangeFlow,
     equal_velocity,

@@ -15,8 +15,10 @@ from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.terms import MEAN, PLATES, chamber_contributions
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.law.building import tube_path
-from ringbalance.reduced_model.selection.loss_models import CONSTANT_MODELS, MODELS, ROTATING
 from ringbalance.reduced_model.selection.range_flow import (
+    CONSTANT_MODELS,
+    MODELS,
+    ROTATING,
     SHARES,
     flows,
     range_ends,
@@ -26,9 +28,9 @@ from ringbalance.reduced_model.selection.range_flow import (
 )
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.regime import SiphonCrest
-from ringbalance.scene.accuracy import FINEST
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import FINEST
 from ringbalance.scene.tube_models import CORRELATION, FINEST_MODELS, LEFT_OUT, Fidelity, TubeModels
 
 TUBE_LOSS: Final = "loss of the tube"

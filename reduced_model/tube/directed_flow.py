@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
 from ringbalance.reduced_model.tube.regime import (
     CLEARING,

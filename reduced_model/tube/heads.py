@@ -13,8 +13,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
 from ringbalance.physics.tube.uncertainty import SIMPLER, model_parts, uncertainty_parts, with_errors
-from ringbalance.reduced_model.tables.fit import flat_table, level_table, refined_table
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tables import HermiteTable, flat_table, level_table, refined_table
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
     crest_span,

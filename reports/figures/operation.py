@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from itertools import product
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from scipy.ndimage import distance_transform_edt
-from scipy.spatial import ConvexHull
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
@@ -256,13 +254,12 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
 def reachable(length: float, direction: float, pairs: int) -> Any:
     """Corners of what equal pairs give together, each between plus and minus its length, as complex vectors.
 
+    The first is the sum of all, l e^(jd) (1 + e^(j pi/n) + ... ) = 2 l e^(jd)/(1 - e^(j pi/n)); each next one
+    has one sign changed, which turns it by pi/n.
     Args: `length`: of one pair's vector. `direction`: of the first pair's, rad.
     """
-    each = length * np.exp(1j * (direction + math.pi / pairs * np.arange(pairs)))
-    sums = np.array([np.dot(signs, each) for signs in product((-1, 1), repeat=pairs)])
-    if pairs == 1:
-        return sums
-    return sums[ConvexHull(np.c_[sums.real, sums.imag]).vertices]
+    step = np.exp(1j * math.pi / pairs)
+    return 2 * length * np.exp(1j * direction) / (1 - step) * step ** np.arange(2 * pairs)
 
 
 def _residual(panel: Axes, vector: Any, limit: float, span: float, ends: Any) -> None:

@@ -301,5 +301,5 @@ def _reading_text(found: Record) -> list[str]:
 
 
 SECTION: Final = Section(
-    name="paper_again", title="The paper’s figures, drawn again", collect=_collect, show=_view
+    name="paper_again", title="The paper’s figures, drawn again", collect=_collect, apart=True, show=_view
 )

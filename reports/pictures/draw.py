@@ -108,8 +108,8 @@ def _save(plotter: Any, labels: list[tuple[FloatArray, Label]], scale: Bar, them
         for place, label in labels
     ]
     lettered = letter(image, labels=placed, bar=scale, ink=theme.ink, ground=theme.background, scale=SCALE)
-    # Median cuts: an octree is faster, and its steps of colour can be seen.
-    lettered.reduce(SCALE).quantize(_COLOURS, dither=Image.Dither.NONE).save(path)
+    # All colours: a palette of 256 shows as steps in a colour bar.
+    lettered.reduce(SCALE).save(path)
 
 
 def _draw_pressure(
@@ -122,15 +122,15 @@ def _draw_pressure(
     for part in _without_corner(liquid):
         _add_field(plotter, part, high)
     for edge in _outline(job, half):
-        plotter.add_mesh(edge, color=theme.edge, line_width=3)
+        plotter.add_mesh(edge, color=theme.edge, line_width=2.4)
     reach = outer * math.sin(min(half, math.pi / 2))
     low = min(inner * math.cos(half), outer * math.cos(half))
     bounds = (low, outer, -reach, reach, -width / 2, width / 2)
     look(plotter, direction=(75, -80, 150), up=(1, 0, 0), zoom=1.35, bounds=bounds, lift=0.11)
     shallow = float(np.hypot(liquid.points[:, 0], liquid.points[:, 1]).min())
     return [
-        label_at("outer wall", _polar(outer, 0.45 * half, 0.1 * width), shift=(60, -110)),
-        label_at("free surface", _polar(shallow, 0.55 * half, width / 2), shift=(-125, 150)),
+        label_at("outer wall", _polar(outer, 0.45 * half, 0.1 * width), shift=(48, -88)),
+        label_at("free surface", _polar(shallow, 0.55 * half, width / 2), shift=(-100, 120)),
         label_at("gas", _polar(0.75 * inner + 0.25 * outer, 0.0, width / 2)),
     ], Bar.of("pressure in MPa", _VIRIDIS, (0.0, high))
 
@@ -171,7 +171,7 @@ def _add_field(plotter: Any, part: Any, high: float) -> None:
         show_scalar_bar=False,
     )
     lines = surface.contour(np.linspace(0, high, 9)[1:-1], scalars="pressure")
-    plotter.add_mesh(lines, color="white", line_width=3, opacity=0.6)
+    plotter.add_mesh(lines, color="white", line_width=2.4, opacity=0.6)
 
 
 def _polar(radius: float, angle: float, height: float) -> FloatArray:
@@ -213,7 +213,7 @@ def _draw_disc(
     for index, name in enumerate(job["letters"]):
         angle = 2 * math.pi * (index / count) - 0.22 * job["central_angle"]
         # Beside the middle of the chamber, where the tube does not run.
-        labels.append(label_at(name, _polar(0.62 * inner + 0.38 * outer, angle, 0.0), size=54))
+        labels.append(label_at(name, _polar(0.62 * inner + 0.38 * outer, angle, 0.0), size=43))
     return labels, Bar.of("depth in mm", _WATER, (0.0, high))
 
 
@@ -279,15 +279,15 @@ def _add_tube(plotter: Any, disc: Record, theme: Theme) -> list[tuple[FloatArray
     tube = pv.lines_from_points(path).strip().tube(radius=radius, n_sides=32, capping=True)
     plotter.add_mesh(tube, color=theme.tube, smooth_shading=True, ambient=0.25, specular=0.3)
     if hump is None:
-        return [label_at("connecting tube", np.array([0.0, 0.0, height]), shift=(150, 120))]
+        return [label_at("connecting tube", np.array([0.0, 0.0, height]), shift=(120, 96))]
     top = np.array([0.0, hump, height])
     plotter.add_mesh(
         pv.Sphere(radius=1.7 * radius, center=top), color=theme.mark, smooth_shading=True, ambient=0.3
     )
     side = path[len(path) // 4]
     return [
-        label_at(f"siphon crest at {hump:.4g} mm", top, shift=(-10, -110)),
-        label_at("connecting tube", side, shift=(250, -100)),
+        label_at(f"siphon crest at {hump:.4g} mm", top, shift=(-8, -88)),
+        label_at("connecting tube", side, shift=(200, -80)),
     ]
 
 

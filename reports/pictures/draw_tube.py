@@ -105,11 +105,11 @@ def _labels(points: FloatArray, full: BoolArray, job: Record, told: Record) -> l
     letters = job["letters"]
     opposite = letters[len(letters) // 2]
     found = [
-        label_at(f"from chamber {letters[0]}", points[0], shift=(-120, 140)),
-        label_at(f"to chamber {opposite}", points[-1], shift=(90, 140)),
-        label_at("hump", points[told["hump"]], shift=(0, -120)),
+        label_at(f"from chamber {letters[0]}", points[0], shift=(-96, 112)),
+        label_at(f"to chamber {opposite}", points[-1], shift=(72, 112)),
+        label_at("hump", points[told["hump"]], shift=(0, -96)),
     ]
     empty = np.flatnonzero(~full)
     if empty.size:
-        found.append(label_at("no liquid here", points[empty[empty.size // 2]], shift=(-190, -80)))
+        found.append(label_at("no liquid here", points[empty[empty.size // 2]], shift=(-152, -64)))
     return found

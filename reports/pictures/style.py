@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from ringbalance.scene.arrays import FloatArray
 
-PICTURE: Final = (1500, 1000)
+PICTURE: Final = (1200, 800)
 """Pixels of a finished picture."""
 
 
@@ -54,7 +54,7 @@ THEMES: Final = (
 )
 
 
-_FONT_SIZE: Final = 34
+_FONT_SIZE: Final = 27
 """px of the finished picture."""
 
 
@@ -117,9 +117,9 @@ def _draw_label(pen: ImageDraw.ImageDraw, label: Label, ink: str, ground: str, s
     (x, y), (dx, dy) = label.place, label.shift
     anchor = "mm"
     if dx or dy:
-        for colour, width in ((ground, 7 * scale), (ink, 2 * scale)):
+        for colour, width in ((ground, 6 * scale), (ink, 2 * scale)):
             pen.line([(x, y), (x + dx, y + dy)], fill=colour, width=width)
-        dot = 5 * scale
+        dot = 4 * scale
         pen.ellipse([x - dot, y - dot, x + dot, y + dot], fill=ink)
         # The leader ends at the text, above or below it.
         anchor = "md" if dy < 0 else "ma"
@@ -130,22 +130,22 @@ def _draw_label(pen: ImageDraw.ImageDraw, label: Label, ink: str, ground: str, s
         font=face,
         fill=ink,
         anchor=anchor,
-        stroke_width=6 * scale,
+        stroke_width=5 * scale,
         stroke_fill=ground,
     )
 
 
 def _draw_bar(pen: ImageDraw.ImageDraw, bar: Bar, height: int, ink: str, scale: int) -> None:
-    left, right, top, bottom = 40 * scale, 84 * scale, round(0.24 * height), round(0.82 * height)
+    left, right, top, bottom = 32 * scale, 67 * scale, round(0.24 * height), round(0.82 * height)
     shades = np.rint(255 * np.asarray(bar.colours(np.linspace(1, 0, bottom - top)))).astype(int)
     for row, (red, green, blue, _) in enumerate(shades.tolist(), start=top):
         pen.line([(left, row), (right, row)], fill=(red, green, blue))
     pen.rectangle([left, top, right, bottom], outline=ink, width=2 * scale)
-    pen.text((left, top - 28 * scale), bar.title, font=_font(_FONT_SIZE * scale), fill=ink, anchor="ls")
+    pen.text((left, top - 22 * scale), bar.title, font=_font(_FONT_SIZE * scale), fill=ink, anchor="ls")
     for tick, text in zip(bar.ticks, bar.labels, strict=True):
         y = bottom - (tick - bar.low) / (bar.high - bar.low) * (bottom - top)
-        pen.line([(right, y), (right + 10 * scale, y)], fill=ink, width=2 * scale)
-        pen.text((right + 18 * scale, y), text, font=_font((_FONT_SIZE - 4) * scale), fill=ink, anchor="lm")
+        pen.line([(right, y), (right + 8 * scale, y)], fill=ink, width=2 * scale)
+        pen.text((right + 14 * scale, y), text, font=_font((_FONT_SIZE - 3) * scale), fill=ink, anchor="lm")
 
 
 def look(

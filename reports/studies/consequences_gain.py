@@ -9,9 +9,8 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from ringbalance.controller.ensemble.moment import MomentTable
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.ensemble.run import MemberRuns
+from ringbalance.controller.ensemble.run import MemberRuns, MomentTable
 from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.reduced_model.law.model import BalancerModel

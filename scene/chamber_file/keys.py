@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from ringbalance.scene.keys.declaration import standard, unused
-from ringbalance.scene.keys.quantities import OneLine, Turn
+from ringbalance.scene.keys.fields import OneLine, Turn
 
 MeshUnit = Literal["m", "cm", "mm", "um", "nm", "in"]
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]

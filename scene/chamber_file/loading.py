@@ -5,8 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -18,15 +22,12 @@ from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
 from ringbalance.scene.chamber_file.assembly import Body
 from ringbalance.scene.chamber_file.contents import Contents, MeshFileError
 from ringbalance.scene.chamber_file.elements import dimension
-from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, unfitting
+from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, Placed, placed, port_radius, unfitting
 from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
 from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.chamber_file.names import boundaries_of
-from ringbalance.scene.chamber_file.placing import Placed, placed, port_radius
 from ringbalance.scene.chamber_file.record import ChamberGeometry
-from ringbalance.scene.chamber_file.shape import oriented
-from ringbalance.scene.chamber_file.step_file import STEP_ENDINGS, STEP_UNIT, meshed_step
-from ringbalance.scene.chamber_file.topology import Facets
+from ringbalance.scene.chamber_file.topology import Facets, oriented
 from ringbalance.scene.chamber_file.vtu_file import read_vtu
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
@@ -35,11 +36,17 @@ from ringbalance.scene.rules.check import Finding
 from ringbalance.scene.uncertain import SHAPE
 from ringbalance.scene.units import DIMENSIONS
 
+_STEP_ENDINGS: Final = (".step", ".stp")
+_STEP_UNIT: Final = "m"
+_LONGEST: Final = 300
+"""Seconds."""
+_COARSEST, _FINEST = 1 / 6, 1 / 40
+"""Size of cells over the extent of the solid."""
 _LARGEST_FILE: Final = 2**28
 _READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(
     {".msh": read_gmsh, ".inp": read_abaqus, ".vtu": read_vtu}
 )
-FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
+_FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
 
 
 def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
@@ -103,7 +110,7 @@ def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     name = reading.values["disc.mesh"]
     path = Path(reading.file).parent / name
     content = _content_of(path)
-    unit = STEP_UNIT if _is_step(path) else reading.values["disc.mesh_unit"]
+    unit = _STEP_UNIT if _is_step(path) else reading.values["disc.mesh_unit"]
     contents = _contents_of(path, content, tolerance=reading.values["accuracy.tolerance"])
     body = Body.of(contents, scale=float(DIMENSIONS["length"].units[unit].factor))
     body, misshapen = oriented(body)
@@ -152,14 +159,14 @@ def _record(
 
 def _is_step(path: Path) -> bool:
     """Whether a file is a solid that is yet to be meshed, and has its own unit."""
-    return path.suffix.lower() in STEP_ENDINGS
+    return path.suffix.lower() in _STEP_ENDINGS
 
 
 def _content_of(path: Path) -> bytes:
     """The bytes of a mesh file. Raises: MeshFileError: it cannot be read, or is larger than any mesh."""
-    if path.suffix.lower() not in (*_READERS, *STEP_ENDINGS):
+    if path.suffix.lower() not in (*_READERS, *_STEP_ENDINGS):
         raise MeshFileError.of(
-            f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", FORMATS
+            f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", _FORMATS
         )
     try:
         # Without blocking: a pipe that nobody writes to must not hold the program.
@@ -167,7 +174,7 @@ def _content_of(path: Path) -> bytes:
         with os.fdopen(handle, "rb") as stream:
             kind = os.fstat(stream.fileno())
             if not stat.S_ISREG(kind.st_mode):
-                raise MeshFileError.of("this is a folder or a device, not a file", FORMATS)
+                raise MeshFileError.of("this is a folder or a device, not a file", _FORMATS)
             content = stream.read(_LARGEST_FILE + 1)
     except FileNotFoundError as error:
         raise MeshFileError.of(
@@ -179,7 +186,7 @@ def _content_of(path: Path) -> bytes:
     if len(content) > _LARGEST_FILE:
         raise MeshFileError.of("the file is too large to be checked", f"up to {_LARGEST_FILE // 2**20} MiB")
     if not content.strip():
-        raise MeshFileError.of("the file is empty", FORMATS)
+        raise MeshFileError.of("the file is empty", _FORMATS)
     return content
 
 
@@ -189,7 +196,7 @@ def _contents_of(path: Path, content: bytes, *, tolerance: float) -> Contents:
     Args: `tolerance`: of the scene, from which the size of a solid's cells follows.
     """
     if _is_step(path):
-        return meshed_step(content, tolerance=tolerance)
+        return _meshed_step(content, tolerance=tolerance)
     return _READERS[path.suffix.lower()](content)
 
 
@@ -197,3 +204,37 @@ def _drawing_nodes(contents: Contents) -> IntArray:
     """Numbers of nodes that points and lines of the drawing have, such as centres of arcs."""
     lower = [block.nodes.ravel() for block in contents.blocks if dimension(block.kind) < 2]
     return np.concatenate([np.empty(0, dtype=np.int64), *lower])
+
+
+def _meshed_step(content: bytes, *, tolerance: float) -> Contents:
+    """The mesh of a STEP file in metres, of second order.
+
+    The size of the cells over the extent of the solid is the cube root of the tolerance over 2: what
+    quadratic cells leave of a field falls with the third power of their size.
+    Raises: MeshFileError: no Gmsh is there, or it cannot mesh the solid in time.
+    """
+    if find_spec("gmsh") is None:
+        problem = "a STEP file needs the extra cad, which meshes it"
+        raise MeshFileError.of(problem, 'pip install "ringbalance[cad]", or a mesh in place of the solid')
+    if b"ISO-10303-21" not in content[:1000]:
+        raise MeshFileError.of("this is not a STEP file: it does not begin with ISO-10303-21")
+    share = min(max(tolerance ** (1 / 3) / 2, _FINEST), _COARSEST)
+    with tempfile.TemporaryDirectory() as folder:
+        source, target = Path(folder) / "solid.step", Path(folder) / "solid.msh"
+        source.write_bytes(content)
+        command = [sys.executable, "-m", "ringbalance.scene.chamber_file.step_meshing"]
+        try:
+            child = subprocess.run(
+                [*command, str(source), str(target), repr(share)],
+                capture_output=True,
+                timeout=_LONGEST,
+                check=False,
+                cwd=folder,
+            )
+        except subprocess.TimeoutExpired as error:
+            raise MeshFileError.of(f"Gmsh has not meshed the solid within {_LONGEST} s", "a mesh") from error
+        if child.returncode or not target.exists():
+            lines = child.stderr.decode("utf-8", errors="replace").strip().splitlines()
+            reason = "".join(each for each in (lines or ["it ended"])[-1] if each.isprintable())[:200]
+            raise MeshFileError.of(f"Gmsh cannot mesh the solid: {reason}", "one solid with a closed surface")
+        return read_gmsh(target.read_bytes())

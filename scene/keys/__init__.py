@@ -1,9 +1,8 @@
 """Keys of a scene file, and the reading of a document by them.
 
 A new key is one field of a record in `scene.models`, `scene.loop_models`, `scene.eccentric_models` or
-`scene.eccentric_control_models`: its annotation declares what it takes (a reader in `fields`, named in
-`quantities` where several keys share it), how it may be absent, what it means, how it is described, and
-whether it may be uncertain, see `declaration`. A default that follows from other keys names its
-rule. `schema` and `eccentric_schema` list the tables; tools/scene_reference.py writes them into
-docs/scene-file.md.
+`scene.eccentric_control_models`: its annotation declares what it takes (a reader of `fields`), how it may be
+absent, what it means, how it is described, and whether it may be uncertain, see `declaration`. A default that
+follows from other keys names its rule. `schema` and `scene.eccentric_models` list the tables;
+tools/scene_reference.py writes them into docs/scene-file.md.
 """

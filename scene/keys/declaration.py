@@ -1,6 +1,6 @@
 """Keys of a scene file as the fields of records declare them: each key once, in its field's annotation.
 
-    bore: Annotated[PositiveLength, needed("inner diameter d"), UNCERTAIN, shown("bore d", "mm")]
+    bore: Annotated[PositiveLength, needed("inner diameter d"), UNCERTAIN, Shown("bore d", "mm")]
 
 A field is a key when its annotation holds a `Presence`. What may be written there is the `Reader` of the
 annotation, or follows from the type: a `Literal`, a record, or a tuple of records. Reading, defaults,
@@ -12,7 +12,7 @@ SI: in the first unit that `DIMENSIONS` has for the reader's dimension.  Modules
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, is_dataclass
+from dataclasses import KW_ONLY, dataclass, is_dataclass
 from functools import cache
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
@@ -73,25 +73,26 @@ class Key:
     """Whether [uncertainty] may have its half-width."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Shown:
     """How a field is described to people."""
 
     name: str
     """Such as "outer radius R2"."""
-    unit: str
-    note: str
-    absent: str
+    unit: str = ""
+    _: KW_ONLY
+    note: str = ""
+    absent: str = ""
     """What is written when the scene has no such value; empty: no line."""
-    only_for: str
+    only_for: str = ""
     """Control algorithm for which it is described; empty for all."""
-    dimension: str | None
+    dimension: str | None = None
     """A key of `DIMENSIONS`; None for that of the field's reader."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Listed:
-    """Marks a list of tables."""
+@dataclass(frozen=True)
+class Listed:
+    """Marks a key that takes a list of tables, such as the example."""
 
     example: str
 
@@ -125,24 +126,6 @@ def derived(otherwise: str, meaning: str, *needs: str, rule: Callable[..., Any] 
 def unused(otherwise: str, meaning: str) -> Presence:
     """Declare a key without which a term is left out; `otherwise` says what holds then."""
     return Presence(kind="unused", meaning=meaning, otherwise=otherwise)
-
-
-def listed(example: str) -> _Listed:
-    """Declare that a key takes a list of tables, such as `example`."""
-    return _Listed(example=example)
-
-
-def shown(
-    name: str,
-    unit: str = "",
-    *,
-    note: str = "",
-    absent: str = "",
-    only_for: str = "",
-    dimension: str | None = None,
-) -> Shown:
-    """Let a field be described, see `Shown`."""
-    return Shown(name=name, unit=unit, note=note, absent=absent, only_for=only_for, dimension=dimension)
 
 
 @cache
@@ -188,6 +171,6 @@ def _takes(hint: Any) -> Reader | Entries:
         if get_origin(part) is Literal:
             return choice(part)
         if isinstance(part, type) and is_dataclass(part):
-            listed = _part(hint, _Listed)
+            listed = _part(hint, Listed)
             return Entries(record=part, keys=keys_of(part), example=listed.example if listed else "")
     raise TypeError(f"{hint} does not declare what its key takes")

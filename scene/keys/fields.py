@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.units import DIMENSIONS, FieldError, parse_quantity
@@ -206,7 +206,7 @@ def numbers() -> Reader:
     return Reader(read=read, allowed=allowed, summary="a list of bare numbers")
 
 
-def one_or_each(reader: Reader, *, example: str) -> Reader:
+def _one_or_each(reader: Reader, *, example: str) -> Reader:
     """Reader of one value, or of a list of values of its sort; its values are tuples."""
     allowed = f"{reader.allowed}; or a list of one for each chamber, such as {example}"
 
@@ -299,3 +299,41 @@ def _half_width_allowed(dimension: str | None) -> str:
     if dimension is not None:
         own = f"{DIMENSIONS[dimension].name} in {DIMENSIONS[dimension].unit_names}"
     return f'a percentage of the quantity such as "5 %", or {own}'
+
+
+OneLine = Annotated[str, text()]
+PositiveLength = Annotated[float, quantity("length", POSITIVE)]
+Length = Annotated[float, quantity("length", NOT_NEGATIVE)]
+PositiveAngle = Annotated[float, quantity("angle", POSITIVE)]
+Angle = Annotated[float, quantity("angle", NOT_NEGATIVE)]
+Turn = Annotated[float, angle_of_turn()]
+PositiveTime = Annotated[float, quantity("time", POSITIVE)]
+Time = Annotated[float, quantity("time", NOT_NEGATIVE)]
+Pressure = Annotated[float, quantity("pressure", NOT_NEGATIVE)]
+TimePerChamber = Annotated[
+    tuple[float, ...], _one_or_each(quantity("time", NOT_NEGATIVE), example='["50 ms", "30 ms"]')
+]
+PositivePressure = Annotated[float, quantity("pressure", POSITIVE)]
+Temperature = Annotated[float, quantity("temperature")]
+Influence = Annotated[float, quantity("influence_coefficient", POSITIVE)]
+PositiveMass = Annotated[float, quantity("mass", POSITIVE)]
+Mass = Annotated[float, quantity("mass", NOT_NEGATIVE)]
+Stiffness = Annotated[float, quantity("stiffness", POSITIVE)]
+Damping = Annotated[float, quantity("damping", NOT_NEGATIVE)]
+PositiveVelocity = Annotated[float, quantity("velocity", POSITIVE)]
+Velocity = Annotated[float, quantity("velocity", NOT_NEGATIVE)]
+PositiveUnbalance = Annotated[float, quantity("unbalance", POSITIVE)]
+Unbalance = Annotated[float, quantity("unbalance", NOT_NEGATIVE)]
+PositiveRate = Annotated[float, quantity("speed", POSITIVE)]
+Rate = Annotated[float, quantity("speed", NOT_NEGATIVE)]
+Inertia = Annotated[float, quantity("inertia", NOT_NEGATIVE)]
+Weight = Annotated[float, number(POSITIVE)]
+FillRatio = Annotated[float, share(Bounds(above=0, at_most=1), example=0.5)]
+ProperFraction = Annotated[float, share(Bounds(above=0, below=1), example=0.5)]
+Gate = Annotated[float, share(Bounds(above=0, at_most=1), example=0.01)]
+Angles = Annotated[tuple[float, float], each_of(angle_of_turn(), count=2, example='["0 deg", "180 deg"]')]
+Arms = Annotated[
+    tuple[float, float],
+    each_of(quantity("length", NOT_NEGATIVE), count=2, example='["10 mm", "10 mm"]'),
+]
+Teeth = Annotated[tuple[int, int, int], each_of(whole(1, 100000), count=3, example="[10, 40, 400]")]

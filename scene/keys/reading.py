@@ -119,7 +119,6 @@ class Reading:
                 yield Fault(
                     file=self.file,
                     table=name,
-                    key="",
                     value=MISSING,
                     problem="every scene needs this table",
                     allowed=f"a table with {inside}",

@@ -1,4 +1,4 @@
-"""The tables of a scene file as the records declare its keys; `eccentric_schema` has the other kind."""
+"""The tables of a scene file as the records declare its keys; `scene.eccentric_models` has the others."""
 
 from __future__ import annotations
 

@@ -23,10 +23,6 @@ class Finding:
 Rule = Callable[..., Finding | None]
 
 
-def _always(_: Reading) -> bool:
-    return True
-
-
 @dataclass(frozen=True, kw_only=True)
 class Check:
     """A rule and the values that it needs; it is left out while one of them is unknown."""
@@ -41,7 +37,7 @@ class Check:
 
 
 def check(
-    rule: Rule, *needs: str, when: Callable[[Reading], bool] = _always, moot: tuple[Rule, ...] = ()
+    rule: Rule, *needs: str, when: Callable[[Reading], bool] = lambda _: True, moot: tuple[Rule, ...] = ()
 ) -> Check:
     """Bind a rule to paths "table.key"."""
     return Check(rule=rule, needs=needs, when=when, moot=moot)

@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
-from ringbalance.scene.eccentric_models import SpeedPoint
+from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, SpeedPoint
 from ringbalance.scene.keys.declaration import Entries
-from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.rules.check import Check, Finding, Rule, check, written
 

@@ -107,21 +107,19 @@ _GAS_TIMES = ("controller.minimum_gas_time", "controller.maximum_gas_time")
 _TRIAL_TIMES = ("controller.first_trial", "controller.long_step", "controller.short_step")
 
 
-def _vapour_given(reading: Reading) -> bool:
-    return reading.given(_VAPOUR)
-
-
-def _vapour_looked_up(reading: Reading) -> bool:
-    return not reading.given(_VAPOUR)
-
-
 def _by_trial(reading: Reading) -> bool:
     return bool(reading.values.get("controller.kind") == "trial")
 
 
 CHECKS: tuple[Check, ...] = (
-    check(_liquid_stays_liquid, _VAPOUR, _AMBIENT, when=_vapour_given),
-    check(_temperature_below_boiling, "liquid.temperature", _VAPOUR, _AMBIENT, when=_vapour_looked_up),
+    check(_liquid_stays_liquid, _VAPOUR, _AMBIENT, when=lambda reading: reading.given(_VAPOUR)),
+    check(
+        _temperature_below_boiling,
+        "liquid.temperature",
+        _VAPOUR,
+        _AMBIENT,
+        when=lambda reading: not reading.given(_VAPOUR),
+    ),
     check(_gas_times_in_order, *_GAS_TIMES),
     check(period_covers_lag, "controller.period", "gas.valve_lag"),
     check(_limit_above_noise, "controller.limit", "sensor.amplitude_noise"),

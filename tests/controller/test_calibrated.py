@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.ensemble.samples import MemberUncertainty
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive, Event
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome

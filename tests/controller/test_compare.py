@@ -11,7 +11,7 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.controller.compare import compare
-from ringbalance.controller.compare_cli import tuned_text
+from ringbalance.controller.compare_cli import _tuned_text
 from ringbalance.controller.compare_rotor import OneRotor, own_scene
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
@@ -175,9 +175,9 @@ def test_a_comparison_has_both_tuned_over_one_span_and_several_seeds(
     assert ring.tuned == {"controller.proportional": gain}
     assert set(masses.tuned) == {"friction_filter.speed_gain", "friction_filter.drive_speed"}
     assert told.friction_filter.speed_gain < 2.0
-    assert tuned_text(ring) == f'controller.proportional = "{1e-6 * gain:.4g} s/um"'
+    assert _tuned_text(ring) == f'controller.proportional = "{1e-6 * gain:.4g} s/um"'
     speed = f'"{told.friction_filter.drive_speed * 30 / math.pi:.4g} rpm"'
-    assert f"friction_filter.drive_speed = {speed}" in tuned_text(masses)
+    assert f"friction_filter.drive_speed = {speed}" in _tuned_text(masses)
     low, high = ring.ends("energy")
     assert low <= ring.middle("energy") <= high
     assert low < high

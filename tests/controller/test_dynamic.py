@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from ringbalance.controller.formulas.gas_flow import flow_shape
+from ringbalance.controller.formulas import flow_shape
 from ringbalance.controller.liquid_ring import compiled_column
 from ringbalance.controller.liquid_ring.compiled_gas import line_rates
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time

@@ -12,10 +12,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
 from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Motion
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate

@@ -17,16 +17,16 @@ import pytest
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.ensemble.compiled_noise import noise_key, noise_pair
 from ringbalance.controller.ensemble.compiled_records import SHARED
-from ringbalance.controller.ensemble.moment import MomentTable
 from ringbalance.controller.ensemble.monte_carlo import (
     QUANTILES,
     Probability,
     simulate_ensemble,
     simulate_members,
 )
+from ringbalance.controller.ensemble.run import MomentTable
 from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
 from ringbalance.controller.ensemble.transfer import PairTransfer
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.gas_use import GasUse
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.interval import Passage
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.simulation import GasUse
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import (

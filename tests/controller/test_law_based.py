@@ -16,11 +16,9 @@ from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
-from ringbalance.controller.algorithms.law_based import InfluenceEstimate
-from ringbalance.controller.algorithms.law_based_times import fill_for_moment, pair_changes
-from ringbalance.controller.liquid_ring.closed_form import closed_form
-from ringbalance.controller.liquid_ring.opening import gas_time
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.algorithms.law_based import _InfluenceEstimate, fill_for_moment, pair_changes
+from ringbalance.controller.liquid_ring.integrators import closed_form, quadrature
+from ringbalance.controller.liquid_ring.reach import gas_time
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import chamber_directions
@@ -144,8 +142,8 @@ def test_what_no_pair_can_give_is_asked_of_those_at_their_ends() -> None:
 # --- the influence coefficient ---
 
 
-def learn(*, k: complex, seen: complex, noise: float, standard_deviation: float = 0.0) -> InfluenceEstimate:
-    return InfluenceEstimate(value=k, variance=abs(0.5 * k) ** 2).updated(
+def learn(*, k: complex, seen: complex, noise: float, standard_deviation: float = 0.0) -> _InfluenceEstimate:
+    return _InfluenceEstimate(value=k, variance=abs(0.5 * k) ** 2).updated(
         moment_change=2e-4 + 1e-4j,
         vibration_change=seen * (2e-4 + 1e-4j),
         noise_variance=noise,
@@ -179,7 +177,7 @@ def test_the_estimate_stays_within_a_decade_and_goes_on_following() -> None:
 
 def test_the_average_of_many_noisy_responses_is_the_coefficient() -> None:
     random = np.random.default_rng(3)
-    true, estimate = 1.3 * K * cmath.exp(0.4j), InfluenceEstimate(value=K, variance=abs(0.5 * K) ** 2)
+    true, estimate = 1.3 * K * cmath.exp(0.4j), _InfluenceEstimate(value=K, variance=abs(0.5 * K) ** 2)
     for _ in range(400):
         change = complex(*random.standard_normal(2)) * 1e-4
         noise = complex(*random.standard_normal(2)) * 1e-6

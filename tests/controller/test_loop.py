@@ -15,8 +15,8 @@ import pytest
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.loop import MAX_SAMPLES, simulate
 from ringbalance.controller.simulation import Outcome, Simulation, Verdict
 from ringbalance.reduced_model.law.model import BalancerModel

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.ensemble.transfer import PairTransfer, gas_off, gas_on
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.pair_path import FlowPaths
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.flow_law import Regime

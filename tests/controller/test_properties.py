@@ -15,8 +15,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.closed_form import closed_form
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import closed_form, quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.liquid_ring.reach import starting_pressure
 from ringbalance.controller.rotor import chamber_directions, chamber_letters, disc_unbalance, wrapped
 from ringbalance.reduced_model.law.model import BalancerModel

@@ -12,17 +12,17 @@ import pytest
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.integrators import closed_form
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, PairState
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.simulation import Outcome, Simulation, Verdict
 from ringbalance.controller.tuning.loop_factor import (
     LoopFactor,
+    _largest_staying,
+    _stationary_deviation,
     balanced_fills,
-    largest_staying,
     loop_factor,
-    stationary_deviation,
     vibration_rates,
 )
 from ringbalance.controller.tuning.recommendation import recommended_gain
@@ -94,7 +94,7 @@ def test_the_rate_at_level_chambers_is_kappa_lambda_rho_s_u(scene: Scene, model:
 @pytest.mark.parametrize("h", [0.1, 0.58, 1.0, 1.5])
 def test_with_p_alone_noise_leaves_the_known_deviation(h: float, error: float) -> None:
     known = math.sqrt(h / (2 * math.cos(error) - h))
-    assert stationary_deviation(loop_factor=h, noise=1.0, lag_error=error) == pytest.approx(known, rel=1e-9)
+    assert _stationary_deviation(loop_factor=h, noise=1.0, lag_error=error) == pytest.approx(known, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_noise_leaves_what_a_simulated_linear_loop_shows(
         summed += integral * (seen + before) / 2
         x, before = x - h * (seen + summed + derivative * (seen - before)), seen
         squares += x * x
-    found = stationary_deviation(loop_factor=h, noise=1.0, integral=integral, derivative=derivative)
+    found = _stationary_deviation(loop_factor=h, noise=1.0, integral=integral, derivative=derivative)
     # Some 1e5 independent squares: 1 % is four standard deviations.
     assert found == pytest.approx(math.sqrt(squares / STEPS), rel=0.015)
 
@@ -125,21 +125,21 @@ def test_a_loop_that_turns_round_takes_its_derivative_of_amplitudes(h: float) ->
         seen = y + noise[k]
         y, before = h * (seen + q * (seen - before)) - y, seen
         squares += y * y
-    found = stationary_deviation(loop_factor=h, noise=1.0, integral=0.3, derivative=q)
+    found = _stationary_deviation(loop_factor=h, noise=1.0, integral=0.3, derivative=q)
     assert found == pytest.approx(math.sqrt(squares / STEPS), rel=0.03)
 
 
 def test_a_loop_beyond_its_limit_has_no_stationary_deviation() -> None:
-    assert stationary_deviation(loop_factor=2.0, noise=0.0) == math.inf
-    assert stationary_deviation(loop_factor=1.2, noise=1.0, lag_error=1.0) == math.inf
-    assert stationary_deviation(loop_factor=1.9, noise=0.0) == 0.0
+    assert _stationary_deviation(loop_factor=2.0, noise=0.0) == math.inf
+    assert _stationary_deviation(loop_factor=1.2, noise=1.0, lag_error=1.0) == math.inf
+    assert _stationary_deviation(loop_factor=1.9, noise=0.0) == 0.0
 
 
 def test_the_largest_factor_that_stays_leaves_a_third_of_the_limit() -> None:
-    found = largest_staying(limit=5.0, noise=1.0)
-    assert 3 * stationary_deviation(loop_factor=found, noise=1.0) == pytest.approx(5.0, rel=1e-6)
-    assert largest_staying(limit=5.0, noise=0.0) == pytest.approx(2.0)
-    assert largest_staying(limit=1.0, noise=1e3) == pytest.approx(0.0, abs=1e-5)
+    found = _largest_staying(limit=5.0, noise=1.0)
+    assert 3 * _stationary_deviation(loop_factor=found, noise=1.0) == pytest.approx(5.0, rel=1e-6)
+    assert _largest_staying(limit=5.0, noise=0.0) == pytest.approx(2.0)
+    assert _largest_staying(limit=1.0, noise=1e3) == pytest.approx(0.0, abs=1e-5)
 
 
 # --- the verdict ---

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from ringbalance.controller.document import _sparkline, show
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.show import show, sparkline
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
 
@@ -43,5 +43,5 @@ def test_a_run_without_injections_and_one_with_too_many(scene: Scene, model: Bal
     [([1.0, 1e-3, 1e-9], "█▁▁"), ([0.0, 0.0], "▁▁"), ([1.0, 10**-1.5], "█▄"), ([], "")],
 )
 def test_bars_are_logarithmic_over_three_decades(values: list[float], bars: str) -> None:
-    found = sparkline(np.array(values))
+    found = _sparkline(np.array(values))
     assert found == bars or (bars == "█▄" and found in {"█▄", "█▅"})

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.target_vector import TargetVector, TargetVectorState, components
+from ringbalance.controller.algorithms.target_vector import TargetVector, _TargetVectorState, components
 from ringbalance.controller.rotor import chamber_directions
 
 PID = TargetVector(
@@ -168,7 +168,7 @@ def test_it_rests_at_and_below_the_limit_and_forgets(amplitude: float) -> None:
     state, _ = PID.step(state, sample(1.0, 3e-6))
     state, command = PID.step(state, sample(2.0, amplitude))
     assert command == Command(resting=True)
-    assert state == TargetVectorState()
+    assert state == _TargetVectorState()
 
 
 @pytest.mark.parametrize(

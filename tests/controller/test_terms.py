@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import run_models
 from ringbalance.reduced_model.calibration import calibrate

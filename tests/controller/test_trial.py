@@ -7,7 +7,7 @@ import math
 import pytest
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.trial import Trial, TrialState
+from ringbalance.controller.algorithms.trial import Trial, _TrialState
 
 TRIAL = Trial(
     sequence=(0, 2, 1, 3),
@@ -57,17 +57,17 @@ def test_steps_are_short_near_the_goal_first_trials_too() -> None:
 
 
 def test_it_rests_at_the_limit_and_keeps_its_chamber() -> None:
-    state = TrialState(position=2, previous=1e-7)
+    state = _TrialState(position=2, previous=1e-7)
     state, command = TRIAL.step(state, Measurement(time=0.0, amplitude=0.05e-6, phase=0.0))
     assert command == Command(resting=True)
-    assert state == TrialState(position=2)
+    assert state == _TrialState(position=2)
     _, again = TRIAL.step(state, Measurement(time=1.0, amplitude=0.2e-6, phase=0.0))
     assert (again.valves[0].chamber, again.valves[0].duration) == (1, 0.01)
 
 
 @pytest.mark.parametrize("bad", [None, Measurement(time=1.0, amplitude=math.nan, phase=0.0)])
 def test_a_bad_sample_holds_everything(bad: Measurement | None) -> None:
-    state = TrialState(position=1, previous=1e-6)
+    state = _TrialState(position=1, previous=1e-6)
     held, command = TRIAL.step(state, bad)
     assert held is state
     assert command.valves == ()

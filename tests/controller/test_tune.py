@@ -19,9 +19,8 @@ from ringbalance.controller.eccentric_mass.strategy.settings import StrategySett
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning import cli
 from ringbalance.controller.tuning.cli import _show
-from ringbalance.controller.tuning.eccentric import FIRST_RUNS, eccentric_settling, tune_eccentric
-from ringbalance.controller.tuning.loop_factor import vibration_rates
-from ringbalance.controller.tuning.margins import loop_margins
+from ringbalance.controller.tuning.eccentric import FIRST_RUNS, _eccentric_settling, tune_eccentric
+from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
 from ringbalance.reduced_model.calibration import calibrated_model
@@ -269,7 +268,7 @@ def test_eccentric_masses_get_their_sampled_loops_and_settling_times(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As a document and as text: of the same runs."""
-    monkeypatch.setattr(cli, "tune_eccentric", once(cli.tune_eccentric))
+    monkeypatch.setattr(cli, "tune_eccentric", once(tune_eccentric))
     scene = str(bundled_scene("washing_machine"))
     assert main(["tune", scene, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
@@ -288,7 +287,7 @@ def test_eccentric_masses_get_their_sampled_loops_and_settling_times(
 def test_settling_times_of_eccentric_masses_are_those_of_whole_runs() -> None:
     """Runs that end early, because they have settled, settle as they do in the whole time."""
     scene = washing_machine(time_limit=12.0)
-    found = eccentric_settling(scene, runs=6, told=lambda _: None)
+    found = _eccentric_settling(scene, runs=6, told=lambda _: None)
     times = []
     for number in range(6):
         seed = scene.run.seed + number

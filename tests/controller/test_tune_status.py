@@ -15,8 +15,7 @@ from ringbalance.controller.tuning.loop_factor import loop_factor, usable_fill, 
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.search import Candidate, Search, search, with_ways_out
 from ringbalance.controller.tuning.settling import SettlingTimes
-from ringbalance.controller.tuning.status import status_of
-from ringbalance.controller.tuning.tune import Tuning, tune
+from ringbalance.controller.tuning.tune import Tuning, _status_of, tune
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.loop_models import ControllerSettings
@@ -102,7 +101,7 @@ def test_what_keeps_most_of_the_runs_from_settling_is_named(
 
 def _status(scene: Scene, settling: SettlingTimes, found: Search) -> str:
     loop = loop_factor(scene, paper_model(scene), target_vector_of(scene))
-    return status_of(scene, loop, zone=0.0, smallest=0.0, settling=settling, best=found.best, found=found)
+    return _status_of(scene, loop, zone=0.0, smallest=0.0, settling=settling, best=found.best, found=found)
 
 
 @pytest.mark.parametrize(

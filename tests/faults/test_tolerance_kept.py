@@ -11,7 +11,7 @@ from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.selection.registry import models_used
 from ringbalance.scene import Scene, bundled_scene, load_scene
-from ringbalance.scene.accuracy import with_tolerance
+from ringbalance.scene.narrowing import with_tolerance
 from ringbalance.scene.tube_models import FINEST_MODELS
 from ringbalance.verification.selection_studies.choices import random_scene
 

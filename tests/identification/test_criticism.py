@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.identification.criticism.law_comparison import NEEDED, LawComparison, summaries
-from ringbalance.identification.criticism.linear_fit import LinearFit
-from ringbalance.identification.criticism.patterns import LEVEL, Criticism, runs_probability
+from ringbalance.identification.criticism.patterns import LEVEL, Criticism, LinearFit, _runs_probability
 from ringbalance.scene.arrays import FloatArray
 
 ROWS = 60
@@ -134,7 +133,7 @@ def test_runs_are_counted_right(plus: int, minus: int) -> None:
     counts = [1 + sum(a != b for a, b in itertools.pairwise(order)) for order in orders]
     for runs in range(2, plus + minus + 1):
         expected = sum(count <= runs for count in counts) / len(counts)
-        assert runs_probability(plus, minus, runs) == pytest.approx(expected, rel=1e-12)
+        assert _runs_probability(plus, minus, runs) == pytest.approx(expected, rel=1e-12)
 
 
 def test_overlapping_patterns_count_once() -> None:

@@ -12,10 +12,9 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.identification.data import tables
-from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.observations import Observations
-from ringbalance.identification.data.reading import observations_of, read_observations
-from ringbalance.identification.data.template import template
+from ringbalance.identification.data.kinds import KINDS, template
+from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.data.reading import _observations_of, read_observations
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.models import Scene
 
@@ -28,7 +27,7 @@ def scenes(paper_scene: Scene) -> Mapping[str, AnyScene]:
 
 
 def read(text: str, scene: AnyScene) -> Observations:
-    found, faults = observations_of(text.encode(), file="x.csv", scene=scene)
+    found, faults = _observations_of(text.encode(), file="x.csv", scene=scene)
     assert [str(fault) for fault in faults] == []
     assert found is not None
     return found
@@ -36,7 +35,7 @@ def read(text: str, scene: AnyScene) -> Observations:
 
 def refused(text: str, scene: AnyScene) -> list[str]:
     """Lines of the message, in the order of the file."""
-    found, faults = observations_of(text.encode(), file="x.csv", scene=scene)
+    found, faults = _observations_of(text.encode(), file="x.csv", scene=scene)
     assert found is None
     return [str(fault) for fault in tables.in_order(faults)]
 

@@ -13,12 +13,12 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.identification.balancers import fitted_names
+from ringbalance.identification.balancers import _fitted_names
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
-from ringbalance.identification.next_measurement import next_measurement, offered_rows, words_of
+from ringbalance.identification.next_measurement import _offered_rows, _words_of, next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.scene import bundled_scene, load_scene
@@ -145,8 +145,8 @@ def test_the_next_speed_narrows_as_expected(scene: EccentricScene) -> None:
     )
     first = fit(scene, data=[few], parameters=["rotor.damping"])
     told = next_measurement(first, "rotor.damping")
-    offered = offered_rows(first.scene, "run_up", few)
-    chosen = next(i for i in range(len(offered)) if words_of(offered, i) == told.gains[0].candidate)
+    offered = _offered_rows(first.scene, "run_up", few)
+    chosen = next(i for i in range(len(offered)) if _words_of(offered, i) == told.gains[0].candidate)
     speed = offered.columns["speed"][[chosen]]
     plain = observed("run_up", {"speed": speed, "amplitude": np.ones(1), "phase": np.zeros(1)})
     real, imaginary = PREDICTED["run_up"].predict(first.scene, plain, None)
@@ -216,7 +216,7 @@ def test_friction_holds_a_small_voltage(scene: EccentricScene) -> None:
 
 
 def test_every_uncertain_quantity_can_be_changed(scene: EccentricScene) -> None:
-    for name in fitted_names(scene):
+    for name in _fitted_names(scene):
         changed = eccentric_with(scene, 0.125, name=name)
         assert eccentric_value(changed, name) == 0.125
         assert eccentric_with(changed, eccentric_value(scene, name), name=name) == scene

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from ringbalance.identification.next_measurement import Candidate, Gain, expected_gains
+from ringbalance.identification.next_measurement import Candidate, _expected_gains, _Gain
 from ringbalance.scene.arrays import FloatArray
 
 DURATIONS = np.array([0.05, 0.1, 0.2, 0.3])
@@ -47,7 +47,7 @@ def spread_of_refits(durations: tuple[float, ...], draws: int = 1500) -> FloatAr
 @pytest.mark.parametrize("parameter", [0, 1])
 def test_the_best_candidate_is_the_one_that_refits_find(parameter: int) -> None:
     offered = {f"{d:g} s": np.array([d]) for d in (0.02, 0.4, 2.0)}
-    gains = expected_gains(
+    gains = _expected_gains(
         derivatives(DURATIONS).T @ derivatives(DURATIONS),
         parameter=parameter,
         candidates=[Candidate(text=name, derivatives=derivatives(d)) for name, d in offered.items()],
@@ -59,7 +59,7 @@ def test_the_best_candidate_is_the_one_that_refits_find(parameter: int) -> None:
 def test_the_expected_interval_is_that_of_refits() -> None:
     """Enough data for a linear problem: ten of each duration, and ten at 2 s."""
     many = np.repeat(DURATIONS, 10)
-    gain = expected_gains(
+    gain = _expected_gains(
         derivatives(many).T @ derivatives(many),
         parameter=0,
         candidates=[Candidate(text="2 s", derivatives=derivatives(np.full(10, 2.0)))],
@@ -72,7 +72,7 @@ def test_the_expected_interval_is_that_of_refits() -> None:
 
 def test_what_nothing_determines_is_infinite_until_something_does() -> None:
     one = np.array([[1.0, 1.0]])
-    gains = expected_gains(
+    gains = _expected_gains(
         one.T @ one,
         parameter=0,
         candidates=[
@@ -93,7 +93,7 @@ def test_what_nothing_determines_is_infinite_until_something_does() -> None:
 )
 def test_a_measurement_never_harms(rows: list[tuple[float, float, float]], parameter: int) -> None:
     information = np.diag([1.0, 4.0, 9.0])
-    (gain,) = expected_gains(
+    (gain,) = _expected_gains(
         information, parameter=parameter, candidates=[Candidate(text="c", derivatives=np.array(rows))]
     )
     assert gain.after <= gain.before * (1 + 1e-12)
@@ -105,8 +105,8 @@ def test_units_do_not_matter() -> None:
     """Parameters in any unit: the answer scales with it."""
     first = derivatives(DURATIONS)
     scale = np.array([1e-9, 1e6])
-    found: list[Gain] = []
+    found: list[_Gain] = []
     for d, s in ((first, 1.0), (first * scale, scale)):
         more = Candidate(text="2 s", derivatives=derivatives(np.array([2.0])) * s)
-        found += expected_gains(d.T @ d, parameter=1, candidates=[more])
+        found += _expected_gains(d.T @ d, parameter=1, candidates=[more])
     assert found[1].after * 1e6 == pytest.approx(found[0].after, rel=1e-6)

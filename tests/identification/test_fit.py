@@ -12,7 +12,7 @@ from scipy.stats import t as student_t
 from synthetic_rigs import covered, fitted, measured, observations, rig
 
 from ringbalance.identification.balancers import model_errors, with_model_error
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit, problem_of
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.parameters import FitError

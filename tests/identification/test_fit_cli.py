@@ -18,9 +18,8 @@ from ringbalance.identification.balancers import informed
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.patterns import Criticism
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.reading import observations_of, read_observations
-from ringbalance.identification.data.template import template
+from ringbalance.identification.data.kinds import KINDS, template
+from ringbalance.identification.data.reading import _observations_of, read_observations
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -241,7 +240,7 @@ def test_the_page_has_every_kind_and_its_example_can_be_read(paper_scene: Scene)
     page = measurement_tables.FIT_PAGE.read_text(encoding="utf-8")
     assert measurement_tables.fresh(page, "fit_kinds", measurement_tables.fit_kind_table()) == page
     example = page.split("## Files of measurements")[1].split("```")[1].lstrip("\n")
-    found, faults = observations_of(example.encode(), file="example", scene=paper_scene)
+    found, faults = _observations_of(example.encode(), file="example", scene=paper_scene)
     assert faults == ()
     assert found is not None
     assert len(found) == 3

@@ -10,9 +10,9 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.identifiability import DEPENDENT, Verdict, power_text
+from ringbalance.identification.identifiability import DEPENDENT, Verdict, _power_text
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
@@ -249,4 +249,4 @@ def replace_bore(scene: Scene, relative: float) -> InputUncertainty:
     ],
 )
 def test_products_of_powers(exponents: list[float], text: str) -> None:
-    assert power_text(["a", "b"], np.array(exponents)) == text
+    assert _power_text(["a", "b"], np.array(exponents)) == text

@@ -12,7 +12,7 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.data.reading import read_observations
 from ringbalance.scene import SceneError, bundled_scene
 from ringbalance.scene.faults import MOST_SHOWN

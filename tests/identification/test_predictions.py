@@ -10,11 +10,11 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.quadrature import quadrature
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, Review, power_of
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, Review, _power_of
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.next_measurement import (
     NextMeasurement,
+    _offered_rows,
+    _words_of,
     next_measurement,
-    offered_rows,
-    words_of,
 )
 from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.kinds import PREDICTED
@@ -98,7 +98,7 @@ def test_a_disc_with_another_law_is_found_out(
     velocity = float(
         Device.of(paper_scene, models).law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6).velocity
     )
-    other = replace(models, other=lambda law: power_of(law, velocity, exponent))
+    other = replace(models, other=lambda law: _power_of(law, velocity, exponent))
     data = transfers(true, other, seed=1, known=False)
     told = Review.of(fit(paper_scene, data=[data], parameters=["bore", "extra_loss"]))
     assert not told.criticism.describes
@@ -136,8 +136,8 @@ def test_the_expected_gain_is_that_of_fits_made_again(
     Noise is given, so that an interval depends on the draw through curvature alone: within 5 %.
     """
     data, first, told = four
-    offered = offered_rows(first.scene, "transfer", data)
-    chosen = next(g for g in told.gains if g.candidate == words_of(offered, row))
+    offered = _offered_rows(first.scene, "transfer", data)
+    chosen = next(g for g in told.gains if g.candidate == _words_of(offered, row))
     volume = PREDICTED["transfer"].predict(first.scene, offered, Models.of(paper_scene))
     more = replace(some(offered, [row], volume=volume[[row]]), file="more.csv")
     again = fit(paper_scene, data=[data, more], parameters=["bore"])

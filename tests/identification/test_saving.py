@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.intervals import Profile
 from ringbalance.identification.result import FittedParameter
-from ringbalance.identification.saving import fitted_scene, found_from, save_fitted
+from ringbalance.identification.saving import _fitted_scene, _found_from, _save_fitted
 from ringbalance.scene import SceneError, bundled_scene, load_scene
 from ringbalance.scene.describe import scene_table
 from ringbalance.scene.loader import scene_from
@@ -53,7 +53,7 @@ def test_values_uncertainties_and_origins(tmp_path: Path) -> None:
     target = tmp_path / "fitted.toml"
     lag = fitted("rotor.lag_angle", -0.01, 0.05)
     loss = fitted("tube.extra_loss", 2.0, 0.5, verdict=Verdict.PRACTICALLY)
-    save_fitted(
+    _save_fitted(
         target, text=text_of("liquid_ring_paper"), fitted=[BORE, FACTOR, lag, loss], files=[FILE],
         findings=[MeasuredFinding(about="combination", text="lambda^2/(k + 1)")],
     )  # fmt: skip
@@ -81,7 +81,7 @@ def test_values_uncertainties_and_origins(tmp_path: Path) -> None:
 def test_every_key_stays(name: str) -> None:
     """Without fitted values the saved scene is the same one but for what it says of its measurements."""
     text = text_of(name)
-    content = fitted_scene(text, fitted=[], files=[FILE])
+    content = _fitted_scene(text, fitted=[], files=[FILE])
     document = tomllib.loads(content.decode())
     assert document.pop("measured")["files"] == [
         {"file": "run.csv", "kind": "injection", "rows": 40, "sha256": "ab" * 32}
@@ -93,7 +93,7 @@ def test_every_key_stays(name: str) -> None:
 
 def test_entries_of_a_list_share_the_larger_uncertainty() -> None:
     arms = [fitted("masses.friction_arm[1]", 0.012, 0.002), fitted("masses.friction_arm[0]", 0.01, 0.001)]
-    content = fitted_scene(text_of("eccentric_mass_paper"), fitted=arms, files=[FILE])
+    content = _fitted_scene(text_of("eccentric_mass_paper"), fitted=arms, files=[FILE])
     scene = eccentric_scene(scene_from(content=content, file="a.toml"))
     assert scene.masses.friction_arm == pytest.approx((0.01, 0.012), rel=1e-9)
     widths = {each.quantity: each.half_width for each in scene.uncertainty}
@@ -104,7 +104,7 @@ def test_entries_of_a_list_share_the_larger_uncertainty() -> None:
 def test_an_entry_fitted_alone_leaves_the_uncertainty_of_both() -> None:
     """The key stands for both masses, and nothing was learnt of the other one."""
     arm = fitted("masses.friction_arm[0]", 0.012, 0.001)
-    content = fitted_scene(text_of("eccentric_mass_paper"), fitted=[arm], files=[FILE])
+    content = _fitted_scene(text_of("eccentric_mass_paper"), fitted=[arm], files=[FILE])
     scene = eccentric_scene(scene_from(content=content, file="a.toml"))
     assert scene.masses.friction_arm == pytest.approx((0.012, 0.01), rel=1e-9)
     assert tomllib.loads(content.decode())["uncertainty"]["masses"]["friction_arm"] == "25 %"
@@ -114,7 +114,7 @@ def test_an_entry_fitted_alone_leaves_the_uncertainty_of_both() -> None:
 def test_an_interval_that_a_scene_cannot_state_is_said() -> None:
     wide = fitted("tube.extra_loss", 0.2, 0.1, interval=(0.01, 0.9))
     scene = scene_from(
-        content=fitted_scene(text_of("six_chamber"), fitted=[wide], files=[FILE]), file="a.toml"
+        content=_fitted_scene(text_of("six_chamber"), fitted=[wide], files=[FILE]), file="a.toml"
     )
     assert {each.quantity: each.half_width for each in scene.uncertainty}["extra_loss"] == pytest.approx(0.2)
     assert "tube.extra_loss" in scene.measured.findings[0].text
@@ -124,19 +124,19 @@ def test_values_that_make_no_scene_leave_no_file(tmp_path: Path) -> None:
     target = tmp_path / "fitted.toml"
     outside = fitted("tube.hump_radius", 0.09, 0.001)
     with pytest.raises(SceneError, match="hump_radius"):
-        save_fitted(target, text=text_of("liquid_ring_paper"), fitted=[outside], files=[FILE])
+        _save_fitted(target, text=text_of("liquid_ring_paper"), fitted=[outside], files=[FILE])
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("path", ["tube.colour", "nothing.bore", "colour", "masses.mass"])
 def test_a_path_that_no_scene_has_is_refused(path: str) -> None:
     with pytest.raises(ValueError, match="no value"):
-        fitted_scene(text_of("six_chamber"), fitted=[fitted(path, 1.0, 0.1)], files=[FILE])
+        _fitted_scene(text_of("six_chamber"), fitted=[fitted(path, 1.0, 0.1)], files=[FILE])
 
 
 @given(value=st.floats(1.01e-3, 2e-3), share=st.floats(1e-6, 0.9))
 def test_saving_loses_nothing_that_matters(value: float, share: float) -> None:
-    content = fitted_scene(
+    content = _fitted_scene(
         text_of("liquid_ring_paper"), fitted=[fitted("tube.bore", value, share * value)], files=[FILE]
     )
     scene = liquid_ring_scene(scene_from(content=content, file="a.toml"))
@@ -148,9 +148,9 @@ def test_saving_loses_nothing_that_matters(value: float, share: float) -> None:
 def test_a_mesh_is_found_from_another_folder(tmp_path: Path) -> None:
     text = text_of("imported_chamber")
     folder = bundled_scene("imported_chamber").parent
-    assert found_from(text, folder=folder, to=folder) == text
-    (tmp_path / "disc.toml").write_text(found_from(text, folder=folder, to=tmp_path), encoding="utf-8")
+    assert _found_from(text, folder=folder, to=folder) == text
+    (tmp_path / "disc.toml").write_text(_found_from(text, folder=folder, to=tmp_path), encoding="utf-8")
     there = load_scene(tmp_path / "disc.toml")
     assert there.values_sha256 == load_scene(folder / "imported_chamber.toml").values_sha256
     plain = text_of("six_chamber")
-    assert found_from(plain, folder=folder, to=tmp_path) == plain
+    assert _found_from(plain, folder=folder, to=tmp_path) == plain

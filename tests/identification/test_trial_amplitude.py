@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import next_measurement

@@ -17,7 +17,7 @@ import pytest
 from synthetic_rigs import observations
 
 from ringbalance.identification.criticism.review import ORDER, Review
-from ringbalance.identification.data.observations import Observations
+from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.result import FitResult

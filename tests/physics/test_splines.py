@@ -11,7 +11,7 @@ from scipy import interpolate
 
 from ringbalance.physics.roots import bracketed_minimum, bracketed_root
 from ringbalance.physics.splines import CubicSpline, Surface, monotone_slopes
-from ringbalance.reduced_model.tables.fit import table_from_samples
+from ringbalance.reduced_model.tables import table_from_samples
 
 X = np.array([0.0, 0.3, 0.9, 1.4, 2.0, 2.2, 3.1])
 Y = np.array([-1.0, 0.2, 0.5, 1.7, 2.0])

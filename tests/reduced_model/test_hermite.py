@@ -7,8 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.reduced_model.tables.fit import level_table, refined_table, table_from_samples
-from ringbalance.reduced_model.tables.hermite import HermiteTable
+from ringbalance.reduced_model.tables import (
+    HermiteTable,
+    level_table,
+    refined_table,
+    table_from_samples,
+)
 
 
 def test_quintics_are_exact() -> None:

@@ -13,8 +13,8 @@ from ringbalance.physics import deferred
 from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
-from ringbalance.reduced_model.chamber.imported_walls import share_across
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
+from ringbalance.reduced_model.chamber.values import share_across
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.loading import load_law

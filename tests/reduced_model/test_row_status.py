@@ -11,7 +11,7 @@ from rich.console import Console
 import ringbalance as rb
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.documents import REMEDIES, RowStatus, calibration_document, row_status
+from ringbalance.reduced_model.documents import REMEDIES, RowStatus, _row_status, calibration_document
 from ringbalance.reduced_model.show import calibration_view
 from ringbalance.scene import Scene
 
@@ -24,27 +24,27 @@ def changed(scene: Scene, *, port: float = 44.5e-3, crest: float | None = 31.5e-
 
 
 def test_the_papers_disc_has_no_limited_row(table_1_scene: Scene) -> None:
-    assert set(row_status(table_1_scene, fill_ratio=FILLS, closed=CLOSED)) == {RowStatus.OK}
+    assert set(_row_status(table_1_scene, fill_ratio=FILLS, closed=CLOSED)) == {RowStatus.OK}
 
 
 def test_a_port_between_two_levels_limits_the_rows_below(table_1_scene: Scene) -> None:
     """The level at a fill of 0.2 is 40.95 mm by the paper's disc, at 0.3 it is 39.05 mm."""
     assert surface_radius(disc=table_1_scene.disc, fill_ratio=0.2) == pytest.approx(40.95e-3, abs=0.05e-3)
-    states = row_status(changed(table_1_scene, port=40e-3), fill_ratio=FILLS, closed=CLOSED)
+    states = _row_status(changed(table_1_scene, port=40e-3), fill_ratio=FILLS, closed=CLOSED)
     assert states == (RowStatus.OK, *[RowStatus.PORT_UNCOVERED] * 2, *[RowStatus.OK] * 3)
 
 
 def test_a_crest_between_two_levels_limits_the_rows_above(table_1_scene: Scene) -> None:
     """The level at a fill of 0.4 is 37.03 mm, at 0.5 it is 34.89 mm."""
-    states = row_status(changed(table_1_scene, crest=36e-3), fill_ratio=FILLS, closed=CLOSED)
+    states = _row_status(changed(table_1_scene, crest=36e-3), fill_ratio=FILLS, closed=CLOSED)
     assert states == (*[RowStatus.OK] * 5, RowStatus.OVER_CREST)
-    assert RowStatus.OVER_CREST not in row_status(
+    assert RowStatus.OVER_CREST not in _row_status(
         changed(table_1_scene, crest=None), fill_ratio=FILLS, closed=CLOSED
     )
 
 
 def test_gas_is_drawn_through_residual_liquid(table_1_scene: Scene) -> None:
-    states = row_status(table_1_scene, fill_ratio=FILLS, closed=CLOSED, residual=0.15)
+    states = _row_status(table_1_scene, fill_ratio=FILLS, closed=CLOSED, residual=0.15)
     assert states == (*[RowStatus.GAS_DRAWN] * 2, *[RowStatus.OK] * 4)
 
 
@@ -57,7 +57,7 @@ def test_velocities_of_residual_liquid_are_marked(table_1_calibration: Calibrati
 
 
 def test_an_open_ring_comes_first(table_1_scene: Scene) -> None:
-    states = row_status(changed(table_1_scene, port=40e-3), fill_ratio=FILLS, closed=FILLS > 0.15)
+    states = _row_status(changed(table_1_scene, port=40e-3), fill_ratio=FILLS, closed=FILLS > 0.15)
     assert states[:3] == (RowStatus.OK, RowStatus.NO_RING, RowStatus.PORT_UNCOVERED)
 
 

@@ -20,7 +20,7 @@ from ringbalance.reduced_model.chamber.values import (
     by_paper,
     by_quadrature,
 )
-from ringbalance.reduced_model.selection.loss_models import (
+from ringbalance.reduced_model.selection.range_flow import (
     CONSTANT,
     CORRELATIONS,
     LOSSES,
@@ -31,8 +31,8 @@ from ringbalance.reduced_model.selection.loss_models import (
 )
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene import loop_models
-from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import with_tolerance
 from ringbalance.verification.selection_studies.chambers import by_elements, chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import choose
 from ringbalance.verification.selection_studies.laws import (

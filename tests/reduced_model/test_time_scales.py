@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.reduced_model.selection.estimates import FILLING, LAG, term_estimates
-from ringbalance.reduced_model.short_injection import ridden
+from ringbalance.reduced_model.short_injection import _ridden
 from ringbalance.reduced_model.time_scales import (
     deciding_gas_time,
     long_start_up_loss,
@@ -90,11 +90,11 @@ def test_a_column_rides_as_its_equation_of_motion_says(push: float) -> None:
         lambda _, y: [push - 40 * y[0] ** 2, y[0]], (0, 5e-3), [2.0, 0.0], rtol=1e-10, atol=1e-12
     )
     expected = pytest.approx([float(values[-1]) for values in path.y], rel=1e-8)
-    assert list(ridden(velocity=2.0, push=push, friction=40.0, time=5e-3)) == expected
+    assert list(_ridden(velocity=2.0, push=push, friction=40.0, time=5e-3)) == expected
 
 
 @pytest.mark.parametrize("velocity", [0.0, 2.0])
 @pytest.mark.parametrize("push", [-1e-323, 1e-323])
 def test_a_push_too_small_for_numbers_is_none(velocity: float, push: float) -> None:
-    plain, tiny = (ridden(velocity=velocity, push=p, friction=1e9, time=0.01) for p in (0.0, push))
+    plain, tiny = (_ridden(velocity=velocity, push=p, friction=1e9, time=0.01) for p in (0.0, push))
     assert tiny == plain

@@ -11,7 +11,7 @@ import pytest
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reduced_model.chamber.terms import wave_height, wave_mean
+from ringbalance.reduced_model.chamber.terms import _wave_mean, wave_height
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.models import Scene
 
@@ -74,14 +74,14 @@ def test_a_fast_rotor_by_hand(table_1_calibration: Calibration) -> None:
     assert table_1_calibration.chamber.moment.status.ok
     height = float(wave_height(table_1_calibration.scene, np.array(0.5)))
     assert height == pytest.approx(5.613e-3, rel=0.02)
-    assert float(wave_mean(table_1_calibration.scene, np.array(0.5))) == pytest.approx(height**2 / 4)
+    assert float(_wave_mean(table_1_calibration.scene, np.array(0.5))) == pytest.approx(height**2 / 4)
 
 
 def test_the_bound_falls_with_the_fourth_power_of_the_speed(table_1_scene: Scene) -> None:
-    one, two = (float(wave_mean(at_speed(table_1_scene, rpm), np.array(0.4))) for rpm in (3000.0, 6000.0))
+    one, two = (float(_wave_mean(at_speed(table_1_scene, rpm), np.array(0.4))) for rpm in (3000.0, 6000.0))
     assert one / two == pytest.approx(16.0)
 
 
 def test_a_vertical_shaft_makes_no_waves(table_1_scene: Scene) -> None:
     upright = replace(table_1_scene, environment=replace(table_1_scene.environment, shaft="vertical"))
-    assert wave_mean(upright, np.array(0.4)) == 0.0
+    assert _wave_mean(upright, np.array(0.4)) == 0.0

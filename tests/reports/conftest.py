@@ -9,8 +9,8 @@ from typing import IO, Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from ringbalance.reports.figures import style
 from ringbalance.reports.render import render
 
 R1, R2, B, THETA, T = 0.0205, 0.0445, 0.062, math.pi / 2, 2.777e-3
@@ -327,7 +327,7 @@ def unwritten(monkeypatch: pytest.MonkeyPatch) -> None:
     def savefig(_: object, buffer: IO[str], **__: object) -> None:
         buffer.write('<svg ><path d="M 0 0" /></svg>')
 
-    monkeypatch.setattr(style.Figure, "savefig", savefig)
+    monkeypatch.setattr(Figure, "savefig", savefig)
 
 
 @pytest.fixture

@@ -12,16 +12,16 @@ import scene_reference
 from ringbalance.scene import Fault, bundled_scene, liquid_ring_scene, load_scene, scene_table
 from ringbalance.scene.keys.declaration import (
     UNCERTAIN,
+    Listed,
+    Shown,
     derived,
     descriptions_of,
     keys_of,
-    listed,
     needed,
-    shown,
     standard,
     unused,
 )
-from ringbalance.scene.keys.quantities import Length, PositiveLength
+from ringbalance.scene.keys.fields import Length, PositiveLength
 from ringbalance.scene.keys.reading import Reading, read_document
 from ringbalance.scene.keys.schema import LIQUID_RING, Schema, Table
 from ringbalance.scene.loop_models import Requirement
@@ -38,11 +38,11 @@ class Hole:
 class Plate:
     """A plate."""
 
-    width: Annotated[PositiveLength, needed("along the shaft"), UNCERTAIN, shown("width w", "mm")]
+    width: Annotated[PositiveLength, needed("along the shaft"), UNCERTAIN, Shown("width w", "mm")]
     kind: Annotated[Literal["flat", "bent"], standard("flat", "shape")]
-    rim: Annotated[Length | None, unused("no rim", "height of the rim"), shown("rim", "mm", absent="none")]
+    rim: Annotated[Length | None, unused("no rim", "height of the rim"), Shown("rim", "mm", absent="none")]
     depth: Annotated[Length, derived("twice the width", "depth", "plate.width", rule=lambda width: 2 * width)]
-    holes: Annotated[tuple[Hole, ...], standard([], "list of { radius }"), listed('[{ radius = "1 mm" }]')]
+    holes: Annotated[tuple[Hole, ...], standard([], "list of { radius }"), Listed('[{ radius = "1 mm" }]')]
     mass: float
     """No key, kg."""
 

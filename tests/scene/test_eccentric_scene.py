@@ -26,7 +26,7 @@ from ringbalance.scene import (
     load_scene,
     scene_from,
 )
-from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
+from ringbalance.scene.eccentric_models import ECCENTRIC_MASS
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.loop_models import RunSettings
 

@@ -317,7 +317,7 @@ def test_table_has_every_value() -> None:
 
 def test_fault_of_a_loaded_scene() -> None:
     scene = paper()
-    fault = scene_fault(scene=scene, table="rotor", key="speed", problem="too slow", allowed="above 300 rpm")
+    fault = scene_fault(scene, "rotor.speed", problem="too slow", allowed="above 300 rpm")
     place = bundled_scene("liquid_ring_paper")
     assert str(fault) == f'{place}: [rotor] speed = "10000 rpm": too slow; allowed: above 300 rpm'
 

@@ -13,8 +13,8 @@ import scene_reference
 
 from ringbalance.scene import Scene, loop_models, models
 from ringbalance.scene.chamber_file.keys import MeshKeys
+from ringbalance.scene.eccentric_models import ECCENTRIC_MASS
 from ringbalance.scene.keys.declaration import keys_of
-from ringbalance.scene.keys.eccentric_schema import ECCENTRIC_MASS
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.origins import Measured
 from ringbalance.scene.rules import eccentric, shape, working

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import Calibration, calibrate

@@ -16,7 +16,7 @@ from ringbalance.cli import main
 from ringbalance.mesh.cut.tilted import tilted_liquid
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.chamber.values import by_quadrature
-from ringbalance.reduced_model.selection.loss_models import TABLES
+from ringbalance.reduced_model.selection.range_flow import TABLES
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.integrators import closed_form
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.pressure.ring import ring_quantities

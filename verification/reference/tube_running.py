@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.selection.loss_models import TABLES, velocity_under_head
+from ringbalance.reduced_model.selection.range_flow import TABLES, velocity_under_head
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 

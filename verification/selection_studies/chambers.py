@@ -14,7 +14,6 @@ from ringbalance.mesh.cut.tilted import tilted_liquid
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics import deferred
 from ringbalance.reduced_model.chamber.element_check import ImportedElements, scene_ring
-from ringbalance.reduced_model.chamber.imported_walls import drawing_shares
 from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
 from ringbalance.reduced_model.chamber.terms import (
     MEAN,
@@ -26,7 +25,13 @@ from ringbalance.reduced_model.chamber.terms import (
     chamber_contributions,
 )
 from ringbalance.reduced_model.chamber.tilted_ring import POINTS, RADIAL_POINTS, turn_samples
-from ringbalance.reduced_model.chamber.values import ChamberValues, by_closed_form, by_paper, by_quadrature
+from ringbalance.reduced_model.chamber.values import (
+    ChamberValues,
+    by_closed_form,
+    by_paper,
+    by_quadrature,
+    drawing_shares,
+)
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene

@@ -13,8 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ringbalance.scene import load_scene
-from ringbalance.scene.accuracy import Models, with_tolerance
-from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.narrowing import Models, liquid_ring_scene, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 from ringbalance.verification.evidence import Level

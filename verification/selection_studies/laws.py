@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrate
@@ -21,8 +21,14 @@ from ringbalance.reduced_model.chamber.terms import MEAN
 from ringbalance.reduced_model.chamber.values import paper_closed_forms
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
-from ringbalance.reduced_model.selection.loss_models import CONSTANT, LOSSES, loss_at, with_loss
-from ringbalance.reduced_model.selection.range_flow import SHARES, equal_velocity
+from ringbalance.reduced_model.selection.range_flow import (
+    CONSTANT,
+    LOSSES,
+    SHARES,
+    equal_velocity,
+    loss_at,
+    with_loss,
+)
 from ringbalance.reduced_model.selection.tube_terms import (
     CREST,
     LEVEL_STEPS,
@@ -30,11 +36,11 @@ from ringbalance.reduced_model.selection.tube_terms import (
     flow_contributions,
     loss_contributions,
 )
-from ringbalance.reduced_model.tables.fit import table_from_samples
+from ringbalance.reduced_model.tables import table_from_samples
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.scene.accuracy import with_tolerance
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import with_tolerance
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
 
 EQ_12: Final = "Eq. 12"

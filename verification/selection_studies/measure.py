@@ -22,6 +22,8 @@ from ringbalance.verification.selection_studies.hierarchy import Fidelity, Model
 
 _QUICK: Final = 0.1
 """s, below which a run is repeated."""
+_QUICK_ONCE: Final = 0.01
+"""s, below which a run at another point is looked at where each counts once."""
 FLOOR: Final = 3e-8
 """Relative error below which grid convergence, tables and rounding rule: smaller ones count as equal."""
 _RESOURCE: Final = "cost_model.json"
@@ -124,7 +126,7 @@ class Clock:
     def _over(self, fidelity: Fidelity, points: int) -> float:
         runs = [partial(fidelity.fresh or fidelity.solve, point) for point in range(points)]
         each = [_once(runs[0])]
-        if self.repeats > 1 or each[0] < _QUICK:
+        if self.repeats > 1 or each[0] < _QUICK_ONCE:
             each += map(_once, runs[1:])
         if max(each) < _QUICK:
             each += map(_once, runs * (self.repeats - 1))

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.integrators import closed_form
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import dynamics_of
@@ -25,8 +25,7 @@ from ringbalance.reduced_model.selection.estimates import (
     injection_estimates,
     injection_time,
 )
-from ringbalance.reduced_model.selection.loss_models import CONSTANT
-from ringbalance.reduced_model.selection.range_flow import equal_velocity
+from ringbalance.reduced_model.selection.range_flow import CONSTANT, equal_velocity
 from ringbalance.reduced_model.selection.tube_terms import flow_contributions
 from ringbalance.reduced_model.time_scales import first_gas_time
 from ringbalance.scene.arrays import FloatArray

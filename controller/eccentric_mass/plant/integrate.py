@@ -16,17 +16,21 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.plant.friction import (
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant.plant import (
     HELD,
     LOCKED,
+    SIZE,
     SLIDING,
     STUCK,
+    Drive,
     angular_accelerations,
+    drive_of,
+    loads,
     motions,
     slips,
+    write_derivative,
 )
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import SIZE, Drive, drive_of, loads, write_derivative
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 LONGEST: Final = 0.1

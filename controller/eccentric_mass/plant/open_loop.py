@@ -1,7 +1,11 @@
-"""The plant alone over many steps: prescribed speed, prescribed voltages, no controller."""
+"""The plant alone over many steps: prescribed speed, prescribed voltages, no controller.
+
+How many substeps a run takes is counted before it begins.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
@@ -9,14 +13,83 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, STUCK
-from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import SIZE, rest_state, stuck_flags
-from ringbalance.controller.eccentric_mass.plant.speed import speed_at
-from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps
+from ringbalance.controller.eccentric_mass.plant.integrate import LONGEST, fastest_rate, plant_step
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
+from ringbalance.controller.eccentric_mass.plant.plant import LOCKED, SIZE, STUCK, rest_state, stuck_flags
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.units import format_quantity
+
+MOST_SUBSTEPS: Final = 30_000_000
+"""About one minute, at 2 us each."""
+MOST_SAMPLES: Final = 2_000_000
+"""About 500 MB of histories."""
+
+
+def check_substeps(scene: EccentricScene) -> None:
+    """Refuse a scene whose run would take many minutes or much memory.
+
+    A substep lasts at most 0.1 / (|W| + sqrt(K_B / M) + C_B / M + C_add / J_least).
+    Raises: SceneError: more than `MOST_SAMPLES`, or more than `MOST_SUBSTEPS`; it names the key of the
+    fastest rate and what is allowed.
+    """
+    samples = scene.run.time_limit / scene.sensor.step + 1
+    if samples > MOST_SAMPLES:
+        longest = scene.sensor.step * (MOST_SAMPLES - 1)
+        problem = f"the run would take {samples:.3g} samples, and {MOST_SAMPLES:.3g} are the most"
+        value = format_quantity(scene.run.time_limit, "time", "s")
+        allowed = f"at most {longest:.4g} s, or a longer sensor.step"
+        raise SceneError([_fault(scene, ("run", "time_limit"), value, problem, allowed)])
+    count = _substeps(scene)
+    if count > MOST_SUBSTEPS:
+        key, value, allowed = _fastest(scene)
+        problem = (
+            f"the run would take {count:.3g} steps of the integration, and {MOST_SUBSTEPS:.3g} are the most"
+        )
+        raise SceneError([_fault(scene, key, value, problem, f"{allowed}, or a shorter run.time_limit")])
+
+
+def longest_run(scene: EccentricScene) -> float:
+    """Longest run.time_limit that `check_substeps` allows, s, if the speed stays what it is on average."""
+    by_samples = scene.sensor.step * (MOST_SAMPLES - 1)
+    return min(by_samples, scene.run.time_limit * MOST_SUBSTEPS / _substeps(scene))
+
+
+def _substeps(scene: EccentricScene) -> float:
+    parameters, step = PlantParameters.of(scene), scene.sensor.step
+    times, speeds = scene.rotor.profile
+    samples = scene.samples
+    # Not at every sample: close enough for a limit, and cheap.
+    at = np.linspace(0.0, scene.run.time_limit, min(samples, 10_000))
+    rates = np.abs(np.interp(at, times, speeds)) + fastest_rate(parameters, 0.0)
+    return samples * float(np.mean(np.maximum(np.ceil(rates * step / LONGEST), 1.0)))
+
+
+def _fastest(scene: EccentricScene) -> tuple[tuple[str, str], str, str]:
+    """Key, present value and limit of the largest of the rates that the steps follow from."""
+    plant, resistance = PlantParameters.of(scene), scene.motor.resistance
+    least = plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / plant.mass
+    speed = max(abs(point.speed) for point in scene.rotor.speed_profile)
+    whirl, damped = math.sqrt(plant.stiffness / plant.mass), plant.damping / plant.mass
+    drive = plant.drive_damping / least
+    # Half of what the whole run may have: the other rates take their part.
+    rate = 0.5 * MOST_SUBSTEPS * LONGEST / scene.run.time_limit
+    most, lowest = "at most", "at least"
+    keys = [
+        (whirl, ("rotor", "stiffness"), plant.stiffness, most, plant.mass * rate**2, "stiffness", "N/m"),
+        (damped, ("rotor", "damping"), plant.damping, most, plant.mass * rate, "damping", "N*s/m"),
+        (speed, ("rotor", "speed_profile"), speed, most, rate, "speed", "rpm"),
+        (drive, ("motor", "resistance"), resistance, lowest, resistance * drive / rate, "resistance", "ohm"),
+    ]
+    _, key, value, bound, limit, dimension, unit = max(keys)
+    shown = format_quantity(limit, dimension, unit, digits=3)
+    return key, format_quantity(value, dimension, unit), f"{bound} {shown}"
+
+
+def _fault(scene: EccentricScene, key: tuple[str, str], value: str, problem: str, allowed: str) -> Fault:
+    return Fault(file=scene.file, table=key[0], key=key[1], value=value, problem=problem, allowed=allowed)
+
 
 _FIRST: Final = 64
 _MOST: Final = 10_000
@@ -29,7 +102,7 @@ Progress = Callable[[float, float], None]
 """Called with the simulated time and the time limit, s."""
 
 
-class PlantRun(NamedTuple):
+class _PlantRun(NamedTuple):
     """History of the plant."""
 
     time: FloatArray
@@ -78,7 +151,7 @@ def run_plant(
     commands: FloatArray | None = None,
     locked: bool = False,
     progress: Progress | None = None,
-) -> PlantRun:
+) -> _PlantRun:
     """Run a scene's plant from rest, with the voltages given.
 
     Args: `commands`: V, shape (steps, 2); None for drives switched off. `locked`: whether both masses are
@@ -100,7 +173,7 @@ def run_plant(
         if progress is not None:
             progress(end * step, scene.run.time_limit)
     elapsed: FloatArray = np.arange(len(states), dtype=np.float64) * step
-    return PlantRun(elapsed, np.interp(elapsed, times, speeds), states, flags)
+    return _PlantRun(elapsed, np.interp(elapsed, times, speeds), states, flags)
 
 
 def stretches(samples: int) -> Iterator[tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""The plant's constants, gathered from a scene into plain numbers that compiled functions take.
+"""The plant's constants and its speed, gathered from a scene into plain numbers that compiled functions take.
 
 With masses at rest on the track they give the steady whirl in closed form.
 """
@@ -10,6 +10,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene, Motor
 
 
@@ -106,3 +108,30 @@ class PlantParameters(NamedTuple):
 def _reflected_inertia(motor: Motor) -> float:
     first, second, third = motor.teeth
     return (motor.motor_inertia + motor.gear_inertia * (first / second) ** 2) * (third / first) ** 2
+
+
+@compiled
+def speed_at(times: FloatArray, speeds: FloatArray, time: float) -> tuple[float, float]:
+    """W, rad/s, and W', rad/s^2, just after a time; constant before the first corner and after the last."""
+    if time < times[0]:
+        return speeds[0], 0.0
+    for place in range(len(times) - 1):
+        if time < times[place + 1]:
+            rate = (speeds[place + 1] - speeds[place]) / (times[place + 1] - times[place])
+            return speeds[place] + rate * (time - times[place]), rate
+    return speeds[-1], 0.0
+
+
+@compiled
+def turned(times: FloatArray, speeds: FloatArray, time: float) -> float:
+    """Angle of the rotor, the integral of its speed from time zero. Returns: rad, not wrapped."""
+    angle: float = speeds[0] * min(time, times[0])
+    for place in range(len(times) - 1):
+        end = min(time, times[place + 1])
+        if end > times[place]:
+            now, _ = speed_at(times, speeds, times[place])
+            slope = (speeds[place + 1] - speeds[place]) / (times[place + 1] - times[place])
+            length = end - times[place]
+            angle += now * length + 0.5 * slope * length * length
+    angle += speeds[-1] * max(0.0, time - times[-1])
+    return angle

@@ -11,8 +11,14 @@ import math
 from typing import Final
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, Plan
-from ringbalance.controller.eccentric_mass.strategy.records import Beliefs, Motion, Pair, Smoothed
+from ringbalance.controller.eccentric_mass.strategy.plan import (
+    RELEASED,
+    Beliefs,
+    Motion,
+    Pair,
+    Plan,
+    Smoothed,
+)
 from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw, StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.supervisor import FRICTION, IMBALANCE
 from ringbalance.controller.eccentric_mass.strategy.targets import wrapped

@@ -37,12 +37,13 @@ from ringbalance.controller.eccentric_mass.strategy.lqr_law import (
     motor_torques,
     share_of_friction,
 )
-from ringbalance.controller.eccentric_mass.strategy.plan import Facts, Plan
-from ringbalance.controller.eccentric_mass.strategy.records import (
+from ringbalance.controller.eccentric_mass.strategy.plan import (
     Beliefs,
     EccentricMeasurement,
+    Facts,
     Motion,
     Pair,
+    Plan,
     Smoothed,
     StrategyState,
     Whirl,

@@ -7,13 +7,6 @@ import math
 from typing import Final
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.eccentric_mass.strategy.fine_tuning import (
-    Tuning,
-    separation,
-    tuning_next,
-    tuning_place,
-    tuning_start,
-)
 from ringbalance.controller.eccentric_mass.strategy.plan import (
     HELD,
     MOVING,
@@ -28,7 +21,15 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
     Progress,
     Stage,
 )
-from ringbalance.controller.eccentric_mass.strategy.targets import assign, target_angles
+from ringbalance.controller.eccentric_mass.strategy.targets import (
+    Tuning,
+    assign,
+    separation,
+    target_angles,
+    tuning_next,
+    tuning_place,
+    tuning_start,
+)
 
 # Plain numbers: the compiler takes enumerations, but not as fast.
 WAITING, IMBALANCE, FRICTION, POSITIONING, CHECK, FINE_TUNING, REST, FAILED = map(int, Stage)

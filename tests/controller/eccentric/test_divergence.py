@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from ringbalance.controller.eccentric_mass.document import eccentric_document
+from ringbalance.controller.eccentric_mass.document import eccentric_document, show_eccentric
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
-from ringbalance.controller.eccentric_mass.show import show_eccentric
 from ringbalance.scene import EccentricScene, SceneError, bundled_scene, load_scene
 from ringbalance.verification.eccentric_mass.scenes import changed
 

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from ringbalance.controller.eccentric_mass.strategy.fine_tuning import (
+from ringbalance.controller.eccentric_mass.strategy.targets import (
     MOVES,
     Tuning,
     separation,

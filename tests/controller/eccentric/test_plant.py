@@ -12,16 +12,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass.plant import integrate
-from ringbalance.controller.eccentric_mass.plant.friction import LOCKED, SLIDING, STUCK
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant, run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at, turned
 from ringbalance.controller.eccentric_mass.plant.plant import (
+    LOCKED,
+    SLIDING,
+    STUCK,
     drive_of,
     electrical_energy,
     rest_state,
     stuck_flags,
 )
-from ringbalance.controller.eccentric_mass.plant.speed import speed_at, turned
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.eccentric_models import SpeedPoint

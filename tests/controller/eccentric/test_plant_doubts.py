@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant.open_loop import PlantRun, run_plant
+from ringbalance.controller.eccentric_mass.plant.open_loop import _PlantRun, run_plant
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray
@@ -126,7 +126,7 @@ def balanced_angles(p: PlantParameters, error: float) -> tuple[float, float]:
     return p.phase + half, p.phase - half
 
 
-def run_up(scene: EccentricScene, angles: tuple[float, float]) -> PlantRun:
+def run_up(scene: EccentricScene, angles: tuple[float, float]) -> _PlantRun:
     """The paper's run-up from 100 rpm with the drives off; four times as fast, to be quick."""
     corners = (SpeedPoint(time=0.0, speed=SPEED), SpeedPoint(time=32.5, speed=230 * RPM))
     return run_plant(

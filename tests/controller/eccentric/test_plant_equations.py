@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from ringbalance.controller.eccentric_mass.plant.friction import BACKWARDS, FORWARDS
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import Drive, write_derivative
+from ringbalance.controller.eccentric_mass.plant.plant import BACKWARDS, FORWARDS, Drive, write_derivative
 
 T = sp.Symbol("t")
 M_R, M_IM, R_IM, PHASE = sp.symbols("m_r m_im r_im phi_m", positive=True)

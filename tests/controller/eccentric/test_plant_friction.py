@@ -13,23 +13,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant.friction import (
+from ringbalance.controller.eccentric_mass.plant.integrate import held_step, plant_step
+from ringbalance.controller.eccentric_mass.plant.open_loop import run_steps
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant.plant import (
     BACKWARDS,
     FORWARDS,
     HELD,
     LOCKED,
     SLIDING,
     STUCK,
-    Torques,
-    angular_accelerations,
-    motions,
-)
-from ringbalance.controller.eccentric_mass.plant.integrate import held_step, plant_step
-from ringbalance.controller.eccentric_mass.plant.open_loop import run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import (
     Drive,
+    _Torques,
+    angular_accelerations,
     drive_of,
+    motions,
     rest_state,
     stuck_flags,
     write_derivative,
@@ -236,7 +234,7 @@ def test_friction_never_gives_energy(parameters: PlantParameters) -> None:
     assert energy[-1] < 0.1 * energy[0]
 
 
-def consistent_motions(torques: Torques) -> Iterator[tuple[int, int]]:
+def consistent_motions(torques: _Torques) -> Iterator[tuple[int, int]]:
     """All combinations that the law of friction allows, by its definition."""
     most = (torques.friction_1, torques.friction_2)
     for motion in product((HELD, FORWARDS, BACKWARDS), repeat=2):
@@ -259,7 +257,7 @@ def consistent_motions(torques: Torques) -> Iterator[tuple[int, int]]:
 def test_the_motion_from_rest_is_the_one_that_the_law_allows(
     driving: tuple[float, float], friction: tuple[float, float], cross: float
 ) -> None:
-    torques = Torques(1.0, cross, *driving, *friction)
+    torques = _Torques(1.0, cross, *driving, *friction)
     found = motions(torques, rest_state((0.0, 1.0)), stuck_flags(STUCK))
     accelerations = angular_accelerations(torques, *found)
     # At the bound of the torque two motions are the same: what counts is the acceleration.

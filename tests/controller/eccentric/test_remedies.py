@@ -13,13 +13,13 @@ import pytest
 from scipy.stats import chi2
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
+from ringbalance.controller.eccentric_mass.plant.open_loop import check_substeps, longest_run
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.substep_limit import check_substeps, longest_run
 from ringbalance.controller.eccentric_mass.remedies import (
+    _friction_floor,
     _more_time,
     _slower_walks,
     found_beforehand,
-    friction_floor,
 )
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, Remedy
@@ -229,7 +229,7 @@ def test_the_friction_filters_floor_is_where_its_variance_stays(scene: Eccentric
     found = math.sqrt(float(run.estimates.friction_variance[last, 0]))
     # The masses turn as well: b (W + w)^2 in place of b W^2.
     speed = scene.rotor.speed_profile[0].speed + scene.friction_filter.drive_speed
-    assert found == pytest.approx(friction_floor(rough, speed=speed), rel=0.1)
+    assert found == pytest.approx(_friction_floor(rough, speed=speed), rel=0.1)
 
 
 def test_an_encoders_noise_keeps_up_a_floor_that_the_arms_walk_lowers(scene: EccentricScene) -> None:
@@ -237,13 +237,15 @@ def test_an_encoders_noise_keeps_up_a_floor_that_the_arms_walk_lowers(scene: Ecc
     speed = scene.rotor.speed_profile[0].speed
     noisy = changed(scene, "friction_filter", rate_walk=1e-9, friction_walk=1e-4, rate_noise=0.1)
     calmer = changed(noisy, "friction_filter", friction_walk=1e-4 / 16)
-    assert friction_floor(noisy, speed=speed) == pytest.approx(8 * friction_floor(calmer, speed=speed), 1e-4)
-    target = friction_floor(noisy, speed=speed) / 2
+    assert _friction_floor(noisy, speed=speed) == pytest.approx(
+        8 * _friction_floor(calmer, speed=speed), 1e-4
+    )
+    target = _friction_floor(noisy, speed=speed) / 2
     told = noisy
     for key, value in _slower_walks(noisy, target, speed=speed):
         told = changed(told, "friction_filter", **{key.split(".")[1]: value})
     assert told.friction_filter.friction_walk < noisy.friction_filter.friction_walk
-    assert 0.5 * target < friction_floor(told, speed=speed) <= 1.001 * target
+    assert 0.5 * target < _friction_floor(told, speed=speed) <= 1.001 * target
 
 
 def random_scene(number: int) -> EccentricScene:

@@ -14,13 +14,12 @@ import pytest
 from rich.console import Console
 
 import ringbalance
-from ringbalance.controller.eccentric_mass.document import eccentric_document
+from ringbalance.controller.eccentric_mass.document import eccentric_document, show_eccentric
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, EccentricRun
-from ringbalance.controller.eccentric_mass.show import show_eccentric
-from ringbalance.controller.eccentric_mass.strategy.records import EccentricMeasurement
+from ringbalance.controller.eccentric_mass.strategy.plan import EccentricMeasurement
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
 from ringbalance.reports.simulate_cli import simulate as command

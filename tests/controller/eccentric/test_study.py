@@ -12,8 +12,8 @@ import pytest
 from ringbalance.controller.eccentric_mass import study as study_module
 from ringbalance.controller.eccentric_mass.study import (
     DRAWS,
-    EccentricStudy,
     Requirement,
+    _EccentricStudy,
     eccentric_study,
     interval,
 )
@@ -24,19 +24,19 @@ from ringbalance.verification.eccentric_mass.scenes import changed
 
 
 @pytest.fixture(scope="module")
-def study() -> EccentricStudy:
+def study() -> _EccentricStudy:
     scene = eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
     return eccentric_study(replace(scene, uncertainty=()))
 
 
-def test_the_locked_run_is_what_balancing_is_judged_by(study: EccentricStudy) -> None:
+def test_the_locked_run_is_what_balancing_is_judged_by(study: _EccentricStudy) -> None:
     assert study.locked.outcome.value == "locked"
     assert study.locked.unbalanced_amplitude == study.run.unbalanced_amplitude
     assert study.locked.worst_amplitude > study.run.worst_amplitude
     assert json.loads(json.dumps(study.document(), allow_nan=False))["locked"]["settled"] is False
 
 
-def test_the_moment_of_both_masses_side_by_side_is_the_capacity(study: EccentricStudy) -> None:
+def test_the_moment_of_both_masses_side_by_side_is_the_capacity(study: _EccentricStudy) -> None:
     masses = study.scene.masses
     side_by_side = math.cos(masses.arc_length / masses.guide_radius / 2)
     row = next(row for row in study.requirements if row.quantity == "balancing moment")
@@ -44,14 +44,14 @@ def test_the_moment_of_both_masses_side_by_side_is_the_capacity(study: Eccentric
     assert row.required == pytest.approx(study.scene.imbalance.mass * study.scene.imbalance.radius)
 
 
-def test_a_requirement_that_is_missed_says_so(study: EccentricStudy) -> None:
+def test_a_requirement_that_is_missed_says_so(study: _EccentricStudy) -> None:
     assert all(row.met for row in study.requirements)
     heavy = changed(study.scene, "imbalance", mass=3 * study.scene.imbalance.mass)
     missed = {row.quantity for row in eccentric_study(heavy).requirements if not row.met}
     assert {"balancing moment", "amplitude at the end", "settling time"} <= missed
 
 
-def test_a_loop_at_its_gain_margin_is_at_the_edge(study: EccentricStudy) -> None:
+def test_a_loop_at_its_gain_margin_is_at_the_edge(study: _EccentricStudy) -> None:
     speed = study.tuning.gains.speed
     edge = changed(study.scene, "friction_filter", speed_gain=speed.value * speed.gain_margin * (1 + 1e-6))
     beyond = eccentric_study(replace(edge, run=replace(edge.run, time_limit=1.0)))
@@ -85,7 +85,7 @@ def rows_of(scene: EccentricScene, *, draws: int = DRAWS) -> dict[str, Requireme
         return {row.quantity: row for row in eccentric_study(scene).requirements}
 
 
-def test_the_interval_of_the_capacity_follows_from_both_inputs(study: EccentricStudy) -> None:
+def test_the_interval_of_the_capacity_follows_from_both_inputs(study: _EccentricStudy) -> None:
     """The capacity is proportional to the mass of each; the need to that of the imbalance.
 
     Both are known before the run begins.
@@ -122,7 +122,7 @@ def test_95_per_cent_of_further_draws_lie_in_an_interval() -> None:
     assert np.mean(inside) == pytest.approx(0.95, abs=0.006)
 
 
-def test_an_unknown_stiffness_is_one_that_the_controller_does_not_know(study: EccentricStudy) -> None:
+def test_an_unknown_stiffness_is_one_that_the_controller_does_not_know(study: _EccentricStudy) -> None:
     """The whirl that is left is what the error of the estimated imbalance gives, D_b/D - 1 of it."""
     exact = rows_of(uncertain(study.scene))["amplitude at the end"]
     row = rows_of(uncertain(study.scene, rotor__stiffness=(0.003, True)), draws=5)["amplitude at the end"]
@@ -140,7 +140,7 @@ def test_an_unknown_stiffness_is_one_that_the_controller_does_not_know(study: Ec
     assert row.effects["rotor.stiffness"][0] == pytest.approx(left, abs=12e-6)
 
 
-def test_an_input_that_loses_a_result_leaves_it_open(study: EccentricStudy) -> None:
+def test_an_input_that_loses_a_result_leaves_it_open(study: _EccentricStudy) -> None:
     """An imbalance within reach, or beyond it at the upper end of its interval."""
     row = rows_of(uncertain(study.scene, imbalance__mass=(0.5, True)))
     reach = rows_of(uncertain(study.scene, imbalance__radius=(0.24, False)), draws=5)

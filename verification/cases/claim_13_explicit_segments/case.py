@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.closed_form import closed_form
+from ringbalance.controller.liquid_ring.integrators import closed_form
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.models import Scene

@@ -8,8 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.closed_form import closed_form
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import closed_form, quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.paper import stall_pressure

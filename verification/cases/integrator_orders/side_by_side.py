@@ -10,8 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.closed_form import closed_form
-from ringbalance.controller.liquid_ring.quadrature import quadrature
+from ringbalance.controller.liquid_ring.integrators import closed_form, quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive, Integrator
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.paper_law import PaperLaw

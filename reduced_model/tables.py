@@ -1,8 +1,14 @@
-"""Making a smooth table from samples of a function."""
+"""A smooth table: quintic Hermite pieces on a uniform grid, evaluated and inverted without any other library.
+
+The nodes hold value, slope and curvature, so a saved table gives the same bits wherever it is read again, and
+compiled code needs nothing but the three arrays.  Another table goes here when a calibration or compiled code
+reads it: scipy.interpolate alone takes longer to import than these take to make.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
@@ -10,8 +16,108 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.splines import monotone_slopes
-from ringbalance.reduced_model.tables.hermite import HermiteTable, quintic
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, clipped
+
+_NEWTON_STEPS = 5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HermiteTable:
+    """y(x) on x = start + i step; beyond the ends it continues straight."""
+
+    start: float
+    """x of the first node."""
+    step: float
+    """Distance of the nodes."""
+    value: FloatArray
+    """y at the nodes, shape (n,), n at least 2; read-only."""
+    slope: FloatArray
+    """dy/dx at the nodes, shape (n,); read-only."""
+    curvature: FloatArray
+    """d2y/dx2 at the nodes, shape (n,); read-only."""
+
+    def __post_init__(self) -> None:
+        """Copy the arrays, so that nothing outside can change the table."""
+        for name in ("value", "slope", "curvature"):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            if array.ndim != 1 or array.size < 2 or array.size != np.size(self.value):
+                raise ValueError("a table needs value, slope and curvature at the same two nodes or more")
+            if not np.all(np.isfinite(array)):
+                raise ValueError(f"{name} must be finite")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        if not (np.isfinite(self.start) and np.isfinite(self.step) and self.step > 0):
+            raise ValueError("start must be finite and step positive")
+        object.__setattr__(self, "_pieces", _polynomials(self))
+
+    @property
+    def nodes(self) -> FloatArray:
+        """x of the nodes, shape (n,)."""
+        return np.asarray(self.start + self.step * np.arange(self.value.size), dtype=np.float64)
+
+    @property
+    def coefficients(self) -> FloatArray:
+        """Coefficients of the pieces in t from 0 to 1, ascending powers, shape (6, n - 1)."""
+        pieces: FloatArray = self.__dict__["_pieces"]
+        return pieces[:6]
+
+    def __call__(self, x: npt.ArrayLike) -> FloatArray:
+        """Value at any x."""
+        return self.with_slope(x)[0]
+
+    def with_slope(self, x: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Value and slope at any x."""
+        place = (np.asarray(x, dtype=np.float64) - self.start) / self.step
+        cell = clipped(np.floor(place), 0, self.value.size - 2).astype(np.intp)
+        t = clipped(place - cell, 0.0, 1.0)
+        y, slope = self._within(cell, t)
+        beyond = place - cell - t
+        return np.asarray(y + beyond * self.step * slope), slope
+
+    def _within(self, cell: npt.NDArray[np.intp], t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        pieces: FloatArray = self.__dict__["_pieces"]
+        a0, a1, a2, a3, a4, a5, d2, d3, d4, d5 = pieces[:, cell]
+        y = a0 + t * (a1 + t * (a2 + t * (a3 + t * (a4 + t * a5))))
+        slope = (a1 + t * (d2 + t * (d3 + t * (d4 + t * d5)))) / self.step
+        return np.asarray(y, dtype=np.float64), np.asarray(slope, dtype=np.float64)
+
+    def inverse(self, y: npt.ArrayLike) -> FloatArray:
+        """The x of a value, for a table that grows from node to node."""
+        wanted = np.asarray(y, dtype=np.float64)
+        cell = np.minimum(np.maximum(np.searchsorted(self.value, wanted) - 1, 0), self.value.size - 2)
+        low = self.value[cell]
+        t = clipped((wanted - low) / (self.value[cell + 1] - low), 0.0, 1.0)
+        for _ in range(_NEWTON_STEPS):
+            found, slope = self._within(cell, t)
+            better = clipped(t + (wanted - found) / (self.step * slope), 0.0, 1.0)
+            if (better == t).all():
+                break
+            t = better
+        else:
+            found, slope = self._within(cell, t)
+        return np.asarray(self.start + self.step * (cell + t) + (wanted - found) / slope, dtype=np.float64)
+
+
+def _quintic(
+    rise: FloatArray, turn: FloatArray, bend: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Third to fifth coefficient of a piece from 0 to 1.
+
+    By what its lower ones leave of value, slope and curvature at its end.
+    """
+    return 10 * rise - 4 * turn + bend / 2, -15 * rise + 7 * turn - bend, 6 * rise - 3 * turn + bend / 2
+
+
+def _polynomials(table: HermiteTable) -> FloatArray:
+    """Coefficients of every piece in t from 0 to 1, of the value from t^0 up and of its slope from t^1 up."""
+    h = table.step
+    y0, d0, c0 = table.value[:-1], h * table.slope[:-1], h * h * table.curvature[:-1] / 2
+    rise = table.value[1:] - y0 - d0 - c0
+    turn = h * table.slope[1:] - d0 - 2 * c0
+    bend = h * h * table.curvature[1:] - 2 * c0
+    a3, a4, a5 = _quintic(rise, turn, bend)
+    return np.array([y0, d0, c0, a3, a4, a5, 2 * c0, 3 * a3, 4 * a4, 5 * a5])
+
 
 _REACH: Final = 50
 """Samples after which a quintic spline's response has fallen by 0.43^50."""
@@ -67,7 +173,7 @@ def _joints(count: int) -> tuple[FloatArray, FloatArray]:
     identity = np.eye(3 * count)
     y, d, c = identity[:count], identity[count : 2 * count], identity[2 * count :] / 2
     rise, turn, bend = y[1:] - y[:-1] - d[:-1] - c[:-1], d[1:] - d[:-1] - 2 * c[:-1], 2 * (c[1:] - c[:-1])
-    a3, a4, a5 = quintic(rise, turn, bend)
+    a3, a4, a5 = _quintic(rise, turn, bend)
     third = (a3 + 4 * a4 + 10 * a5)[:-1] - a3[1:]
     fourth = (a4 + 5 * a5)[:-1] - a4[1:]
     fifth = (a5[:-1] - a5[1:])[[0, 1, -2, -1]]

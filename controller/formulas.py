@@ -1,0 +1,246 @@
+"""Pure functions of numbers that a single run interprets and an ensemble compiles.
+
+One formula, one place: each calls nothing but `math`, so that it is compiled as it stands.  Paths of a flow,
+x(t), are a cubic between two nodes, in both directions, and the parabola of a linear law; the target-vector
+algorithm goes from what a sensor shows to valve-open times; gas flows through a valve or line by ISO 6358;
+and the loop stops cycling for a cause, by what counts as a rise, a turn and a movement.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Final, TypeVar
+
+from ringbalance.scene.arrays import FloatArray
+
+Number = TypeVar("Number", float, FloatArray)
+
+_MOST_NEWTON: Final = 60
+_CLOSE: Final = 1e-15
+"""Step of Newton's method, as a part of a piece, that ends it."""
+
+
+def piece_rise(part: Number, rise: Number, d0: Number, d1: Number) -> Number:
+    """Change of x after a part of a piece's time; `d0` and `d1` are dx/dt at its ends times its duration."""
+    return part * (d0 + part * (3.0 * rise - 2.0 * d0 - d1 + part * (d0 + d1 - 2.0 * rise)))
+
+
+def piece_part(wanted: float, rise: float, d0: float, d1: float) -> float:
+    """The part of a piece's time after which x has changed by `wanted`; the inverse of `piece_rise`.
+
+    Newton's method within a shrinking bracket.
+    """
+    if rise == 0.0:
+        return 0.0
+    a2, a3 = 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise
+    low, high, s = 0.0, 1.0, min(max(wanted / rise, 0.0), 1.0)
+    for _ in range(_MOST_NEWTON):
+        excess = s * (d0 + s * (a2 + s * a3)) - wanted
+        if excess * rise < 0.0:
+            low = s
+        else:
+            high = s
+        slope = d0 + s * (2.0 * a2 + 3.0 * s * a3)
+        step = s - excess / slope if slope != 0.0 else -1.0
+        before = s
+        s = step if low <= step <= high else (low + high) / 2.0
+        if abs(s - before) <= _CLOSE:
+            break
+    return s
+
+
+def linear_course(
+    fill: float,
+    squared_per_pressure: float,
+    pressure_per_fill: float,
+    gas_pressure: float,
+    exchange_rate: float,
+    total: float,
+    lowest: float,
+) -> tuple[float, float, float, bool]:
+    """Path of a flow whose squared velocity is linear in the fill ratio: a parabola in time.
+
+    u^2 = a (p + b (2x - total)) gives du/dt = -a b S/V; it ends at a velocity of zero or at the lowest fill,
+    where D = (S/V) t (u0 + u_end)/2 with u_end^2 = u0^2 - 2 a b D.
+    Returns: Initial velocity (m/s, zero where nothing flows), decrease (m/s^2), end (s), whether it stalls.
+    """
+    squared = squared_per_pressure * (gas_pressure + pressure_per_fill * (2.0 * fill - total))
+    slowing = squared_per_pressure * pressure_per_fill * exchange_rate
+    if squared <= 0.0 or gas_pressure <= 0.0:
+        return 0.0, slowing, 0.0, True
+    u0 = math.sqrt(squared)
+    distance = (fill - lowest) / exchange_rate
+    left = squared - 2.0 * slowing * distance
+    if left <= 0.0:
+        return u0, slowing, u0 / slowing, True
+    return u0, slowing, 2.0 * distance / (u0 + math.sqrt(left)), False
+
+
+def vector_gas_time(
+    amplitude: float,
+    phase: float,
+    time: float,
+    integral: float,
+    before_amplitude: float,
+    before_phase: float,
+    before_time: float,
+    proportional: float,
+    integral_time: float,
+    derivative_time: float,
+    maximum_gas_time: float,
+    resets: bool,
+) -> tuple[float, float]:
+    """PID on the amplitude, T = Kc (e + 1/Ti int e dt + Td de/dt), s, not limited yet, and the new integral.
+
+    An infinite `before_time`: there was no sample before; an infinite Ti: no integral part. While T is above
+    `maximum_gas_time` the integral stands still; with `resets` it is dropped when the residual has turned by
+    more than 90 degrees.
+    """
+    dt = time - before_time
+    if not dt > 0.0:
+        return proportional * amplitude, integral
+    turned = resets and math.cos(phase - before_phase) < 0.0
+    summed = 0.0 if turned else integral + (amplitude + before_amplitude) / 2.0 * dt
+    slope = derivative_time * (amplitude - before_amplitude) / dt
+    wanted = proportional * (amplitude + summed / integral_time + slope)
+    if turned or wanted <= maximum_gas_time:
+        return wanted, summed
+    return wanted, integral
+
+
+def vector_shares(
+    chambers: int, angle: float, length: float, at_residual: Sequence[bool]
+) -> tuple[int, float, int, float]:
+    """Split a vector over the two chamber directions on either side of it; see `target_vector.components`.
+
+    Args: `at_residual`: of every chamber, whether it is passed over for the next one.
+    Returns: Chamber index and share of either; a share of zero where one chamber takes all.
+    """
+    if chambers == 2:
+        along = length * math.cos(angle)
+        return (0, along, 1, 0.0) if along >= 0.0 else (1, -along, 0, 0.0)
+    spacing = 2.0 * math.pi / chambers
+    turn = angle % (2.0 * math.pi)
+    nearest = min(int(turn / spacing), chambers - 1)
+    before, after = nearest, nearest + 1
+    while at_residual[before % chambers] and after - before < chambers:
+        before -= 1
+    while at_residual[after % chambers] and after - before < chambers:
+        after += 1
+    if 2 * (after - before) >= chambers:
+        before, after = nearest, nearest + 1
+    between, past = (after - before) * spacing, turn - before * spacing
+    scale = length / math.sin(between)
+    return (
+        before % chambers,
+        scale * max(math.sin(between - past), 0.0),
+        after % chambers,
+        scale * max(math.sin(past), 0.0),
+    )
+
+
+def valve_time(share: float, offset: float, minimum_gas_time: float, maximum_gas_time: float) -> float:
+    """Time for which a valve opens, s: the share and its offset, at most the maximum; none for a share below
+    the minimum.
+    """
+    return min(share + offset, maximum_gas_time) if share > 0.0 and share >= minimum_gas_time else 0.0
+
+
+LAMINAR_RATIO: Final = 0.999
+"""Pressure ratio above which the conductance is taken as laminar."""
+
+
+def flow_shape(ratio: float, critical_ratio: float) -> float:
+    """phi(r), the mass flow over its choked value: 1 up to b, 0 at r = 1.
+
+    An ellipse above b, and straight from r = 0.999 on, where the flow is laminar and its slope infinite.
+    """
+    if ratio <= critical_ratio:
+        return 1.0
+    held = min(ratio, max(LAMINAR_RATIO, critical_ratio))
+    ellipse = math.sqrt(max(1.0 - ((held - critical_ratio) / (1.0 - critical_ratio)) ** 2, 0.0))
+    return ellipse if ratio == held else ellipse * (1.0 - ratio) / (1.0 - held)
+
+
+def flow_shape_slope(ratio: float, critical_ratio: float, shape: float) -> float:
+    """dphi/dr, with phi(r) given."""
+    if ratio <= critical_ratio:
+        return 0.0
+    if ratio > max(LAMINAR_RATIO, critical_ratio):
+        return -shape / max(1.0 - ratio, 1e-300)
+    return -(ratio - critical_ratio) / (1.0 - critical_ratio) ** 2 / max(shape, 1e-300)
+
+
+NOTICEABLE: Final = 1e-12
+"""Change of a fill ratio that counts as movement."""
+
+
+class Cause(IntEnum):
+    """Why the loop stopped cycling."""
+
+    NONE = 0
+    """It goes on."""
+    RISING = 1
+    """The amplitude rose after more operations in a row than the algorithm can explain."""
+    IDLE = 2
+    """Several commands in a row whose longest injection moved no liquid."""
+    AT_REST = 3
+    """The controller rests, the sensor is exact and no liquid can move: nothing will change."""
+    TIME = 4
+    SAMPLES = 5
+    """The bound on the number of samples."""
+    HELD = 6
+    """The amplitude has been within its limit for the hold time and is expected to stay."""
+
+
+NONE: Final = int(Cause.NONE)
+RISING: Final = int(Cause.RISING)
+IDLE: Final = int(Cause.IDLE)
+AT_REST: Final = int(Cause.AT_REST)
+TIME: Final = int(Cause.TIME)
+HELD: Final = int(Cause.HELD)
+"""The same as whole numbers, which is what compiled code knows."""
+
+
+def stop_cause(
+    held: bool,
+    rises: int,
+    rises_tolerated: int,
+    above_first: bool,
+    idle: int,
+    idle_tolerated: int,
+    final: bool,
+    time_left: float,
+) -> int:
+    """Number of the cause for which a loop ends after a sample; zero: it continues."""
+    if held:
+        return HELD
+    if rises > rises_tolerated or (rises == rises_tolerated and above_first):
+        return RISING
+    if idle >= idle_tolerated:
+        return IDLE
+    if final:
+        return AT_REST
+    return TIME if time_left <= 0.0 else NONE
+
+
+def has_held(time: float, since: float, hold_time: float) -> bool:
+    """Whether an amplitude within its limit since an instant, infinite for none, has held, all in s."""
+    return time - since >= hold_time * (1.0 - 1e-9)
+
+
+def has_grown(cause: int, higher: bool) -> bool:
+    """Whether a run that has not settled made the vibration worse: it ended rising, or idle and `higher`."""
+    return cause == RISING or (cause == IDLE and higher)
+
+
+def has_risen(before: float, after: float, floor: float) -> bool:
+    """Whether an amplitude rose by more than the noise floor, all in m."""
+    return after - before > floor
+
+
+def has_turned(before: float, after: float) -> bool:
+    """Whether a phase turned by more than 90 degrees, rad; a jump by a whole turn is no turn."""
+    return math.cos(after - before) < 0.0

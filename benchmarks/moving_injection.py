@@ -25,7 +25,8 @@ from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_motion import begin
 from ringbalance.controller.ensemble.transfer import RELATIVE_ERROR
 from ringbalance.controller.formulas import flow_shape
-from ringbalance.controller.liquid_ring.compiled_march import advance, command
+from ringbalance.controller.liquid_ring.compiled_events import command
+from ringbalance.controller.liquid_ring.compiled_march import advance
 from ringbalance.controller.liquid_ring.motion import Dynamics, Lift
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
 from ringbalance.controller.terms import dynamics_of

@@ -42,7 +42,7 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.convergence import gci
 from ringbalance.physics.sloshing.modes import sloshing_modes
 from ringbalance.physics.sloshing.response import sloshing_response
-from ringbalance.physics.tube.numbers import rotation_reynolds_number
+from ringbalance.physics.tube.friction import rotation_reynolds_number
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.physics.tube.state import tube_state_at
 from ringbalance.physics.tube.uncertainty import model_parts

@@ -16,8 +16,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.tube.loss import TubeLoss, tube_loss
-from ringbalance.physics.tube.range import VELOCITIES
+from ringbalance.physics.tube.loss import VELOCITIES, TubeLoss, tube_loss
 from ringbalance.reduced_model.budget import Budget, budgets
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.gravity import check_ring

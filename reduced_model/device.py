@@ -11,7 +11,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.physics.tube.draw_down import draw_down_depth
+from ringbalance.physics.tube.ends import draw_down_depth
 from ringbalance.physics.tube.uncertainty import TUBE_INPUTS
 from ringbalance.reduced_model.chamber.inputs import measured_closed_forms
 from ringbalance.reduced_model.law.building import tube_path

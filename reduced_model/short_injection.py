@@ -202,7 +202,8 @@ class ShortInjection:
 
     def shortest(self, least: float) -> _Moved:
         """By the shortest valve-open time that primes the tube and is not below `least`, s."""
-        return self._closed(self._opened(least))
+        now = self._primed
+        return self._least if now.time >= least else self._closed(self._open(now, least))
 
     def dead_time(self, metres: float, *, least: float = 0.0) -> float:
         """Of the injection that moves the column by `metres`, or of the shortest that moves more, s."""
@@ -230,12 +231,10 @@ class ShortInjection:
             now = self._open(now, now.time + _INSTANT)
         return now
 
-    def _opened(self, opening: float) -> _Moved:
-        """When the valve shuts, at the earliest as the tube is primed."""
-        now = self._primed
-        if now.time >= opening:
-            return now
-        return self._open(now, opening)
+    @cached_property
+    def _least(self) -> _Moved:
+        """With the valve shut as the tube is primed."""
+        return self._closed(self._primed)
 
     def _open(self, now: _Moved, until: float) -> _Moved:
         """Of a primed tube, up to a time, s."""

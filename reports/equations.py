@@ -20,7 +20,7 @@ _USE: Final = re.compile(r'href="#([^"]+)"')
 
 
 @dataclass(frozen=True, kw_only=True)
-class Equation:
+class _Equation:
     """One displayed equation."""
 
     latex: str
@@ -31,10 +31,10 @@ class Equation:
 
 
 @cache
-def equations() -> Mapping[str, Equation]:
+def equations() -> Mapping[str, _Equation]:
     """The displayed equations of the report's sections, by name."""
     text = files("ringbalance.reports").joinpath("templates", "equations.toml").read_text(encoding="utf-8")
-    return {name: Equation(**entry) for name, entry in tomllib.loads(text).items()}
+    return {name: _Equation(**entry) for name, entry in tomllib.loads(text).items()}
 
 
 @cache

@@ -16,10 +16,9 @@ from PIL import Image
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
-from ringbalance.reports.figures.chamber import chamber_figures
+from ringbalance.reports.figures.calibration import chamber_figures, tube_figures
 from ringbalance.reports.figures.loop import loop_figures
 from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.figures.tube import tube_figures
 from ringbalance.reports.numbers import (
     PLUS_MINUS,
     display_unit,
@@ -32,9 +31,9 @@ from ringbalance.reports.numbers import (
 )
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.eccentric_scene import BALANCER
+from ringbalance.reports.prose import traced
 from ringbalance.reports.section import Cells, Record, Table
 from ringbalance.reports.sections import drawings_in, section_views, viewed
-from ringbalance.reports.traces import traced
 
 Facts = tuple[tuple[str, str], ...]
 """Labels and texts."""
@@ -62,11 +61,6 @@ _PICTURE_WIDTH: Final = 1000
 _PICTURE_QUALITY: Final = 80
 _PICTURE_EFFORT: Final = 2
 """Of 6; more saves a twentieth of the bytes in twice the time."""
-
-
-def _page_figures(evidence: Record) -> Record:
-    """The figures of the sections, by name; one whose evidence is missing is None."""
-    return chamber_figures(evidence) | tube_figures(evidence) | loop_figures(evidence)
 
 
 def _column(values: list[float], unit: str, *, digits: int = 6) -> list[str]:
@@ -238,7 +232,7 @@ def page_content(
     if evidence.get("balancer") == BALANCER:
         sections = viewed(evidence, sections_by(evidence))
         return PageContent(context=_frame(evidence, sections), drawings=tuple(drawings_in(sections)))
-    figures, shown_pictures = _page_figures(evidence), _pictures(evidence["pictures"], pictures or {})
+    figures = chamber_figures(evidence) | tube_figures(evidence) | loop_figures(evidence)
     sections = viewed(evidence, sections_by(evidence))
     views = views_of(evidence["verification"])
     claims = [
@@ -250,10 +244,10 @@ def page_content(
     context = {
         **_frame(evidence, sections),
         "tallies": _tallies(evidence),
-        "causes": _causes(evidence),
+        "causes": summary.common_causes(summary.claims(evidence)),
         "equations": _equations(),
         "figures": figures,
-        "pictures": shown_pictures,
+        "pictures": _pictures(evidence["pictures"], pictures or {}),
         "chamber": _chamber_table(calibration["chamber"]),
         "drag_at": _drag_table(calibration["tube"], evidence["operating_point"]),
         "injections": _injections(runs.get("calibrated")),
@@ -264,7 +258,8 @@ def page_content(
         "models": _models(calibration["models_used"]),
         "mesh_facts": _mesh_facts(evidence["pressure"]["mesh"]),
     }
-    drawings = drawings_in([figures, sections, *(_own_drawings(case) for case in (*claims, *checks))])
+    own = [[case["order_plot"], *case["drawings"]] for case in (*claims, *checks)]
+    drawings = drawings_in([figures, sections, *own])
     return PageContent(context=context, drawings=tuple(drawings))
 
 
@@ -279,10 +274,6 @@ def _frame(evidence: Record, sections: list[Record]) -> Record:
         "version_facts": _version_facts(evidence),
         "product": f"ringbalance {evidence['versions']['ringbalance']}",
     }
-
-
-def _own_drawings(case: Record) -> list[Record]:
-    return [case["order_plot"], *case["drawings"]]
 
 
 def _stamp(evidence: Record) -> Facts:
@@ -306,15 +297,6 @@ def _tallies(evidence: Record) -> Record:
         "claims": summary.verdict_counts(summary.claims(evidence), summary.CLAIM_VERDICTS),
         "checks": summary.verdict_counts(summary.checks(evidence), summary.CHECK_VERDICTS),
     }
-
-
-def _causes(evidence: Record) -> list[str]:
-    """What several claims that do not simply hold have in common."""
-    return [
-        f"{found['cause']}: claims {', '.join(map(str, found['numbers']))}"
-        for found in summary.common_causes(summary.claims(evidence))
-        if len(found["numbers"]) > 1
-    ]
 
 
 def _equations() -> Record:

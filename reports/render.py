@@ -15,9 +15,9 @@ from ringbalance.reports import summary
 from ringbalance.reports.equations import GLYPHS, share_glyphs
 from ringbalance.reports.figures.style import DARK, LIGHT
 from ringbalance.reports.page import ANNEX, DOCUMENTS, PageContent, page_content
+from ringbalance.reports.prose import marked_up
 from ringbalance.reports.section import Record
 from ringbalance.reports.sections import PREFIXES
-from ringbalance.reports.traces import marked_up
 
 _STYLED: Final = re.compile(r'(<(?:path|g|text|tspan|use|rect|line|polyline|image)\b[^>]*?) style="([^"]*)"')
 _PART_ID: Final = re.compile(r'(<(?:path|g|defs|text)\b[^>]*?)( id="([^"]*)")')

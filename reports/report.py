@@ -20,6 +20,7 @@ from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
 from ringbalance.reports.pictures.view import VIEW, view_page
+from ringbalance.reports.prose import untraced
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Record
@@ -27,7 +28,6 @@ from ringbalance.reports.sections import section_view, sections_of
 from ringbalance.reports.summary import lead_sentence
 from ringbalance.reports.tables import FOLDER as TABLES
 from ringbalance.reports.tables import csv_tables
-from ringbalance.reports.traces import untraced
 from ringbalance.scene import AnyScene, Scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.platform.files import staged

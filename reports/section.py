@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING
-from ringbalance.reports.traces import untraced
+from ringbalance.reports.prose import untraced
 from ringbalance.scene import Scene
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from ringbalance.reports.numbers import percent
+from ringbalance.reports.prose import series
 from ringbalance.reports.section import Record
 
 CLAIM_VERDICTS: Final = ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run")
@@ -52,6 +53,15 @@ def worst(*verdicts: str) -> str:
     return next(verdict for verdict in (MISSED, OPEN, MET) if verdict in verdicts)
 
 
+def decided(judged: Sequence[tuple[str, str]]) -> str:
+    """One sentence on requirements, given by name and verdict: how many are met, and which are not."""
+    named = {v: [name for name, verdict in judged if verdict == v] for v in (MISSED, OPEN)}
+    met = len(judged) - sum(map(len, named.values()))
+    said = f"{met} of {len(judged)} requirements {'is' if met == 1 else 'are'} met"
+    parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
+    return "; ".join([said, *parts]) + "."
+
+
 def is_verdict(text: str) -> bool:
     """Whether a cell of a table is a verdict, which has a colour of its own."""
     return text in _TONES
@@ -89,17 +99,14 @@ def counted(cases: list[Record]) -> list[str]:
     return [f"{c['count']} {'is' if c['count'] == 1 else 'are'} {c['verdict']}" for c in counts]
 
 
-def common_causes(cases: list[Record]) -> list[Record]:
-    """Claims that do not simply hold, grouped by what they have in common; the largest group first."""
-    groups: dict[str, list[Record]] = {}
+def common_causes(cases: list[Record]) -> list[str]:
+    """What several claims that do not simply hold have in common; the most frequent cause first."""
+    groups: dict[str, list[str]] = {}
     for case in cases:
         if case.get("cause"):
-            groups.setdefault(case["cause"], []).append(case)
+            groups.setdefault(case["cause"], []).append(str(case["number"]))
     ordered = sorted(groups.items(), key=lambda group: -len(group[1]))
-    return [
-        {"cause": cause, "numbers": [c["number"] for c in group], "verdicts": [c["verdict"] for c in group]}
-        for cause, group in ordered
-    ]
+    return [f"{cause}: claims {', '.join(numbers)}" for cause, numbers in ordered if len(numbers) > 1]
 
 
 def lead_sentence(evidence: Record) -> str:
@@ -109,7 +116,9 @@ def lead_sentence(evidence: Record) -> str:
     own = [case for case in checks(evidence) if case not in measured]
     run = [case for case in own if case["verdict"] != "not run"]
     passed = sum(case["verdict"] == "passed" for case in run)
-    told = f"Of {len(claims(evidence))} claims of the liquid-ring paper {_series(parts)}. "
+    told = (
+        f"Of {len(claims(evidence))} claims of the liquid-ring paper {series(parts) or 'none was judged'}. "
+    )
     foreign = sum(elsewhere(case, evidence) for case in claims(evidence))
     if foreign:
         told += (
@@ -120,12 +129,6 @@ def lead_sentence(evidence: Record) -> str:
         confirmed = sum(case["verdict"] == "confirmed" for case in measured)
         told += f" Of {len(measured)} comparisons of parts with measurements, {confirmed} are confirmed."
     return told
-
-
-def _series(parts: list[str]) -> str:
-    if len(parts) < 2:
-        return parts[0] if parts else "none was judged"
-    return f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
 def elsewhere(case: Record, evidence: Record) -> bool:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +26,16 @@ def distinct(values: npt.ArrayLike) -> FloatArray:
 def clipped(values: npt.ArrayLike, low: float, high: float) -> FloatArray:
     """As np.clip, which takes three times as long for a few numbers."""
     return np.minimum(np.maximum(values, low), high)
+
+
+def stretches(values: Sequence[Any]) -> list[tuple[Any, slice]]:
+    """Stretches of equal values, each reaching to the first of the next so that a line has no gap."""
+    found, start = [], 0
+    for value, members in groupby(values):
+        stop = start + len(list(members))
+        found.append((value, slice(start, min(stop + 1, len(values)))))
+        start = stop
+    return found
 
 
 def finite(value: float | None) -> float | None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ringbalance.reports.numbers import MINUS, SCALES
-from ringbalance.reports.traces import evidence_at
+from ringbalance.reports.prose import evidence_at
 
 _TRACED: Final = re.compile(r'<span data-from="([^"]+)">(.*?)</span>')
 _NUMBER: Final = re.compile(

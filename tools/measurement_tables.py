@@ -20,7 +20,7 @@ from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.document import case_document, definition_document
 from ringbalance.verification.runner import paper_scene, run_case
 from ringbalance.verification.standing import HEADS, standing_rows
-from ringbalance.verification.validation.comparison import KINDS
+from ringbalance.verification.validation.kinds import KINDS
 
 _ROOT: Final = Path(__file__).resolve().parents[1]
 README: Final = _ROOT / "README.md"

@@ -11,7 +11,7 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import RestsOn
-from ringbalance.verification.eccentric_mass.scenes import changed
+from ringbalance.verification.eccentric_scenes import changed
 
 KNOWN: Final = ("given", "measured")
 """Origins of a value that somebody vouches for: it is taken as it stands."""

@@ -1,7 +1,13 @@
-"""A case's text and criteria, `case.toml`, as a validated record: the claim stands before the result."""
+"""A case's text and criteria, `case.toml`, as a validated record: the claim stands before the result.
+
+Numbers come into its prose from the evidence alone, at placeholders {name}, {name:unit} or
+{name:unit:format}, such as {stall:MPa}, {low:%:.1f} or {count:1:d}.
+"""
 
 from __future__ import annotations
 
+import math
+import re
 import tomllib
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -10,7 +16,6 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from ringbalance.verification.standing import SUBJECTS
-from ringbalance.verification.text import placeholders
 from ringbalance.verification.verdicts import VOCABULARY, Kind, Metric, Role, Verdict
 
 Text = Annotated[str, StringConstraints(min_length=3, strip_whitespace=True)]
@@ -31,7 +36,7 @@ CAUSES: Final[Mapping[str, str]] = MappingProxyType(
 """Common causes of a claim's departure, as readers see them."""
 Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
 Basis = Literal["total", "per unit depth", "pointwise", "ratio", "count", "time"]
-ReferenceKind = Literal[
+_ReferenceKind = Literal[
     "printed number",
     "printed formula",
     "closed form",
@@ -42,6 +47,30 @@ ReferenceKind = Literal[
     "definition",
 ]
 NEEDS_REFERENCE: tuple[Metric, ...] = ("validation", "within_uncertainty", "relative", "absolute")
+_UNITS = {
+    "": (1.0, ""),
+    "1": (1.0, ""),
+    "%": (100.0, " %"),
+    "MPa": (1e-6, " MPa"),
+    "kPa": (1e-3, " kPa"),
+    "Pa": (1.0, " Pa"),
+    "m": (1.0, " m"),
+    "mm": (1e3, " mm"),
+    "um": (1e6, " µm"),
+    "ml": (1e6, " ml"),
+    "g mm": (1e6, " g mm"),
+    "m/s": (1.0, " m/s"),
+    "s": (1.0, " s"),
+    "ms": (1e3, " ms"),
+    "g": (1e3, " g"),
+    "kg/m^3": (1.0, " kg/m³"),
+    "rpm": (30 / math.pi, " rpm"),
+    "deg": (180 / math.pi, "°"),
+    "N": (1.0, " N"),
+    "cSt": (1e6, " mm²/s"),
+    "um/(g*mm)": (1.0, " µm/(g mm)"),
+}
+_PLACEHOLDER = re.compile(r"\{([a-z][a-z0-9_]*)(?::([^:{}]*))?(?::([^{}]*))?\}")
 
 
 class CaseError(ValueError):
@@ -55,7 +84,7 @@ class _Record(BaseModel):
 class _ReferenceText(_Record):
     """Where the reference comes from and how far it is to be trusted."""
 
-    kind: ReferenceKind
+    kind: _ReferenceKind
     source: Text
     uncertainty: Text
     doubts: tuple[Text, ...] = ()
@@ -111,7 +140,7 @@ class Mutation(_Record):
     cost: Literal["light", "heavy"] = "light"
 
 
-class Study(_Record):
+class _Study(_Record):
     """A computation that several cases share, in place of a `case.py`."""
 
     of: Literal["pressure under gravity", "manufactured pressure", "choice of models", "measurements"]
@@ -144,7 +173,7 @@ class CaseDefinition(_Record):
     """One sentence for a designer, by verdict, or "default"."""
     equations: tuple[Text, ...]
     reference: _ReferenceText
-    study: Study | None = None
+    study: _Study | None = None
     """What computes it where the folder has no `case.py`."""
     judged_on: Literal["scene", "paper"] = "scene"
     """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
@@ -244,3 +273,45 @@ class CaseDefinition(_Record):
 def _unique(what: str, names: list[str]) -> None:
     if len(set(names)) != len(names):
         raise ValueError(f"{what}: a name stands twice in {names}")
+
+
+def placeholders(text: str) -> tuple[str, ...]:
+    """Names of the numbers that a text asks for, in order of appearance.
+
+    Raises: ValueError: a unit that is not known, or braces that are not a placeholder.
+    """
+    for match in _PLACEHOLDER.finditer(text):
+        if (match[2] or "") not in _UNITS:
+            raise ValueError(f"placeholder {match[0]} has an unknown unit; known: {', '.join(_UNITS)}")
+    rest = _PLACEHOLDER.sub("", text)
+    if "{" in rest or "}" in rest:
+        raise ValueError(f"braces that are no placeholder in: {text}")
+    return tuple(match[1] for match in _PLACEHOLDER.finditer(text))
+
+
+def fill(text: str, numbers: Mapping[str, float]) -> str:
+    """A text with SI values put in by name.
+
+    Each is written in the unit that its placeholder names, to four significant digits unless that has a
+    format, and held to its unit by a no-break space.
+    Raises: ValueError: a number that is missing or not finite.
+    """
+
+    def number(match: re.Match[str]) -> str:
+        name, unit, style = match[1], match[2] or "", match[3] or "#.4g"
+        if name not in numbers:
+            raise ValueError(f'the evidence holds no number "{name}"')
+        if not math.isfinite(numbers[name]):
+            raise ValueError(f'the number "{name}" is not finite')
+        factor, symbol = _UNITS[unit]
+        value = numbers[name] * factor
+        return _shown(round(value) if style.endswith("d") else value, style) + symbol.replace(" ", "\u00a0")
+
+    return _PLACEHOLDER.sub(number, text)
+
+
+def _shown(value: float, style: str) -> str:
+    shown = format(value, style)
+    if style.startswith("#"):
+        shown = shown.rstrip(".")
+    return shown.replace("-", "\u2212") if "e" not in shown else shown

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import difflib
 import re
-from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.resources import files
-from typing import Any, Final, cast
+from types import SimpleNamespace
+from typing import Final, cast
 
 from ringbalance.verification import cases
-from ringbalance.verification.case import CaseDefinition, Study
-from ringbalance.verification.evidence import CaseCode, Evidence, Level
+from ringbalance.verification.case import CaseDefinition
+from ringbalance.verification.evidence import CaseCode
 
 _PAPERS: Final = ("liquid_ring", "eccentric_mass")
 
@@ -37,20 +37,9 @@ def case_code(case_id: str) -> CaseCode:
     """
     study = load_case(case_id).study
     if study is not None:
-        return _SharedCode(study)
+        shared = getattr(cases, study.of).study
+        return cast(CaseCode, SimpleNamespace(compute=partial(shared, **study.settings)))
     return cast(CaseCode, getattr(cases, f"{case_id}_code"))
-
-
-@dataclass(frozen=True)
-class _SharedCode:
-    """The computation of a case whose case.toml names a study and its settings."""
-
-    study: Study
-
-    def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
-        module = getattr(cases, self.study.of)
-        found: Evidence = module.study(scene, level, defect, **self.study.settings)
-        return found
 
 
 @lru_cache(maxsize=64)

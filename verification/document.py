@@ -10,8 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.verification.case import CAUSES, CaseDefinition
-from ringbalance.verification.comparison import COVERAGE_FACTOR
-from ringbalance.verification.evidence import Convergence, Curve, Evidence, Found, Reference, Series, Table
+from ringbalance.verification.evidence import (
+    COVERAGE_FACTOR,
+    Convergence,
+    Curve,
+    Evidence,
+    Found,
+    Reference,
+    Series,
+    Table,
+)
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
 from ringbalance.verification.verdicts import Verdict
 

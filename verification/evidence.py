@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, SupportsFloat
 
@@ -13,10 +13,45 @@ import numpy.typing as npt
 
 from ringbalance.physics.results import Status
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.comparison import from_range
 
 Level = Literal["light", "heavy"]
 CurveStyle = Literal["paper", "found", "reference", "points"]
+COVERAGE_FACTOR = 2.0
+"""Half-widths at 95 % per standard uncertainty."""
+
+
+def from_half_width(half_width: float) -> float:
+    """Standard uncertainty from an expanded uncertainty (95 %)."""
+    return half_width / COVERAGE_FACTOR
+
+
+def from_range(values: Iterable[float]) -> float:
+    """Standard uncertainty of a number equally likely between the least and the largest value: GUM, 4.3.7."""
+    ends = sorted(values)
+    return (ends[-1] - ends[0]) / (2 * math.sqrt(3))
+
+
+def from_rounding(last_digit: float) -> float:
+    """Standard uncertainty of a printed number from one unit of its last digit: u = last_digit/(2 sqrt(3)).
+
+    All within half a unit is equally likely. The expanded uncertainty, 0.58 of the last digit, covers that.
+    Source: rectangular distribution, GUM (JCGM 100:2008), 4.3.7.
+    """
+    return last_digit / (2 * math.sqrt(3))
+
+
+def input_uncertainty(contributions: Sequence[tuple[Callable[[float], float], float, float]]) -> float:
+    """Standard uncertainty from independent inputs: u^2 = sum of [(f(v + u_v) - f(v - u_v))/2]^2.
+
+    Args: `contributions`: f, v and u_v of each input; one whose uncertainty is zero is not evaluated.
+    Source: GUM (JCGM 100:2008), 5.1.
+    """
+    effects = [
+        (function(value + standard_uncertainty) - function(value - standard_uncertainty)) / 2
+        for function, value, standard_uncertainty in contributions
+        if standard_uncertainty > 0
+    ]
+    return math.hypot(*effects)
 
 
 @dataclass(frozen=True, kw_only=True)

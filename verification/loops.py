@@ -26,10 +26,10 @@ PHASES: Final = tuple(math.radians(angle) for angle in (90, 180, 270, 360))
 AMPLITUDES: Final = (2e-6, 4e-6, 6e-6, 8e-6, 10e-6)
 """Of the initial vibration, the five cases of Fig. 8, m."""
 LARGEST: Final = 10e-6
+GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
+"""Kp of Fig. 7, s/m."""
 PERIODS: Final = (0.25, 0.5, 1.0)
 """Between operations, s: the paper gives none; the middle one is judged and the others bound it."""
-
-
 _POINTS: Final = 400
 """Of a curve."""
 

@@ -14,8 +14,7 @@ from typing import Final
 
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import from_rounding, input_uncertainty
-from ringbalance.verification.evidence import Reference
+from ringbalance.verification.evidence import Reference, from_rounding, input_uncertainty
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,17 +1,21 @@
-"""Finite-element rings that several cases share: each is computed once per process."""
+"""Finite-element rings that several cases share, each computed once per process; and mutations of their
+pressure problem, put in from outside: the product has no parameter for them."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
+from unittest.mock import patch
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
-from ringbalance.physics.convergence import GridConvergence, Verdict
+from ringbalance.physics.convergence import Verdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
+from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid
 from ringbalance.physics.results import Estimate
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Convergence, Found
+from ringbalance.verification.evidence import Convergence, Found, from_half_width
 from ringbalance.verification.paper_numbers import RING_RADIUS, with_plate
 from ringbalance.verification.reference.exact_chamber import exact_moment
 
@@ -34,16 +38,12 @@ def found_of(quantities: RingQuantities, name: str, index: int) -> Found:
     It is not conclusive where the meshes do not converge steadily.
     """
     estimate: Estimate = getattr(quantities, name)
+    converges = quantities.convergence[name][index].verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)
     return Found(
         value=float(estimate.value[index]),
         numerical=from_half_width(float(estimate.uncertainty[index])),
-        conclusive=quantities.status.ok and _conclusive(quantities.convergence[name][index]),
+        conclusive=quantities.status.ok and converges,
     )
-
-
-def _conclusive(convergence: GridConvergence) -> bool:
-    """Whether the values converge steadily or have reached round-off."""
-    return convergence.verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)
 
 
 def chamber_moment(scene: Scene, *, density: float, factor: float = 1.0) -> Found:
@@ -81,3 +81,20 @@ def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> 
         geometry="quadratic",
         note=f"{' x '.join(map(str, quantities.cells[0]))} cells on the finest mesh; {record.text}",
     )
+
+
+@contextmanager
+def mutated_pressure(*, source: float = 1.0, wall: float = 1.0) -> Iterator[None]:
+    """Multiply the source term and the walls' condition of every rotating liquid solved inside."""
+    true = RotatingLiquid.problem
+
+    def problem(liquid: RotatingLiquid) -> PressureProblem:
+        exact = true(liquid)
+        return PressureProblem(
+            source=lambda places: source * exact.source(places),
+            wall_flux=lambda places, normals: wall * exact.wall_flux(places, normals),
+            surface_pressure=exact.surface_pressure,
+        )
+
+    with patch.object(RotatingLiquid, "problem", problem):
+        yield

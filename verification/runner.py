@@ -16,10 +16,16 @@ from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.assumptions import assumptions_of, overridden
 from ringbalance.verification.case import CaseDefinition, Mutation
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
-from ringbalance.verification.eccentric_mass.scenes import driven_scene
+from ringbalance.verification.eccentric_scenes import driven_scene
 from ringbalance.verification.evidence import CaseCode, Evidence, Level, NotRunError
-from ringbalance.verification.judging import judge, references, widened
-from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
+from ringbalance.verification.result import (
+    CaseResult,
+    MutationResult,
+    QuantityResult,
+    judge,
+    references,
+    widened,
+)
 from ringbalance.verification.verdicts import Verdict, combine
 
 Progress = Callable[[CaseResult], None]

@@ -3,17 +3,21 @@
 An assumed input can only weaken a verdict. A quantity is confirmed or refuted when it is so at every value
 that its assumed inputs may have; where that is not so it is inconclusive, however well the assumed values
 agree.
+
+A found number S is compared with a reference D (ASME V&V 20): the error E = S - D with the validation
+uncertainty u_val = sqrt(u_num^2 + u_input^2 + u_D^2).  All u are standard uncertainties; the half-width
+2 u_val covers 95 %.  An error inside it cannot be distinguished from none; one outside it can.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
-from ringbalance.verification.comparison import Comparison, compare
-from ringbalance.verification.evidence import Found, Reference
+from ringbalance.verification.evidence import COVERAGE_FACTOR, Found, Reference
 
 Kind = Literal["validation", "code_verification", "solution_verification", "claim"]
 Metric = Literal["validation", "within_uncertainty", "relative", "absolute", "at_most", "at_least"]
@@ -43,6 +47,48 @@ VOCABULARY: dict[Kind, tuple[Verdict, ...]] = {
     "solution_verification": _OF_A_CHECK,
 }
 """Verdicts of each kind of case, the one that decides the case first."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A found number against a reference."""
+
+    error: float
+    """E = S - D."""
+    validation_uncertainty: float
+    """u_val, standard."""
+
+    @property
+    def half_width(self) -> float:
+        """2 u_val, the expanded uncertainty (95 %) that |E| is compared with."""
+        return COVERAGE_FACTOR * self.validation_uncertainty
+
+    @property
+    def consistent(self) -> bool:
+        """Whether |E| <= 2 u_val: the comparison sees no difference."""
+        return abs(self.error) <= self.half_width
+
+
+def compare(
+    *,
+    found: float,
+    reference: float,
+    numerical: float = 0.0,
+    input_: float = 0.0,
+    reference_uncertainty: float = 0.0,
+) -> Comparison:
+    """Compare a found number S with a reference D: E = S - D, u_val = sqrt(u_num^2 + u_input^2 + u_D^2).
+
+    A few units in the last place of the larger number are added for round-off.
+    Args: `numerical`, `input_` and `reference_uncertainty` are standard uncertainties in the unit of S.
+    Raises: ValueError: a number that is not finite, or a negative uncertainty.
+    Source: ASME V&V 20-2009, sections 1 and 6; independent uncertainties.
+    """
+    parts = (numerical, input_, reference_uncertainty)
+    if not all(math.isfinite(value) for value in (found, reference, *parts)) or min(parts) < 0:
+        raise ValueError("a comparison needs finite numbers and uncertainties that are not negative")
+    round_off = 4 * math.ulp(max(abs(found), abs(reference)))
+    return Comparison(error=found - reference, validation_uncertainty=math.hypot(*parts, round_off))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import KW_ONLY, asdict, dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -40,7 +40,7 @@ DRAWS: Final = 39
 """Of so many: 95 % of further ones lie between least and greatest, or between an end and the second."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Requirement:
     """What is asked of the balancer and what it comes to; intervals are 95 %, from stated uncertainties."""
 
@@ -54,6 +54,7 @@ class Requirement:
     """Where the requirement comes from."""
     achieved: float | None
     """None: the run did not come to it."""
+    _: KW_ONLY
     required_interval: Interval | None = None
     achieved_interval: Interval | None = None
     """None: no uncertainty is stated, or it does not move the number."""
@@ -139,11 +140,15 @@ def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
     limit, gate = scene.supervisor.limit, scene.imbalance_filter.gate
     until, why = _deadline(scene)
     return [
-        _row("balancing moment", "kg m", _AT_LEAST, plant.unbalance, "the imbalance to cancel", capacity),
-        _row("amplitude at the end", "m", _AT_MOST, limit, _LIMIT, run.final_amplitude),
-        _row("largest amplitude after balancing", "m", _AT_MOST, limit, _LIMIT, _largest_balanced(run)),
-        _row("settling time", "s", _AT_MOST, until, why, run.settling_time),
-        _row(
+        Requirement(
+            "balancing moment", "kg m", _AT_LEAST, plant.unbalance, "the imbalance to cancel", capacity
+        ),
+        Requirement("amplitude at the end", "m", _AT_MOST, limit, _LIMIT, run.final_amplitude),
+        Requirement(
+            "largest amplitude after balancing", "m", _AT_MOST, limit, _LIMIT, _largest_balanced(run)
+        ),
+        Requirement("settling time", "s", _AT_MOST, until, why, run.settling_time),
+        Requirement(
             "standard deviation of the imbalance",
             "kg m",
             _AT_MOST,
@@ -165,17 +170,9 @@ def _deadline(scene: EccentricScene) -> tuple[float, str]:
 def _of_loops(gains: RecommendedGains) -> Sequence[Requirement]:
     why = "half the gain at which the loop is unstable"
     return [
-        _row(f"gain margin of the {loop.name}", "", _AT_LEAST, GAIN_MARGIN, why, loop.gain_margin)
+        Requirement(f"gain margin of the {loop.name}", "", _AT_LEAST, GAIN_MARGIN, why, loop.gain_margin)
         for loop in gains.loops
     ]
-
-
-def _row(
-    quantity: str, unit: str, sense: str, required: float, set_by: str, achieved: float | None
-) -> Requirement:
-    return Requirement(
-        quantity=quantity, unit=unit, sense=sense, required=required, set_by=set_by, achieved=achieved
-    )
 
 
 def _judged(scene: EccentricScene, run: EccentricRun) -> Judged:

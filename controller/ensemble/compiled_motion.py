@@ -8,14 +8,9 @@ from typing import Any
 from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_disc import kept, leave_out, vibration
 from ringbalance.controller.ensemble.compiled_records import Record
+from ringbalance.controller.liquid_ring.compiled_events import command, rests
 from ringbalance.controller.liquid_ring.compiled_gas import gas_volume
-from ringbalance.controller.liquid_ring.compiled_march import (
-    advance,
-    command,
-    least_later,
-    opening_within,
-    rests,
-)
+from ringbalance.controller.liquid_ring.compiled_march import advance, least_later, opening_within
 from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.records import P, X
 from ringbalance.scene.arrays import FloatArray

@@ -5,6 +5,7 @@ A state is x of chamber 0, the velocity out of it and the absolute pressures of 
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from ringbalance.controller.compilation.compiled import in_place
@@ -19,7 +20,7 @@ from ringbalance.controller.liquid_ring.compiled_column import (
     steady,
 )
 from ringbalance.controller.liquid_ring.compiled_lift import arrived, crest_stop, lift_push, shown
-from ringbalance.controller.liquid_ring.records import EVENTS, P, Record, U, X
+from ringbalance.controller.liquid_ring.records import EVENTS, WORK, P, Record, U, X
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.reduced_model.law.flow_law import Regime
 
@@ -33,6 +34,8 @@ STOPS: Final = 3
 """The column comes to rest."""
 ARRIVES: Final = 4
 """Lifted liquid reaches the end of the crest."""
+RESTING: Final = int(Regime.BLOCKED)
+_BLOCKED: Final = EVENTS.index(Event.BLOCKED)
 _SIPHON: Final = int(Regime.SIPHON)
 _SEPARATED: Final = int(Regime.SEPARATED)
 _REVERSE: Final = int(Regime.REVERSE)
@@ -83,6 +86,26 @@ def pass_crest(plant: Record, motion: Record) -> None:
 def outward(motion: Record) -> int:
     """Direction of flow out of the chamber that was driven last."""
     return 1 if motion.chamber == 0 else -1
+
+
+@in_place
+def command(plant: Record, motion: Record, chamber: int, duration: float) -> None:
+    """A valve opens and closes a lag after its command, which begins a new record of what it does."""
+    x = shown(plant, motion, motion.state[X])
+    motion.chamber, motion.opens, motion.closes = chamber, plant.valve_lag, plant.valve_lag + duration
+    motion.fill_before = plant.total - x if chamber else x
+    motion.least_fill = motion.fill_before
+    motion.state[WORK], motion.state[WORK + 1] = 0.0, 0.0
+    motion.regime_start, motion.regime_end, motion.event = RESTING, RESTING, _BLOCKED
+    motion.closing_pressure, motion.run_dry = 0.0, 0.0
+
+
+@in_place
+def rests(plant: Record, motion: Record) -> bool:
+    """Whether nothing moves, no gas is under pressure, and no valve is open or about to move."""
+    waiting, y = min(motion.opens, motion.closes) < math.inf, motion.state
+    still = motion.direction == 0 and y[P] == plant.ambient_pressure == y[P + 1]
+    return bool(still and not (motion.primed or motion.valve_0 or motion.valve_1 or waiting))
 
 
 @in_place

@@ -16,10 +16,12 @@ from ringbalance.controller.liquid_ring.compiled_events import (
     EMPTY,
     FULL,
     NONE,
+    RESTING,
     STALLED,
     Four,
     beyond,
     changes,
+    command,
     flow_end,
     heading,
     holds_column,
@@ -43,9 +45,8 @@ from ringbalance.controller.liquid_ring.compiled_step import (
     shorten,
     take,
 )
-from ringbalance.controller.liquid_ring.records import EVENTS, WORK, P, Record, U, X
+from ringbalance.controller.liquid_ring.records import EVENTS, P, Record, U, X
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
 
 _ROUND_OFF: Final = 1e-12
@@ -61,9 +62,7 @@ _LITTLE_MOVED: Final = 1e-9
 """Fill ratio below which a flow that ends was the last swing of a column about its balance."""
 _OPENINGS: Final = 40
 """Halvings of the valve-open time that leaves a chamber with its residual fill."""
-_BLOCKED: Final = EVENTS.index(Event.BLOCKED)
 _UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
-_RESTING: Final = int(Regime.BLOCKED)
 
 
 @in_place
@@ -85,26 +84,6 @@ def carry(
         return opening_within(plant, motions, 0, 1, chamber, duration, w)
     advance(plant, motions[0], duration, notes, 1, count, w)
     return duration
-
-
-@in_place
-def command(plant: Record, motion: Record, chamber: int, duration: float) -> None:
-    """A valve opens and closes a lag after its command, which begins a new record of what it does."""
-    x = shown(plant, motion, motion.state[X])
-    motion.chamber, motion.opens, motion.closes = chamber, plant.valve_lag, plant.valve_lag + duration
-    motion.fill_before = plant.total - x if chamber else x
-    motion.least_fill = motion.fill_before
-    motion.state[WORK], motion.state[WORK + 1] = 0.0, 0.0
-    motion.regime_start, motion.regime_end, motion.event = _RESTING, _RESTING, _BLOCKED
-    motion.closing_pressure, motion.run_dry = 0.0, 0.0
-
-
-@in_place
-def rests(plant: Record, motion: Record) -> bool:
-    """Whether nothing moves, no gas is under pressure, and no valve is open or about to move."""
-    waiting, y = min(motion.opens, motion.closes) < math.inf, motion.state
-    still = motion.direction == 0 and y[P] == plant.ambient_pressure == y[P + 1]
-    return bool(still and not (motion.primed or motion.valve_0 or motion.valve_1 or waiting))
 
 
 @in_place
@@ -399,7 +378,7 @@ def _note(plant: Record, motion: Record, event: int, direction: int) -> None:
     """Keep what happens to the flow out of the driven chamber."""
     if direction == outward(motion):
         is_open = motion.valve_1 > 0 if motion.chamber else motion.valve_0 > 0
-        if motion.regime_start == _RESTING and event == NONE:
+        if motion.regime_start == RESTING and event == NONE:
             motion.regime_start = regime(plant, motion)
         if event == EMPTY and motion.event != EMPTY:
             motion.run_dry = motion.closes if is_open else 0.0

@@ -135,7 +135,10 @@ def search(
         yield from _pushed(best)
 
     for each in candidates():
-        found = _try(each, model, known, rows, told)
+        what = each.change or "the recommended gain alone"
+        told(f"{what} ...")
+        found = tried(each.scene, model, known.widths)
+        rows.append(_Tried(change=what, settled=found.settled.value, runs=found.runs))
         held = (found.quantiles["p95"] or 0.0) + scene.controller.hold_time
         enough = each is base and held <= scene.run.time_limit
         share = min(found.settled.value, settled) if enough else found.settled.value
@@ -144,16 +147,6 @@ def search(
         if most >= 1.0:
             return Search(best=each, settles=True, needs=held, tried=tuple(rows))
     return Search(best=best, settles=False, needs=None, tried=tuple(rows))
-
-
-def _try(
-    each: Candidate, model: BalancerModel, known: FactorUncertainty, rows: list[_Tried], told: Progress
-) -> SettlingTimes:
-    what = each.change or "the recommended gain alone"
-    told(f"{what} ...")
-    found = tried(each.scene, model, known.widths)
-    rows.append(_Tried(change=what, settled=found.settled.value, runs=found.runs))
-    return found
 
 
 def _others(

@@ -16,7 +16,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.compiled_march import advance, command
+from ringbalance.controller.liquid_ring.compiled_events import command
+from ringbalance.controller.liquid_ring.compiled_march import advance
 from ringbalance.controller.liquid_ring.interval import packed
 from ringbalance.controller.liquid_ring.motion import Motion
 from ringbalance.controller.liquid_ring.records import WORKSPACE, X

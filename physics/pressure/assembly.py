@@ -22,7 +22,7 @@ _BLOCK = 2**15
 
 
 @dataclass(frozen=True, kw_only=True)
-class Volume:
+class _Volume:
     """Quadrature points of all cells; lengths in the mesh's unit."""
 
     points: FloatArray
@@ -47,7 +47,7 @@ class Volume:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Facets(Volume):
+class Facets(_Volume):
     """Quadrature points of one side, one facet for each cell at it; the functions that are not zero there."""
 
     normals: FloatArray
@@ -175,7 +175,7 @@ def _summed(places: IntArray, local: FloatArray, size: int) -> FloatArray:
     return np.asarray(total, dtype=np.float64)
 
 
-def volume_points(chamber: ChamberMesh, *, extra: int = 0) -> Volume:
+def volume_points(chamber: ChamberMesh, *, extra: int = 0) -> _Volume:
     """Quadrature points over all cells, in the mesh's unit, with `extra` more than usual along each axis."""
     line, dimension = gauss_line(chamber.order, extra), chamber.dimension
     points, determinants = [], []
@@ -185,7 +185,7 @@ def volume_points(chamber: ChamberMesh, *, extra: int = 0) -> Volume:
         for axis in range(dimension):
             places = contracted(line.values, places, 1 + axis)
         points.append(places.reshape(dimension, -1, places.shape[-1]))
-    return Volume(
+    return _Volume(
         points=np.concatenate(points, axis=-1),
         weights=np.concatenate(determinants, axis=-1) * products([line.weights] * dimension)[:, None],
         nodes=chamber.cell_nodes,

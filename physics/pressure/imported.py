@@ -8,7 +8,7 @@ error of the discretisation.  What the facets of a wall leave of a smooth wall i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -23,7 +23,7 @@ from ringbalance.physics.pressure.linear import LinearSolution, solve_linear
 from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid
 from ringbalance.physics.pressure.tetrahedra import Facets, TetrahedronSpace
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
 _VOLUME_TOLERANCE: Final = 1e-10
@@ -31,7 +31,7 @@ _MOST_STEPS: Final = 20
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoundaryLoad:
+class _BoundaryLoad:
     """Force and moment of the liquid on one boundary."""
 
     force: Estimate
@@ -48,7 +48,7 @@ class ImportedRing:
 
     wall_pressure: Estimate
     """Mean over the part of the outer wall that the liquid touches, gauge, Pa, shape ()."""
-    loads: Mapping[str, BoundaryLoad]
+    loads: Mapping[str, _BoundaryLoad]
     """By boundary, the free surface left out."""
     volume: float
     """m^3."""
@@ -92,7 +92,19 @@ def solved_ring(
     linear = solve_on(space, liquid.problem())
     exact = density * angular_velocity**2 * body.level.value(space.body.nodes) + gas_pressure
     status = _NO_RING if no_ring else (status if linear.status.ok else linear.status)
-    return _ring(geometry, space, linear, exact, density, angular_velocity, status)
+    walls = {name: space.facets(name) for name in space.boundaries if name != FREE_SURFACE}
+    # What the facets of the outer wall leave of r^2 there stands for the other walls, too.
+    doubt = density * angular_velocity**2 / 2 * SAFETY * faceting(geometry).wall
+    mean, still = (_mean(walls[OUTER_WALL], values) for values in (linear.values, exact))
+    weights = space.weights
+    return ImportedRing(
+        wall_pressure=Estimate(value=np.array(mean), uncertainty=np.array(abs(mean - still) + doubt)),
+        loads={name: _load(facets, linear.values, exact, doubt) for name, facets in walls.items()},
+        volume=float(weights.sum()),
+        first_moment=density * weights @ space.points,
+        status=status,
+        statistics=linear.statistics,
+    )
 
 
 _NO_RING: Final = Status(
@@ -107,7 +119,7 @@ class _Held:
     level: Level
 
 
-def body_volume(body: Tetrahedra) -> float:
+def _body_volume(body: Tetrahedra) -> float:
     """m^3."""
     return float(TetrahedronSpace(body=body).weights.sum())
 
@@ -117,10 +129,10 @@ def _held_volume(chamber: Tetrahedra, level: Level, radius: float) -> tuple[_Hel
     liquid = liquid_body(chamber, level)
     if not any(level.tilt):
         return _Held(liquid=liquid, level=level), Status()
-    target = body_volume(liquid_body(chamber, Level(constant=radius**2 / 2)))
+    target = _body_volume(liquid_body(chamber, Level(constant=radius**2 / 2)))
     for _ in range(_MOST_STEPS):
         surface = TetrahedronSpace(body=liquid).facets(FREE_SURFACE)
-        shortage = target - body_volume(liquid)
+        shortage = target - _body_volume(liquid)
         if abs(shortage) <= _VOLUME_TOLERANCE * target:
             return _Held(liquid=liquid, level=level), Status()
         # A level lower by d moves the surface out of the liquid by d / |gradient|.
@@ -147,14 +159,10 @@ def solve_on(space: TetrahedronSpace, problem: PressureProblem) -> LinearSolutio
     free = np.setdiff1d(np.arange(space.unknowns), surface)
     rows = space.stiffness[free]
     linear = solve_linear(
-        csr_matrix(rows[:, free]), load[free] - rows @ values, prolongation=_coarse(space, free)
+        csr_matrix(rows[:, free]), load[free] - rows @ values, prolongation=lambda: space.prolongation(free)
     )
     values[free] = linear.values
     return LinearSolution(values=values, status=linear.status, statistics=linear.statistics)
-
-
-def _coarse(space: TetrahedronSpace, free: IntArray) -> Callable[[], csr_matrix]:
-    return lambda: space.prolongation(free)
 
 
 def _flux(problem: PressureProblem, facets: Facets) -> FloatArray:
@@ -164,38 +172,12 @@ def _flux(problem: PressureProblem, facets: Facets) -> FloatArray:
     return np.asarray(flux * weights)
 
 
-def _ring(
-    geometry: ChamberGeometry,
-    space: TetrahedronSpace,
-    linear: LinearSolution,
-    exact: FloatArray,
-    density: float,
-    angular_velocity: float,
-    status: Status,
-) -> ImportedRing:
-    walls = {name: space.facets(name) for name in space.boundaries if name != FREE_SURFACE}
-    # What the facets of the outer wall leave of r^2 there stands for the other walls, too.
-    doubt = density * angular_velocity**2 / 2 * SAFETY * faceting(geometry).wall
-    loads = {name: _load(facets, linear.values, exact, doubt) for name, facets in walls.items()}
-    wall = walls[OUTER_WALL]
-    mean, still = (_mean(wall, values) for values in (linear.values, exact))
-    weights = space.weights
-    return ImportedRing(
-        wall_pressure=Estimate(value=np.array(mean), uncertainty=np.array(abs(mean - still) + doubt)),
-        loads=loads,
-        volume=float(weights.sum()),
-        first_moment=density * weights @ space.points,
-        status=status,
-        statistics=linear.statistics,
-    )
-
-
 def _mean(facets: Facets, nodal: FloatArray) -> float:
     weights = facets.weights
     return float(np.sum(weights * facets.at_points(nodal)) / weights.sum())
 
 
-def _load(facets: Facets, nodal: FloatArray, exact: FloatArray, doubt: float) -> BoundaryLoad:
+def _load(facets: Facets, nodal: FloatArray, exact: FloatArray, doubt: float) -> _BoundaryLoad:
     """With a doubt of the pressure by the walls' facets, Pa."""
     found, still = (_resultants(facets, values) for values in (nodal, exact))
     area = float(facets.weights.sum())
@@ -205,7 +187,7 @@ def _load(facets: Facets, nodal: FloatArray, exact: FloatArray, doubt: float) ->
         Estimate(value=value, uncertainty=np.abs(value - other) + extra)
         for value, other, extra in zip(found, still, facet, strict=True)
     ]
-    return BoundaryLoad(force=estimates[0], moment=estimates[1], area=area)
+    return _BoundaryLoad(force=estimates[0], moment=estimates[1], area=area)
 
 
 def _resultants(facets: Facets, nodal: FloatArray) -> tuple[FloatArray, FloatArray]:

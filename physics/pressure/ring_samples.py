@@ -1,14 +1,15 @@
-"""One fill ratio on one mesh: the mean of all ring quantities over a turn of gravity."""
+"""One fill ratio on one mesh: the mean of all ring quantities, by quadrature, over a turn of gravity."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ringbalance.mesh.chamber import chamber_mesh
+from ringbalance.mesh.chamber import FREE_SURFACE, chamber_mesh
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.pressure.integrals import LiquidIntegrals, liquid_integrals
+from ringbalance.physics.pressure.assembly import facet_points, volume_points
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
 from ringbalance.physics.pressure.surface import refined_surface, solve_with_gravity
 from ringbalance.physics.results import Status
@@ -40,15 +41,15 @@ class Sample:
     """In the order of `QUANTITIES`, SI totals, shape (5,)."""
     ripple: FloatArray
     """First harmonic of wall pressure (Pa) and moment (kg m), zero-to-peak, shape (2,)."""
-    surfaces: tuple[FloatArray, ...]
+    surfaces: tuple[FloatArray, ...] = ()
     """Found surfaces, one per angle, m; empty without gravity."""
     status: Status
-    unknowns: int
-    residual: float
+    unknowns: int = 0
+    residual: float = 0.0
     """Largest relative residual of the linear systems."""
-    flux_mismatch: float
+    flux_mismatch: float = 0.0
     """Largest mismatch of flux and force on a found surface, relative."""
-    rounding: float
+    rounding: float = 0.0
     """Largest rounding of a found surface's place, in mean depths."""
 
 
@@ -131,7 +132,7 @@ def _solve(
     return solve_pressure(chamber=chamber, problem=liquid.problem())
 
 
-def _row(totals: LiquidIntegrals) -> list[float]:
+def _row(totals: _LiquidIntegrals) -> list[float]:
     """None of these changes in the mirror image, which gravity at the opposite angle makes."""
     return [
         totals.volume,
@@ -143,13 +144,78 @@ def _row(totals: LiquidIntegrals) -> list[float]:
 
 
 def _failed(status: Status) -> Sample:
-    return Sample(
-        values=np.zeros(WIDTH),
-        ripple=np.zeros(2),
-        surfaces=(),
-        status=status,
-        unknowns=0,
-        residual=0.0,
-        flux_mismatch=0.0,
-        rounding=0.0,
+    return Sample(values=np.zeros(WIDTH), ripple=np.zeros(2), status=status)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _LiquidIntegrals:
+    """Integrals over the liquid of one chamber: totals."""
+
+    volume: float
+    """m^3."""
+    first_moment: FloatArray
+    """rho times the integral of (x, y, z), kg m, shape (3,)."""
+    wall_pressure: float
+    """Mean over the outer wall, gauge, Pa."""
+    moment_per_volume: float
+    """dU/dV' as liquid is added, kg/m^2."""
+    force: Mapping[str, FloatArray]
+    """Force of the liquid on each wall, N, shape (3,)."""
+    torque: Mapping[str, float]
+    """Its torque about the shaft, with the rotation, N m."""
+
+
+def liquid_integrals(*, solution: PressureSolution, density: float, axial_width: float) -> _LiquidIntegrals:
+    """Integrals of a solution in three dimensions, or of one in a cross-section times the axial width.
+
+    Every cross-section is the same without axial gravity, and the integral of its pressure is the force on
+    each end.
+    Source: definitions; the shape derivative is dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p| over the
+        free surface, because a raised pressure level moves the surface by dp/|n.grad p|.
+    """
+    chamber = solution.chamber
+    unit, volume = chamber.length_scale, volume_points(chamber)
+    depth = axial_width if chamber.dimension == 2 else unit
+    forces, torques = _wall_loads(solution, depth)
+    if chamber.dimension == 2:
+        pressure = float(unit**2 * np.sum(volume.weights * volume.at_points(solution.pressure)))
+        push = np.array([0.0, 0.0, pressure])
+        forces |= {"end_back": -push, "end_front": push}
+        torques |= {"end_back": 0.0, "end_front": 0.0}
+    moment = density * unit**3 * depth * np.sum(volume.weights * volume.points, axis=(1, 2))
+    return _LiquidIntegrals(
+        volume=float(unit**2 * depth * volume.weights.sum()),
+        first_moment=np.pad(moment, (0, 3 - len(moment))),
+        wall_pressure=_wall_pressure(solution),
+        moment_per_volume=_moment_per_volume(solution, density),
+        force=forces,
+        torque=torques,
     )
+
+
+def _wall_pressure(solution: PressureSolution) -> float:
+    wall = facet_points(solution.chamber, "outer_wall")
+    return float(np.sum(wall.weights * wall.at_points(solution.pressure)) / wall.weights.sum())
+
+
+def _moment_per_volume(solution: PressureSolution, density: float) -> float:
+    surface = facet_points(solution.chamber, FREE_SURFACE)
+    gradient = np.zeros(solution.pressure.size)
+    gradient[solution.chamber.grid[0]] = solution.surface_gradient
+    speed = surface.weights / np.abs(surface.at_points(gradient))
+    return float(density * solution.chamber.length_scale * np.sum(speed * surface.points[0]) / speed.sum())
+
+
+def _wall_loads(solution: PressureSolution, depth: float) -> tuple[dict[str, FloatArray], dict[str, float]]:
+    unit = solution.chamber.length_scale
+    forces, torques = {}, {}
+    for name in solution.chamber.boundaries:
+        if name == FREE_SURFACE:
+            continue
+        wall = facet_points(solution.chamber, name)
+        push = wall.weights * wall.at_points(solution.pressure) * wall.normals
+        turn = wall.points[0] * push[1] - wall.points[1] * push[0]
+        total = unit * depth * push.sum(axis=(1, 2))
+        forces[name] = np.pad(total, (0, 3 - len(total)))
+        torques[name] = float(unit**2 * depth * turn.sum())
+    return forces, torques

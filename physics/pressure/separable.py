@@ -21,7 +21,7 @@ from ringbalance.scene.arrays import FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeparableInverse:
+class _SeparableInverse:
     """An inverse that is diagonal in products of one set of vectors along each axis."""
 
     vectors: tuple[FloatArray, ...]
@@ -40,7 +40,7 @@ class SeparableInverse:
         return np.asarray(field).ravel()
 
 
-def stiffness_inverse(stiffness: Stiffness, *, pinned_surface: bool) -> SeparableInverse:
+def stiffness_inverse(stiffness: Stiffness, *, pinned_surface: bool) -> _SeparableInverse:
     """Near inverse of the form.
 
     Args: `pinned_surface`: True leaves out the nodes of the free surface, False keeps them and gives back
@@ -60,10 +60,10 @@ def stiffness_inverse(stiffness: Stiffness, *, pinned_surface: bool) -> Separabl
     total = np.asarray(sum(values))
     if not pinned_surface:
         total[(0,) * len(axes)] = np.inf
-    return SeparableInverse(vectors=tuple(vectors), factors=1 / total)
+    return _SeparableInverse(vectors=tuple(vectors), factors=1 / total)
 
 
-def mass_inverse(facets: Facets, *, cells: tuple[int, ...], line: Line) -> SeparableInverse:
+def mass_inverse(facets: Facets, *, cells: tuple[int, ...], line: Line) -> _SeparableInverse:
     """Near inverse of the integrals of u v over one side. Args: `cells`: along the side's axes."""
     points = (len(line.weights),) * len(cells)
     logs = np.log(facets.weights.reshape(*points, *cells))
@@ -72,7 +72,7 @@ def mass_inverse(facets: Facets, *, cells: tuple[int, ...], line: Line) -> Separ
         profile = _profile(logs, axis) - logs.mean() * (1 - 1 / len(cells))
         root = np.linalg.cholesky(_assembled(line.values, np.exp(profile)))
         vectors.append(np.linalg.inv(root).T)
-    return SeparableInverse(vectors=tuple(vectors), factors=np.ones([len(v) for v in vectors]))
+    return _SeparableInverse(vectors=tuple(vectors), factors=np.ones([len(v) for v in vectors]))
 
 
 def _profiles(stiffness: Stiffness, line: Line) -> tuple[list[FloatArray], list[FloatArray]]:

@@ -37,14 +37,14 @@ class PressureProblem:
     surface_pressure: Callable[[FloatArray], FloatArray]
     """p_gas(x), Pa, gauge."""
 
-    def discretise(self, *, chamber: ChamberMesh) -> DiscreteProblem:
+    def discretise(self, *, chamber: ChamberMesh) -> _DiscreteProblem:
         """Form and load of the weak problem; the free surface is left without a condition."""
         unit, volume = chamber.length_scale, volume_points(chamber)
         total = -(unit**2) * volume.load(self.source(unit * volume.points), unknowns=chamber.grid.size)
         for name in chamber.boundaries:
             if name != FREE_SURFACE:
                 total += self.wall_load(chamber=chamber, boundary=name)
-        return DiscreteProblem(stiffness=Stiffness.of(chamber), load=total)
+        return _DiscreteProblem(stiffness=Stiffness.of(chamber), load=total)
 
     def wall_load(self, *, chamber: ChamberMesh, boundary: str) -> FloatArray:
         """Part of the load that one boundary contributes, int q v, in the mesh's unit of length."""
@@ -104,7 +104,7 @@ class PressureSolution:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiscreteProblem:
+class _DiscreteProblem:
     """Form and load of the weak problem, before any condition on the free surface; lengths in mesh units."""
 
     stiffness: Stiffness
@@ -160,7 +160,7 @@ def solve_pressure(*, chamber: ChamberMesh, problem: PressureProblem) -> Pressur
 
 
 def _surface_gradient(
-    chamber: ChamberMesh, discrete: DiscreteProblem, pressure: FloatArray
+    chamber: ChamberMesh, discrete: _DiscreteProblem, pressure: FloatArray
 ) -> LinearSolution:
     """Flux that balances the weak form on the surface, in mesh units: better than the field's gradient."""
     facets, count = facet_points(chamber, FREE_SURFACE), chamber.grid[0].size

@@ -14,11 +14,7 @@ import numpy as np
 from ringbalance.mesh.chamber import FREE_SURFACE, ChamberMesh, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
 from ringbalance.physics.pressure.assembly import facet_points, volume_points
-from ringbalance.physics.pressure.solve import (
-    PressureSolution,
-    RotatingLiquid,
-    solve_pressure,
-)
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.physics.splines import CubicSpline
 from ringbalance.scene.arrays import FloatArray
@@ -36,7 +32,7 @@ _NEAREST = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class FoundSurface:
+class _FoundSurface:
     """A mesh whose free surface has constant pressure and holds the given volume."""
 
     chamber: ChamberMesh
@@ -88,7 +84,7 @@ def solve_with_gravity(
     return replace(solution, statistics=statistics)
 
 
-def _unsolved(found: FoundSurface) -> PressureSolution:
+def _unsolved(found: _FoundSurface) -> PressureSolution:
     chamber = found.chamber
     return PressureSolution(
         chamber=chamber,
@@ -106,7 +102,7 @@ def find_surface(
     fill_ratio: float,
     cells: tuple[int, ...],
     start: FloatArray | None = None,
-) -> FoundSurface:
+) -> _FoundSurface:
     """Move the nodes of the free surface until the pressure is constant along it, at the given volume.
 
     Each step solves laplace(p) = f with n.grad p given on the whole boundary, then moves every surface node
@@ -124,7 +120,7 @@ def find_surface(
     if no_ring is None:
         return _search(disc, liquid, fill_ratio, cells, concentric if start is None else start)
     chamber = chamber_mesh(disc=disc, surface_radius=concentric, cells=cells)
-    return FoundSurface(
+    return _FoundSurface(
         chamber=chamber, status=no_ring, steps=0, last_move=0.0, rounding=0.0, volume_error=0.0
     )
 
@@ -135,7 +131,7 @@ def _search(
     fill_ratio: float,
     cells: tuple[int, ...],
     start: FloatArray | float,
-) -> FoundSurface:
+) -> _FoundSurface:
     target = _target(disc, fill_ratio, len(cells))
     first = chamber = chamber_mesh(disc=disc, surface_radius=start, cells=cells)
     depth = disc.outer_radius - float(np.mean(first.surface_radius))
@@ -150,7 +146,7 @@ def _search(
         status = _end_of_search(disc, chamber.surface_radius, move, _settled(move, before))
     chamber = _hold_volume(disc, chamber, target) if status.ok else first
     error = _measure(chamber) / target - 1 if status.ok else 0.0
-    return FoundSurface(
+    return _FoundSurface(
         chamber=chamber,
         status=status,
         steps=steps,

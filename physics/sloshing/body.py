@@ -56,7 +56,7 @@ _ITERATIONS: Final = 9
 
 
 @dataclass(frozen=True, kw_only=True)
-class WallMean:
+class _WallMean:
     """Mean of p'/rho over a wall under G = (x + i y) exp(i s t): i s flow . c + surface . c + drive."""
 
     flow: FloatArray
@@ -91,7 +91,7 @@ class ReducedWaves:
     """Rows that take c to n . xi at the nodes of the surface, shape (nodes, n)."""
     quasi_static: ComplexArray
     """Integrals of (1, x, y) n . xi of a surface that follows G = x + i y at once, shape (3,)."""
-    wall: WallMean
+    wall: _WallMean
     fast: FastWaves
     residual: float
     """Largest relative one of the linear solves."""
@@ -211,7 +211,7 @@ def _quasi_static(fields: Fields) -> ComplexArray:
     return np.asarray(drive - matrix[:, 0] * drive[0] / matrix[0, 0])
 
 
-def _wall_mean(fields: Fields, wall: str, blocks: list[FloatArray], over: FloatArray) -> WallMean:
+def _wall_mean(fields: Fields, wall: str, blocks: list[FloatArray], over: FloatArray) -> _WallMean:
     """Mean of p'/rho = Q + G over a wall, Q = [g n . xi - G] - 2 i s chi.
 
     The bracket is continued harmonically from the surface; chi is the potential that projecting e_z x xi
@@ -229,7 +229,7 @@ def _wall_mean(fields: Fields, wall: str, blocks: list[FloatArray], over: FloatA
     over_surface = np.asarray(fields.surface_mass @ np.ones(space.unknowns))
     still = complex(mean @ places - (over_surface @ places) / over_surface.sum())
     drive = complex(mean @ places - onto @ places[surface])
-    return WallMean(flow=-2 * chi[0], surface=onto @ over, drive=drive, still=still)
+    return _WallMean(flow=-2 * chi[0], surface=onto @ over, drive=drive, still=still)
 
 
 def _squared_errors(space: TetrahedronSpace, gradients: FloatArray) -> FloatArray:

@@ -30,7 +30,7 @@ FORMAL_ORDER: Final = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class SloshingModes:
+class _SloshingModes:
     """Planar modes of the liquid in one chamber, lowest first."""
 
     fill_ratio: FloatArray
@@ -50,7 +50,7 @@ def sloshing_modes(
     fill_ratio: npt.ArrayLike,
     modes: int = 4,
     cells: tuple[tuple[int, int], ...] | None = None,
-) -> SloshingModes:
+) -> _SloshingModes:
     """Lowest natural frequencies of the liquid in one chamber, over the angular velocity.
 
     (-s^2 S + 2 i s C + A) psi = 0; without Coriolis force and plates s_n^2 = k tanh(k ln(R2/a)), k = n
@@ -76,7 +76,7 @@ def sloshing_modes(
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
     found = np.array([[_lowest(disc, float(a), counts, modes) for counts in meshes] for a in radii])
     widths = np.apply_along_axis(_half_width, 1, found, meshes)
-    return SloshingModes(
+    return _SloshingModes(
         fill_ratio=fills,
         surface_radius=radii,
         frequency_ratio=Estimate(value=found[:, 0].copy(), uncertainty=widths),
@@ -85,7 +85,7 @@ def sloshing_modes(
     )
 
 
-def _imported(disc: Disc, geometry: ChamberGeometry, fills: FloatArray, modes: int) -> SloshingModes:
+def _imported(disc: Disc, geometry: ChamberGeometry, fills: FloatArray, modes: int) -> _SloshingModes:
     """Waves in three dimensions, those along the shaft among them, on a chamber's own mesh."""
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
     waves = [ring_waves(geometry=geometry, surface_radius=float(radius)) for radius in radii]
@@ -93,7 +93,7 @@ def _imported(disc: Disc, geometry: ChamberGeometry, fills: FloatArray, modes: i
         np.array([getattr(each.frequency_ratio, name)[:modes] for each in waves])
         for name in ("value", "uncertainty")
     )
-    return SloshingModes(
+    return _SloshingModes(
         fill_ratio=fills,
         surface_radius=radii,
         frequency_ratio=Estimate(value=values, uncertainty=widths),
@@ -115,20 +115,18 @@ def default_sloshing_cells(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, in
     return tuple((more * radial // k, more * angular // k) for k in (1, 2, 4))
 
 
-def resonant_fills(
-    *, disc: Disc, modes: int = 4, highest: float | None = None
-) -> tuple[tuple[int, float], ...]:
+def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ...]:
     """Fills at which a natural frequency equals the speed, s_n(x) = 1, whatever the speed.
 
     Args: `modes`: how many of the lowest modes are looked at; higher ones resonate in thinner rings and are
-        damped more. `highest`: fill ratio up to which to look; default the disc's largest.
+        damped more.
     Returns: Mode number (from 1) and fill ratio of each, by mode.
-    Raises: ValueError: no modes, or a highest fill outside (0, 1].
+    Raises: ValueError: no modes.
     Source: `sloshing_modes`; the frequencies grow with the fill.
     """
-    top = disc.max_fill_ratio if highest is None else highest
-    if not 0 < top <= 1 or modes < 1:
-        raise ValueError("highest must lie within (0, 1], and at least one mode must be asked for")
+    if modes < 1:
+        raise ValueError("at least one mode must be asked for")
+    top = disc.max_fill_ratio
     if disc.geometry is not None:
         return _imported_resonances(disc, modes, top)
     middle = default_sloshing_cells(disc=disc, modes=modes)[1]

@@ -29,7 +29,7 @@ _SHIFT: Final = 0.3
 """Of the squared frequencies."""
 
 
-class RepeatedSolves:
+class _RepeatedSolves:
     """Repeated solves with one positive definite matrix of quadratic elements."""
 
     def __init__(self, matrix: csr_matrix, prolongation: csr_matrix) -> None:
@@ -102,16 +102,16 @@ class Fields:
         return csr_matrix(parts, shape=(rows, self.space.unknowns))
 
     @cached_property
-    def shifted(self) -> RepeatedSolves:
+    def shifted(self) -> _RepeatedSolves:
         """The stiffness of all nodes and a part of the surface's mass, which makes it positive."""
         matrix = csr_matrix(self.space.stiffness + _SHIFT * self.surface_mass)
-        return RepeatedSolves(matrix, self.space.prolongation(np.arange(self.space.unknowns)))
+        return _RepeatedSolves(matrix, self.space.prolongation(np.arange(self.space.unknowns)))
 
     @cached_property
-    def pinned(self) -> RepeatedSolves:
+    def pinned(self) -> _RepeatedSolves:
         """The stiffness of the nodes that are not on the surface."""
         inside = self.space.stiffness[self.inner][:, self.inner]
-        return RepeatedSolves(inside, self.space.prolongation(self.inner))
+        return _RepeatedSolves(inside, self.space.prolongation(self.inner))
 
     def harmonic(self, values: FloatArray) -> FloatArray:
         """Columns of nodal values, those inside replaced by the harmonic ones with walls without flux."""

@@ -69,8 +69,6 @@ class SloshingSystem:
     wall_drive: complex
     """Mean of x + i y over the outer wall less that over the free surface: the pressure of a surface that
     follows gravity at once."""
-    unknowns: int
-    """Of the mesh, before condensation."""
 
     def natural_frequencies(self) -> FloatArray:
         """All positive s, ascending.
@@ -125,7 +123,6 @@ def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]
         potential=_even_growth(grid) @ (stiffness[:, free] @ extension),
         surface_mean=surface.mean()[1:-1],
         wall_drive=_Line.of(nodes[:, grid[-1]]).mean_place - surface.mean_place,
-        unknowns=free.size,
     )
 
 

@@ -105,3 +105,18 @@ def turbulent_share(
     re = np.asarray(reynolds, dtype=np.float64)
     log_ratio = np.log(STRAIGHT_CRITICAL_REYNOLDS * np.asarray(critical_ratio, dtype=np.float64) / re)
     return np.asarray(1 / (1 + np.exp(clipped(sharpness * log_ratio, -300, 300))), dtype=np.float64)
+
+
+def reynolds_number(*, velocity: npt.ArrayLike, bore: float, kinematic_viscosity: float) -> FloatArray:
+    """Reynolds number of the tube, Re = |u| d/nu, u the mean over the bore."""
+    return np.asarray(np.abs(np.asarray(velocity, dtype=np.float64)) * bore / kinematic_viscosity)
+
+
+def rotation_reynolds_number(*, angular_velocity: float, bore: float, kinematic_viscosity: float) -> float:
+    """Rotation Reynolds number, R_Om = omega d^2/nu, the inverse of an Ekman number.
+
+    Args: `angular_velocity`: omega, rad/s, of either sign. `bore`: d, m. `kinematic_viscosity`: nu, m^2/s.
+    Returns: R_Om; with Re it makes Kl = R_Om Re (laminar), Kt = R_Om^2/Re (turbulent) and S = R_Om/Re.
+    Source: Ito and Nanbu, J. Basic Eng. 93 (1971) 383, definitions.
+    """
+    return abs(angular_velocity) * bore**2 / kinematic_viscosity

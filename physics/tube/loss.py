@@ -1,4 +1,5 @@
-"""Loss coefficient k(u) of the connecting tube, k = 2 (H_A - H_C)/u^2 - 1, from laminar to turbulent flow."""
+"""Loss coefficient k(u) of the connecting tube, k = 2 (H_A - H_C)/u^2 - 1, from laminar to turbulent flow,
+and where its correlations are used outside what their sources state."""
 
 from __future__ import annotations
 
@@ -6,17 +7,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
-from ringbalance.physics.tube.range import FULLY_TURBULENT_REYNOLDS, range_notes
+from ringbalance.physics.tube.bends import bend_in_range
+from ringbalance.physics.tube.ends import LAMINAR_ENTRY_LENGTH
 from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS
+from ringbalance.physics.tube.rotation_table import rotation_table_covers
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.physics.tube.uncertainty import uncertainty_parts
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import Scene, Tube
+
+FULLY_TURBULENT_REYNOLDS: Final = 4000.0
+"""Re above which a straight tube's flow is taken as turbulent."""
+LARGEST_REYNOLDS: Final = 1e6
+"""End of the data that the friction formula is compared with."""
+LARGEST_ROUGHNESS: Final = 0.05
+"""eps/d up to which the friction formula is compared with data, rounded up from 0.033."""
+VELOCITIES: Final = (0.1, 20.0)
+"""m/s: range for which k is calibrated."""
 
 
 class FlowState(StrEnum):
@@ -106,3 +119,28 @@ def flow_states(state: TubeState) -> npt.NDArray[np.str_]:
         [FlowState.LAMINAR.value, FlowState.TRANSITIONAL.value],
         FlowState.TURBULENT.value,
     ).astype(np.str_)
+
+
+def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[str, BoolArray]:
+    """For each sentence that holds anywhere on why a correlation is stretched, where it holds."""
+    re, rotation = state.reynolds, state.rotation_reynolds
+    laminar = re < state.critical_ratio * STRAIGHT_CRITICAL_REYNOLDS
+    unsteady = ~laminar & (re < state.critical_ratio * FULLY_TURBULENT_REYNOLDS)
+    low, high = VELOCITIES
+    notes = {"velocity outside 0.1 to 20 m/s": (velocity < low * (1 - 1e-9)) | (velocity > high * (1 + 1e-9))}
+    if tube.drag_coefficient is None:
+        shapes = all(bend_in_range(bend=b, bore=tube.bore) for b in tube.bends)
+        untested = ~rotation_table_covers(reynolds=re, rotation_reynolds=rotation)
+        developing = LAMINAR_ENTRY_LENGTH * re * tube.bore > tube.length
+        notes |= {
+            "friction: Re above 1e6": re > LARGEST_REYNOLDS,
+            "friction: relative roughness above 0.05": np.full(
+                re.shape, tube.roughness > LARGEST_ROUGHNESS * tube.bore
+            ),
+            "rotation: laminar factor beyond Kl = 1e7 or R_Om = 1e5": (laminar | unsteady) & untested,
+            "rotation: critical Re extrapolated beyond R_Om = 2000": unsteady & (rotation > 2000),
+            "bends: scaled from one computed shape in laminar flow": (laminar | unsteady) & bool(tube.bends),
+            "bends: angle above 180 deg or radius below d/2": np.full(re.shape, not shapes),
+            "ends: tube too short for a developed laminar profile": laminar & developing,
+        }
+    return {text: where for text, where in notes.items() if np.any(where)}

@@ -88,7 +88,6 @@ class _FrictionTable:
     """The same, towards the edge of the table."""
     rows: tuple[Mapping[str, str], ...]
     """As they stand in the file."""
-    header: tuple[str, ...]
 
 
 def _base_at(table: str, a: FloatArray, b: FloatArray) -> FloatArray:
@@ -153,7 +152,6 @@ def friction_table() -> _FrictionTable:
     """The table that comes with the package. Returns: The table, read once."""
     path = resources.files("ringbalance.physics") / "data" / "rotating_friction.csv"
     lines = path.read_text(encoding="utf-8").splitlines()
-    header = tuple(line[2:] for line in lines if line.startswith("#"))
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     part = {name: [r for r in rows if r["table"] == name] for name in {row["table"] for row in rows}}
     slow, fast = (_rectangle(name, part[name]) for name in ("slow", "fast"))
@@ -166,7 +164,6 @@ def friction_table() -> _FrictionTable:
         interpolation_error=max(float(gaps[n][near[n]].max()) for n in inner),
         edge_interpolation_error=max(float(gaps[n][~near[n]].max(initial=0.0)) for n in inner),
         rows=tuple(rows),
-        header=header,
     )
 
 

@@ -9,12 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.bends import (
-    BEND_UNCERTAINTY,
-    bend_loss,
-    straight_length,
-    turbulent_bend_loss,
-)
+from ringbalance.physics.tube.bends import BEND_UNCERTAINTY, bend_loss, straight_length, turbulent_bend_loss
 from ringbalance.physics.tube.ends import (
     TURBULENT_KINETIC_FACTOR,
     entrance_loss,
@@ -22,8 +17,7 @@ from ringbalance.physics.tube.ends import (
     kinetic_factor,
     turbulent_entrance_loss,
 )
-from ringbalance.physics.tube.friction import friction_factor
-from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
+from ringbalance.physics.tube.friction import friction_factor, reynolds_number, rotation_reynolds_number
 from ringbalance.physics.tube.rotation import (
     STRAIGHT_CRITICAL_REYNOLDS,
     critical_reynolds,
@@ -51,8 +45,6 @@ class TubeState:
     """Critical Re over the straight tube's."""
     rotating_friction: FloatArray
     """f with rotation."""
-    laminar_ratio: FloatArray
-    """F, laminar friction with rotation over that without."""
     bends: tuple[FloatArray, ...]
     """K of each bend, in order along the path."""
     bend_half_width: FloatArray
@@ -138,7 +130,6 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
         rotating_friction=turning,
         bends=tuple(k for k, _ in bends),
         bend_half_width=np.asarray(sum((w for _, w in bends), start=np.zeros(re.shape))),
-        laminar_ratio=laminar,
         kinetic_factor=alpha,
         terms=terms,
     )

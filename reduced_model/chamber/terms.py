@@ -16,7 +16,7 @@ from ringbalance.reduced_model.chamber.values import (
 )
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.models import Scene
 
 Terms = Mapping[str, Contribution]
 
@@ -183,7 +183,9 @@ def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
 def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
     largest = {name: max((row[name] for row in rows), default=0.0) for name in (RIPPLE, SLOSHING, MEAN)}
     disc = scene.disc
-    bare = _sector_area(disc=disc) * disc.axial_width
+    # Eqs. 1 and 2: S_c = theta (R2^2 - R1^2)/2, without plates.
+    sector = disc.central_angle / 2 * (disc.outer_radius**2 - disc.inner_radius**2)
+    bare = sector * disc.axial_width
     strips = 1 - chamber_volume(disc=disc) / bare
     pressures = part == "pressures"
     first = "rho omega^2 G |R2 s_2 - a s|/P" if pressures else "rho B a^2 G |shape|/U"
@@ -209,11 +211,3 @@ def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
         term: Contribution(term=term, value=float(value), formula=formula, source=source)
         for term, value, formula, source in found
     }
-
-
-def _sector_area(*, disc: Disc) -> float:
-    """Area of a chamber without its plates, S_c = theta (R2^2 - R1^2)/2.
-
-    Source: Eqs. 1 and 2.
-    """
-    return disc.central_angle / 2 * (disc.outer_radius**2 - disc.inner_radius**2)

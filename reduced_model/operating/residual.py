@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics.tube.draw_down import DRAW_DOWN_UNCERTAINTY, draw_down_depth
+from ringbalance.physics.tube.ends import DRAW_DOWN_UNCERTAINTY, draw_down_depth
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.scene.arrays import FloatArray

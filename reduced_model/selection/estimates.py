@@ -15,8 +15,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics.tube.friction import turbulent_share
-from ringbalance.physics.tube.numbers import reynolds_number
+from ringbalance.physics.tube.friction import reynolds_number, turbulent_share
 from ringbalance.reduced_model.chamber.range import (
     chamber_fills,
     mean_gravity,

@@ -19,16 +19,13 @@ _SPARE: Final = (*(style.line(index) for index in (2, 3, 5)), {"color": style.IN
 """Lines of further curves of a style that is taken."""
 
 
-def _positive(values: list[float | None]) -> bool:
-    return all(value is not None and value > 0 for value in values)
-
-
 def order_plot(case: Record) -> Drawing | None:
     """Error against mesh size, a line per sequence, with the formal order as a slope to compare.
 
     Returns: The figure; None when no sequence has errors.
     """
-    sequences = [s for s in case.get("convergence") or [] if s.get("error") and _positive(s["error"])]
+    studies = [s for s in case.get("convergence") or [] if s.get("error")]
+    sequences = [s for s in studies if all(error is not None and error > 0 for error in s["error"])]
     if not sequences:
         return None
 

@@ -94,7 +94,8 @@ def _lines(axes: Axes, told: Record, bore: FloatArray, nu: FloatArray) -> None:
     k, read = (np.log10(np.maximum(np.asarray(told[key]).T, 1e-3)) for key in ("k", "apparent_k"))
     levels = [level for level in _LEVELS if k.min() < np.log10(level) < k.max()]
     thin = axes.contour(bore, nu, k, levels=np.log10(levels), colors=[style.FOUND], linewidths=0.7)
-    names = dict(zip(thin.levels, (_level(level) for level in levels), strict=True))
+    shown = (short(level) if level < 10_000 else number(level, digits=1) for level in levels)
+    names = dict(zip(thin.levels, shown, strict=True))
     texts = axes.clabel(thin, fmt=names, inline=True, inline_spacing=3)
     for text in texts:
         text.set_color(style.FOUND)
@@ -116,10 +117,6 @@ def _lines(axes: Axes, told: Record, bore: FloatArray, nu: FloatArray) -> None:
         axes.plot(
             [], [], color=style.INK, linewidth=1.1, linestyle=(0, (4, 2)), label="Eq. 19’s velocity is right"
         )
-
-
-def _level(k: float) -> str:
-    return short(k) if k < 10_000 else number(k, digits=1)
 
 
 def _mark_liquids(axes: Axes, found: Record) -> None:

@@ -19,10 +19,9 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.origins import input_name
+from ringbalance.reports.prose import input_name, traced
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.tables import FOLDER, is_long, table_file
-from ringbalance.reports.traces import traced
 
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""

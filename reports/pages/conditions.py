@@ -7,11 +7,9 @@ from typing import Final
 
 from ringbalance.reduced_model.budget import UNSTATED, believed
 from ringbalance.reports.figures.operation import tornado
-from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, number, shown
-from ringbalance.reports.origins import named_with_origin
+from ringbalance.reports.prose import named_with_origin, read, states_uncertainty, traced
 from ringbalance.reports.section import Cells, Record, Section, Table
-from ringbalance.reports.traces import read, states_uncertainty, traced
 from ringbalance.verification.standing import budget_standing
 
 _NAMES: Final = {
@@ -38,7 +36,8 @@ _REGIMES: Final = {
 
 
 def _view(_own: Record, evidence: Record) -> Record:
-    return {"state": _state(evidence), "budgets": _budget_table(evidence), "tornado": _tornado(evidence)}
+    drawn = tornado(evidence["calibration"].get("budgets") or {}, _DRAWN)
+    return {"state": _state(evidence), "budgets": _budget_table(evidence), "tornado": drawn}
 
 
 def _state(evidence: Record) -> str:
@@ -74,10 +73,6 @@ def _budget_table(evidence: Record) -> Table:
         rows=[_row(evidence, name) for name in _NAMES if name in budgets],
         style="",
     )
-
-
-def _tornado(evidence: Record) -> Drawing | None:
-    return tornado(evidence["calibration"].get("budgets") or {}, _DRAWN)
 
 
 def _row(evidence: Record, name: str) -> Cells:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from ringbalance.reports import summary
-from ringbalance.reports.origins import input_name
+from ringbalance.reports.prose import input_name
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.verification.standing import HEADS, standing_rows
 
@@ -22,10 +22,6 @@ def _view(_own: Record, evidence: Record) -> Record:
         "credibility": _credibility(evidence),
         "fitted": bool(evidence["scene"].get("measured")),
     }
-
-
-def _of(evidence: Record, *kinds: str) -> list[Record]:
-    return [case for case in evidence["verification"] if case["kind"] in kinds]
 
 
 def _standing(evidence: Record) -> Table:
@@ -81,11 +77,12 @@ def _development(evidence: Record) -> list[Cells]:
         f"{_outcome(checks)}; numerical errors are estimated, and deliberate errors in the code must be "
         "noticed.",
     )
+    validated = any(case["kind"] == "validation" for case in checks)
     measured = ("1", "Parts only, see above; none of the device.")
     return [
         ("Data pedigree", *(pedigree if known else ("0", "No value comes from a document of the device."))),
         ("Verification", *(verified if checks else ("0", "No check was run for this report."))),
-        ("Validation", *(measured if _of(evidence, "validation") else ("0", "None was run."))),
+        ("Validation", *(measured if validated else ("0", "None was run."))),
     ]
 
 

@@ -109,7 +109,7 @@ def _facts(evidence: Record) -> tuple[tuple[str, str], ...]:
         ("Scene file", f"{scene['file']}, SHA-256 {scene['sha256']}"),
         ("Scene values", f"SHA-256 {scene['values_sha256']}; kept evidence names its scene by these"),
         ("Lock file", f"SHA-256 {made['lock_sha256']}" if made.get("lock_sha256") else "not there"),
-        ("evidence.json", f"SHA-256 {_evidence_hash(evidence)}"),
+        ("evidence.json", f"SHA-256 {hashlib.sha256(evidence_text(evidence).encode()).hexdigest()}"),
         ("Kept evidence", _kept(evidence)),
         ("Seeds", ", ".join(f"{name} {value}" for name, value in evidence["seeds"].items())),
         ("Beside this file", "annex.html, evidence.json, figures/, fields/ and tables/"),
@@ -119,11 +119,6 @@ def _facts(evidence: Record) -> tuple[tuple[str, str], ...]:
 def evidence_text(evidence: Record) -> str:
     """The evidence as its file holds it."""
     return json.dumps(evidence, allow_nan=False, indent=1, ensure_ascii=False) + "\n"
-
-
-def _evidence_hash(evidence: Record) -> str:
-    """SHA-256 of the evidence file."""
-    return hashlib.sha256(evidence_text(evidence).encode()).hexdigest()
 
 
 def _kept(evidence: Record) -> str:

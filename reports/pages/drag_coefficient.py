@@ -8,12 +8,13 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.range import VELOCITIES
+from ringbalance.physics.tube.loss import VELOCITIES
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reports.figures.drag_coefficient import drag_figures
 from ringbalance.reports.numbers import MISSING, given, measured, percent, shown
+from ringbalance.reports.prose import series
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
 from ringbalance.reports.studies.drag_map import BORES, ApparentDrag, DragMap, LiquidVerdicts
 from ringbalance.reports.studies.drag_point import DragPoint
@@ -257,12 +258,8 @@ def _lead(liquids: list[Record]) -> str:
     }
     if set(groups) == {"nothing flows"}:
         return "Under the scene’s gas pressure nothing flows in this tube, so no k can be given for it."
-    parts = [text.format(_series(groups[name])) for name, text in told.items() if name in groups]
+    parts = [text.format(series(groups[name])) for name, text in told.items() if name in groups]
     return f"In this tube, with k = 50: {'; '.join(parts)}."
-
-
-def _series(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, apart=True, show=_view)

@@ -47,16 +47,11 @@ def _view(found: Record, evidence: Record) -> Record | None:
         return None
     return {
         "claims": [{**case_view(case), "elsewhere": False} for case in cases],
-        "lead": _lead(cases),
+        "lead": f"Of {len(cases)} claims of the eccentric-mass paper {', '.join(summary.counted(cases))}.",
         "compared": compared and _table(compared),
         "status": _statuses(compared) if compared else [],
         "text": found.get("text", ""),
     }
-
-
-def _lead(cases: list[Record]) -> str:
-    parts = ", ".join(summary.counted(cases))
-    return f"Of {len(cases)} claims of the eccentric-mass paper {parts}."
 
 
 def _table(found: Record) -> Table:

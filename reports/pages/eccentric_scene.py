@@ -32,12 +32,11 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.origins import input_name, named_with_origin
 from ringbalance.reports.pages import credibility, document, measured
 from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.prose import input_name, named_with_origin, traced
 from ringbalance.reports.section import Cells, Record, Section, Table
 from ringbalance.reports.summary import OPEN
-from ringbalance.reports.traces import traced
 
 BALANCER: Final = "eccentric_mass"
 _MODEL: Final = "Plant and filters are models; no measurement of this machine is compared with here."
@@ -76,7 +75,7 @@ def _summary(_own: Record, evidence: Record) -> Record:
     ]
     stated = any(row["achieved_interval"] for row in rows)
     return _parts(
-        ("lead", _decision(rows)),
+        ("lead", summary.decided([(row["quantity"], row["verdict"]) for row in rows])),
         (
             "text",
             f"As the scene stands: {run['status'].rstrip('.')}. The largest amplitude of the run is "
@@ -90,15 +89,6 @@ def _summary(_own: Record, evidence: Record) -> Record:
         ("figure", requirement_bars(map(_bar, rows))),
         ("items", [_MODEL, _STATED if stated else _UNSTATED, _origins(evidence["scene"]["table"])]),
     )
-
-
-def _decision(rows: list[Record]) -> str:
-    """How many requirements are met, and which are not, as for the other balancer."""
-    named = {v: [row["quantity"] for row in rows if row["verdict"] == v] for v in ("not met", OPEN)}
-    met = len(rows) - sum(map(len, named.values()))
-    parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
-    are = "is" if met == 1 else "are"
-    return f"{'; '.join([f'{met} of {len(rows)} requirements {are} met', *parts])}."
 
 
 def _actions(rows: list[Record]) -> list[str]:

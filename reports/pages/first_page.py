@@ -10,7 +10,6 @@ from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING, THIN_SPACE, given, number, percent, shown
-from ringbalance.reports.origins import named_with_origin
 from ringbalance.reports.pages.requirements import (
     SMALLEST,
     STANDING,
@@ -21,10 +20,9 @@ from ringbalance.reports.pages.requirements import (
     requirement_table,
     requirements,
 )
-from ringbalance.reports.prose import key_words
+from ringbalance.reports.prose import found_at, key_words, named_with_origin, read, states_uncertainty, traced
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.summary import LIKELY, MISSED, OPEN
-from ringbalance.reports.traces import found_at, read, states_uncertainty, traced
+from ringbalance.reports.summary import LIKELY, MISSED, OPEN, tuning_of
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.uncertain import half_widths
 from ringbalance.verification.assumptions import assumptions_of
@@ -179,7 +177,7 @@ def loop_sentences(evidence: Record) -> list[str]:
 
 def _change(evidence: Record) -> str:
     """Keys and values that are recommended beside the gain, as keys of the scene file; empty: none."""
-    return str(((evidence.get("summary") or {}).get("tuning") or {}).get("change") or "")
+    return str(tuning_of(evidence).get("change") or "")
 
 
 def _retuned(evidence: Record) -> Record | None:
@@ -295,7 +293,7 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
     valve = _VALVE.get(verdicts.get(SMALLEST, ""))
     valve_named = "the scene’s valve" if line["given"] else "any valve of the default range"
     told = [valve.format(valve=valve_named)] if valve else []
-    tuned, tuning = _retuned(evidence), (evidence.get("summary") or {}).get("tuning") or {}
+    tuned, tuning = _retuned(evidence), tuning_of(evidence)
     if tuned is None:
         return told
     gain = shown(tuned["proportional_s_per_m"], "s/m", digits=2)

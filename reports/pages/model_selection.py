@@ -13,11 +13,7 @@ from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.numbers import MISSING, number, percent
 from ringbalance.reports.section import Record, Section, Table, Work
 from ringbalance.scene.models import Scene
-from ringbalance.verification.selection_studies.study import (
-    TradeStudy,
-    tolerance_text,
-    trade_study,
-)
+from ringbalance.verification.selection_studies.study import TradeStudy, tolerance_text, trade_study
 
 _LEAST: Final = 1e-9
 """Error at which a model that equals the finest is drawn."""

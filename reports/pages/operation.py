@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Final
+import math
+from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, PathPatch
+from matplotlib.path import Path
 
 from ringbalance.mesh.outline import outlines
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reports.figures import style
 from ringbalance.reports.figures.operation import operating_map
-from ringbalance.reports.figures.section import disc_section
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.numbers import given, number
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.scene.arrays import IntArray
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 _FILLS: Final = 101
@@ -23,6 +31,11 @@ _PLACES: Final = 7
 """Of an outline, m."""
 _SPILLING: Final = "spilling"
 _NAMES: Final = (*(regime.label for regime in Regime), _SPILLING)
+_MILLIMETRES: Final = 1e3
+_HEIGHT: Final = 4.1
+_REACH: Final = 1.42
+"""Half the height of the picture over the outer radius: room for the dimensions."""
+_TUBE: Final[dict[str, Any]] = {"color": style.PAPER, "linewidth": 2.0}
 
 
 def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.ArrayLike) -> IntArray:
@@ -91,6 +104,233 @@ def _view(found: Record, evidence: Record) -> Record:
     surface = np.interp(disc["fill_ratio"], chamber["fill_ratio"], chamber["free_surface_radius_m"])
     disc = {**disc, "free_surface_radius_m": float(surface)}
     return {"map": operating_map(found), "disc": disc_section(disc)}
+
+
+def disc_section(found: Record) -> Drawing:
+    """Section of the disc with its dimensions.
+
+    Args: `found`: `disc` of the evidence: lengths in m, angles in rad, the fill that is drawn and, of an
+        imported chamber, its sections under "outlines".
+    """
+    size = {
+        key.removesuffix("_m"): value * _MILLIMETRES
+        for key, value in found.items()
+        if key.endswith("_m") and value is not None
+    }
+    reach = _REACH * size["outer_radius"]
+
+    def paint(axes: Axes) -> None:
+        axes.set_axis_off()
+        figure = style.figure_of(axes)
+        across, along = figure.add_axes((0.0, 0.0, 0.56, 1)), figure.add_axes((0.57, 0.0, 0.43, 1))
+        for panel, width in ((across, 0.56), (along, 0.43)):
+            half = reach * width * style.WIDE / _HEIGHT
+            panel.set(xlim=(-half, half), ylim=(-reach, reach), aspect="equal")
+            panel.set_axis_off()
+        _across(across, found, size)
+        _along(along, found, size)
+
+    r1, r2, width = (given(found[key], "m") for key in ("inner_radius_m", "outer_radius_m", "axial_width_m"))
+    fill = number(found["fill_ratio"], digits=2)
+    return draw(
+        name="disc-section",
+        paint=paint,
+        columns=0,
+        wide=True,
+        height=_HEIGHT,
+        alt=f"Section of the disc: {found['chambers']} chambers between {r1} and {r2}, {width} wide.",
+        caption=f"Section across the shaft and along it, dimensions in mm, to scale but for the bore, at a "
+        f"fill ratio of {fill}. The tube joins opposite chambers; the other pairs’ tubes are left out."
+        f"{_assumed(found)}",
+    )
+
+
+def _assumed(found: Record) -> str:
+    names = [key_words(f"tube.{name}") for name, origin in found["origins"].items() if origin == "assumed"]
+    return f" Assumed: {', '.join(names)}." if names else ""
+
+
+def _arc(radius: float, start: float, end: float) -> FloatArray:
+    angle = np.linspace(start, end, 61)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def _arrow(panel: Axes, start: Sequence[float], end: Sequence[float], kind: str, **line: Any) -> None:
+    """A line between two places, with the heads of its kind."""
+    shape = {"arrowstyle": kind, "color": style.INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, **line}
+    panel.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=shape)
+
+
+def _sector(inner: float, outer: float, middle: float, half: float, strip: float) -> FloatArray:
+    """Outline of what lies between two radii of a chamber, its plates' strips taken off."""
+    ends = [half - math.asin(min(strip / radius, 1.0)) for radius in (outer, inner)]
+    return np.vstack(
+        [
+            _arc(outer, middle - ends[0], middle + ends[0]),
+            _arc(inner, middle + ends[1], middle - ends[1]),
+        ]
+    )
+
+
+def _closed_lines(found: Record, size: dict[str, float]) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Closed lines around the first chamber's space across the shaft, (x, y), and along it, (z, x)."""
+    drawn = found.get("outlines")
+    if drawn is not None:
+        across, along = (
+            [np.array(loop) * _MILLIMETRES for loop in drawn[plane]] for plane in ("across_m", "along_m")
+        )
+        return across, [loop[:, ::-1] for loop in along]
+    inner, outer, half = size["inner_radius"], size["outer_radius"], size["axial_width"] / 2
+    sector = _sector(inner, outer, 0.0, found["central_angle_rad"] / 2, size["plate_thickness"])
+    return [sector], [np.array([[-half, inner], [half, inner], [half, outer], [-half, outer]])]
+
+
+def _area(loops: Sequence[FloatArray]) -> Path:
+    """What lies within the outermost lines and outside those within them."""
+    parts = []
+    for loop in loops:
+        within = sum(Path(other).contains_point(loop[0]) for other in loops if other is not loop)
+        x, y = loop.T
+        rising = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) > 0
+        turned = loop if rising == (within % 2 == 0) else loop[::-1]
+        parts.append(Path(np.vstack([turned, turned[:1]]), closed=True))
+    return Path.make_compound_path(*parts)
+
+
+def _filled(panel: Axes, area: Path, liquid: Path) -> None:
+    """A chamber's gas, and its liquid where the place is one of `liquid`."""
+    panel.add_patch(PathPatch(area, facecolor=style.SURFACE, edgecolor=style.INK, linewidth=0.6))
+    wet = PathPatch(area, facecolor=style.MAP[7], edgecolor=style.INK, linewidth=0.6)
+    panel.add_patch(wet)
+    wet.set_clip_path(liquid, panel.transData)
+    panel.add_patch(PathPatch(area, facecolor="none", edgecolor=style.INK, linewidth=0.6))
+
+
+def _turned(loops: Sequence[FloatArray], angle: float) -> list[FloatArray]:
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    return [loop @ turn for loop in loops]
+
+
+def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
+    inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
+    strip, half = size["plate_thickness"], found["central_angle_rad"] / 2
+    panel.add_patch(Circle((0, 0), outer, facecolor=style.MAP[3], edgecolor=style.INK, linewidth=1))
+    loops, _ = _closed_lines(found, size)
+    ring = _area([_arc(1.1 * outer, 0, 2 * math.pi), _arc(surface, 0, 2 * math.pi)])
+    for index in range(found["chambers"]):
+        middle = 2 * math.pi * index / found["chambers"]
+        area = _area(_turned(loops, middle))
+        _filled(panel, area, ring)
+        level = Circle((0, 0), surface, facecolor="none", edgecolor=style.INK, linewidth=0.6)
+        panel.add_patch(level).set_clip_path(area, panel.transData)
+        place = _letter_radius(size) * np.exp(1j * (middle + 0.62 * half))
+        panel.text(place.real, place.imag, chr(ord("A") + index), ha="center", va="center", weight="bold")
+    panel.plot(0, 0, "+", color=style.INK, markersize=9)
+    _tube(panel, size)
+    _radius(panel, outer, -0.5, f"R₂ {number(outer, digits=4)}", share=1.34)
+    _radius(panel, inner, -2.1, f"R₁ {number(inner, digits=4)}")
+    _radius(panel, surface, -2.62, f"R₁′ {number(surface, digits=4)}")
+    arc = 1.1 * outer
+    low, high = ([arc * math.cos(half), sign * arc * math.sin(half)] for sign in (-1, 1))
+    _arrow(panel, low, high, "<->", connectionstyle=f"arc3,rad={math.tan(half / 2):.3f}")
+    for sign in (-1, 1):
+        edge = np.outer([0, 1.14 * outer], [math.cos(half), sign * math.sin(half)])
+        panel.plot(*edge.T, color=style.MUTED, linewidth=0.7, linestyle=(0, (6, 2, 1, 2)))
+    panel.text(1.13 * outer, 0.12 * outer, f"θ {number(math.degrees(found['central_angle_rad']), digits=3)}°")
+    if "outlines" in found:
+        return
+    wall = 0.9 * outer * np.exp(1j * (half - strip / outer / 2))
+    _note(
+        panel, f"t {number(strip, digits=3)} each side", (wall.real, wall.imag), (0.72 * outer, 1.25 * outer)
+    )
+
+
+def _letter_radius(size: dict[str, float]) -> float:
+    """In the gas, in the wider of the gaps that the tube's way round leaves."""
+    inner, surface = size["inner_radius"], size["free_surface_radius"]
+    crest = min(max(size.get("crest_radius", inner), inner), surface)
+    return (inner + crest) / 2 if crest - inner > surface - crest else (crest + surface) / 2
+
+
+def _tube(panel: Axes, size: dict[str, float]) -> None:
+    """Out of chamber A, inward to the crest, half-way round at its radius, and outward."""
+    port, crest = size["port_radius"], size.get("crest_radius")
+    if crest is None:
+        panel.plot([port, -port], [0, 0], **_TUBE)
+        return
+    arc = _arc(crest, 0, math.pi)
+    path = np.vstack([[[port, 0]], arc, [[-port, 0]]])
+    panel.plot(*path.T, **_TUBE)
+    panel.plot([port, -port], [0, 0], "o", color=style.PAPER, markersize=5)
+    _note(
+        panel,
+        f"tube, bore {number(size['bore'], digits=3)}, length {number(size['length'], digits=4)}",
+        (float(arc[34, 0]), float(arc[34, 1])),
+        (-1.4 * port, 1.3 * port),
+    )
+    _radius(panel, crest, math.pi / 2 + 0.12, f"rₘ {number(crest, digits=3)}", share=0.75)
+    _note(panel, f"port {number(port, digits=3)}", (-port, 0), (-1.43 * port, -0.28 * port))
+
+
+def _radius(panel: Axes, radius: float, angle: float, text: str, *, share: float = 1.22) -> None:
+    """An arrow from the shaft to a radius; its label beyond the rim, or on the way."""
+    tip = [radius * math.cos(angle), radius * math.sin(angle)]
+    _arrow(panel, (0, 0), tip, "-|>")
+    rim = panel.get_ylim()[1] / _REACH
+    place = (share * rim if share > 1 else share * radius) * np.array([math.cos(angle), math.sin(angle)])
+    if share < 1:
+        place[0] += 0.05 * rim
+    else:
+        panel.plot(*np.array([tip, 0.95 * place]).T, color=style.MUTED, linewidth=0.7)
+    panel.text(place[0], place[1], text, ha="center" if share > 1 else "left", va="center", color=style.INK)
+
+
+def _note(panel: Axes, text: str, at: tuple[float, float], place: tuple[float, float]) -> None:
+    panel.annotate(
+        text,
+        at,
+        place,
+        color=style.INK,
+        va="center",
+        arrowprops={"arrowstyle": "-", "color": style.MUTED, "linewidth": 0.7},
+    )
+
+
+def _along(panel: Axes, found: Record, size: dict[str, float]) -> None:
+    inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
+    half = size["axial_width"] / 2
+    wall = 0.06 * outer
+    _, loops = _closed_lines(found, size)
+    reach = 1.1 * np.array([half, outer])
+    for sign in (-1, 1):
+        level = sign * surface
+        liquid = np.array([[-1, level], [1, level], [1, sign * reach[1]], [-1, sign * reach[1]]])
+        liquid[:, 0] *= reach[0]
+        _filled(panel, _area([loop * [1, sign] for loop in loops]), Path(liquid))
+        panel.plot([-half, half], [level, level], color=style.INK, linewidth=0.6)
+        panel.plot([half, half + wall], [sign * size["port_radius"] * 0.985] * 2, **_TUBE)
+    crest = size.get("crest_radius", 0.0)
+    panel.plot([half + wall] * 3, [0.985 * size["port_radius"], crest, -0.985 * size["port_radius"]], **_TUBE)
+    panel.plot(
+        [-1.35 * half, 1.5 * half], [0, 0], color=style.MUTED, linewidth=0.8, linestyle=(0, (8, 2, 1, 2))
+    )
+    _span(panel, (-half, half), -1.14 * outer, f"B {number(2 * half, digits=4)}")
+    panel.text(-half - 0.1 * outer, 0.62 * (inner + outer), "valve side:\ngas line", ha="right", va="center")
+    level = 0.5 * (inner + surface)
+    _arrow(panel, (-half - 0.35 * outer, level), (-half, level), "-|>", color=style.THIRD, linewidth=1.4)
+    panel.text(half + 2 * wall, 0.72 * outer, "tube", color=style.PAPER, va="center")
+    panel.text(0, (surface + outer) / 2, "liquid", ha="center", va="center")
+    # Beside the middle, where a gas tube may stand.
+    panel.text(-half / 2, (surface + inner) / 2, "gas", ha="center", va="center")
+    panel.text(1.5 * half, 0.04 * outer, "shaft", ha="right", va="bottom", color=style.MUTED)
+
+
+def _span(panel: Axes, ends: tuple[float, float], level: float, text: str) -> None:
+    """A dimension line with its value below."""
+    _arrow(panel, (ends[0], level), (ends[1], level), "<->")
+    for end in ends:
+        panel.plot([end, end], [level * 0.9, level * 1.04], color=style.MUTED, linewidth=0.7)
+    panel.text(sum(ends) / 2, level * 1.03, text, ha="center", va="top")
 
 
 SECTION: Final = Section(

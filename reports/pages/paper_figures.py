@@ -21,11 +21,9 @@ from ringbalance.reports.numbers import given, number, percent, short, shown
 from ringbalance.reports.section import Record, Section, Table, Work
 from ringbalance.scene.models import Scene
 from ringbalance.verification import paper_numbers
-from ringbalance.verification.loops import AMPLITUDES, PHASES, calibration_of, loop_scene, run_loop
+from ringbalance.verification.loops import AMPLITUDES, GAINS, PHASES, calibration_of, loop_scene, run_loop
 from ringbalance.verification.runner import paper_scene
 
-_GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
-"""Kp of Fig. 7, s/m."""
 _FILLS: Final = 41
 _SEARCH: Final = tuple((np.arange(4, 41) * 5e3).tolist())
 """Kp among which the onset of overshoot is looked for, s/m."""
@@ -41,7 +39,7 @@ def _collect(work: Work) -> Record:
         "constants": _constants(scene, model),
         "velocity": _velocities(scene, calibration),
         "trial": [_run(run_loop(loop_scene(scene, kind="trial", phase=phase)), phase) for phase in PHASES],
-        "gains": [_run(_proportional(scene, gain), gain) for gain in _GAINS],
+        "gains": [_run(run_loop(_alone(scene, gain)), gain) for gain in GAINS],
         "amplitudes": [
             _run(run_loop(loop_scene(scene, kind="target_vector", amplitude=a)), a) for a in AMPLITUDES
         ],
@@ -50,8 +48,9 @@ def _collect(work: Work) -> Record:
     }
 
 
-def _proportional(scene: Scene, gain: float) -> Simulation:
-    return run_loop(loop_scene(scene, kind="target_vector", proportional=gain, integral_time=None))
+def _alone(scene: Scene, gain: float) -> Scene:
+    """With the proportional part alone."""
+    return loop_scene(scene, kind="target_vector", proportional=gain, integral_time=None)
 
 
 def _rate(scene: Scene, model: BalancerModel) -> float:
@@ -130,18 +129,15 @@ def _run(run: Simulation, of: float) -> Record:
     }
 
 
-def _alone(scene: Scene, model: BalancerModel, gain: float) -> Simulation:
-    """The proportional part alone."""
-    return simulate(loop_scene(scene, kind="target_vector", proportional=gain, integral_time=None), model)
-
-
 def _reading(scene: Scene, model: BalancerModel) -> Record:
     """Lambda per transferred mass, which the loop uses, against Eqs. 21 and 22 taken literally."""
     literal = replace(model, moment=literal_moment(model))
 
     def onset(balancer: BalancerModel) -> float | None:
         # A larger gain never overshoots less.
-        first = bisect_left(_SEARCH, True, key=lambda gain: _alone(scene, balancer, gain).overshoots > 0)
+        first = bisect_left(
+            _SEARCH, True, key=lambda gain: simulate(_alone(scene, gain), balancer).overshoots > 0
+        )
         return _SEARCH[first] if first < len(_SEARCH) else None
 
     full = loop_scene(scene, kind="target_vector")

@@ -11,7 +11,7 @@ from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.numbers import given, number, percent, shown
-from ringbalance.reports.origins import resting
+from ringbalance.reports.prose import evidence_at, read, resting, traced, untraced
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.summary import (
     LIKELY,
@@ -21,6 +21,7 @@ from ringbalance.reports.summary import (
     UNASKED,
     above,
     below,
+    decided,
     ideal_valve,
     line_verdict,
     runs_settled,
@@ -29,7 +30,6 @@ from ringbalance.reports.summary import (
     what_enlarges,
     worst,
 )
-from ringbalance.reports.traces import evidence_at, read, traced, untraced
 from ringbalance.scene import Scene
 
 STANDING: Final = "Vibration up to which the scene’s valve-open times transfer no liquid"
@@ -48,13 +48,12 @@ class Requirement:
     rests: str
     """Inputs behind it that nobody gave, with their origin."""
     required: float | None = None
-    """As a number of `unit`; None where there is none to draw."""
+    """In SI units; None where there is none to draw."""
     reached: float | None = None
     uncertainty: float = 0.0
     low: float | None = None
     high: float | None = None
     """Ends of what is reached, where they are others than plus and minus the uncertainty."""
-    unit: str = "1"
     at_least: bool = True
     """Whether more than required is better."""
 
@@ -124,12 +123,8 @@ def requirement_figure(rows: Iterable[Requirement]) -> Drawing | None:
 
 def decision(rows: Iterable[Requirement]) -> str:
     """One sentence: how many requirements are met, and which are not."""
-    judged = [row for row in rows if row.verdict in {MET, MISSED, OPEN}]
-    named = {v: [r.name[0].lower() + r.name[1:] for r in judged if r.verdict == v] for v in (MISSED, OPEN)}
-    met = len(judged) - sum(map(len, named.values()))
-    said = f"{met} of {len(judged)} requirements {'is' if met == 1 else 'are'} met"
-    parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
-    return "; ".join([said, *parts]) + "."
+    asked = (row for row in rows if row.verdict != UNASKED)
+    return decided([(row.name[0].lower() + row.name[1:], row.verdict) for row in asked])
 
 
 def _capacity(evidence: Record) -> Requirement | None:
@@ -151,7 +146,6 @@ def _capacity(evidence: Record) -> Requirement | None:
         required=needed,
         reached=rest["usable_pair_moment_kg_m"],
         uncertainty=both,
-        unit="kg m",
     )
 
 
@@ -190,7 +184,6 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
         uncertainty=both,
         low=gas * point[key] / most - both if most > 0 else None,
         high=gas * point[key] / least + both if least > 0 else None,
-        unit="Pa",
     )
 
 
@@ -269,7 +262,6 @@ def _settling(evidence: Record) -> Requirement | None:
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "controller.period"),
         required=wanted,
         reached=times.get("p95"),
-        unit="s",
         at_least=False,
     )
 
@@ -307,7 +299,6 @@ def _residual_row(evidence: Record) -> Requirement | None:
         # Where more than noise decides, a bar of the noise would show less than is there.
         required=limit if verdict == alone else None,
         reached=noise,
-        unit="m",
         at_least=False,
     )
 
@@ -341,23 +332,19 @@ def _of_line(evidence: Record, key: str, name: str, *, bound: str = "limit_m") -
         read(evidence, f"calibration.gas_line.ends.{i}.{key}", "m", digits=2) for i in (ends[0], ends[-1])
     )
     least, most = (line["ends"][i][key] for i in (ends[0], ends[-1]))
+    reached = low if len(ends) == 1 else f"{low} (fast valve) to {high} (slow valve)"
     return Requirement(
         name=name,
         wanted=f"at most {given(line[bound], 'm', digits=2)}",
-        result=_valves(low, high, len(ends)) if most else "none",
+        result=reached if most else "none",
         verdict=below((least, most), line[bound]),
         rests="" if line["given"] else "a default range of valves: the scene describes none",
         required=line[bound],
         reached=least,
         low=least,
         high=most,
-        unit="m",
         at_least=False,
     )
-
-
-def _valves(low: str, high: str, valves: int) -> str:
-    return low if valves == 1 else f"{low} (fast valve) to {high} (slow valve)"
 
 
 def _grade_row(evidence: Record) -> Requirement | None:
@@ -377,6 +364,5 @@ def _grade_row(evidence: Record) -> Requirement | None:
         rests=resting(evidence, "rotor.mass", "rotor.influence_coefficient"),
         required=bound if verdict == below((reached,), bound or reached) else None,
         reached=reached,
-        unit="m/s",
         at_least=False,
     )

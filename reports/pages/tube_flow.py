@@ -234,7 +234,8 @@ def _view(found: Record, evidence: Record) -> Record:
 
 def _lead(found: Record) -> str:
     asked, drawn = found["reynolds"], found["section"]["reynolds"]
-    told = f"At the operating point Re is {number(asked, digits=3)} and ωd²/ν {_rotation(found)}"
+    rotation = number(found["rotation_reynolds"], digits=3)
+    told = f"At the operating point Re is {number(asked, digits=3)} and ωd²/ν {rotation}"
     if found["laminar"] and drawn > 0.999 * asked:
         return f"{told}: laminar, and drawn as it is."
     why = "so fast a laminar flow is thin layers" if found["laminar"] else "there the flow is not laminar"
@@ -242,10 +243,6 @@ def _lead(found: Record) -> str:
         f"{told}; {why}. Drawn is laminar flow at Re {number(drawn, digits=3)} with the same ratio of "
         "ωd²/ν to Re: the pattern, not the flow of this tube."
     )
-
-
-def _rotation(found: Record) -> str:
-    return number(found["rotation_reynolds"], digits=3)
 
 
 def three_dimensional_check(evidence: Record) -> Record | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import groupby
 from typing import Any, Final
 
 import numpy as np
@@ -11,7 +10,7 @@ from matplotlib import colormaps
 
 from ringbalance.reports.pictures.disc_shapes import ring
 from ringbalance.reports.pictures.style import Bar, Label, Theme, label_at, look
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, stretches
 
 Record = dict[str, Any]
 
@@ -31,7 +30,7 @@ def draw_tube(
     pressure, full = np.array(told["pressure"]) * 1e-6, np.array(told["full"], dtype=bool)
     low, high = float(pressure.min()), float(pressure.max())
     _add_disc(plotter, disc, theme)
-    for filled, part in _runs(full):
+    for filled, part in stretches(full.tolist()):
         _add_part(plotter, points[part], pressure[part], filled, (low, high), _THICK * outer, theme)
     edge = 1.08 * outer
     look(
@@ -43,16 +42,6 @@ def draw_tube(
         lift=0.17,
     )
     return _labels(points, full, job, told), Bar.of("pressure in MPa", _VIRIDIS, (low, high))
-
-
-def _runs(full: BoolArray) -> list[tuple[bool, slice]]:
-    """Stretches with and without liquid, each reaching to the next one's first point."""
-    found, start = [], 0
-    for filled, members in groupby(full):
-        stop = start + len(list(members))
-        found.append((bool(filled), slice(start, min(stop + 1, full.size))))
-        start = stop
-    return found
 
 
 def _add_disc(plotter: Any, disc: Record, theme: Theme) -> None:

@@ -40,7 +40,7 @@ _FILLS: Final = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outside:
+class _Outside:
     """Faces that bound the liquid, for drawing."""
 
     places: FloatArray
@@ -68,10 +68,10 @@ class ShownField(Protocol):
         ...
 
     def write(self, *, path: Path) -> Path:
-        """Write gauge pressure, Pa, and depth below the free surface, m. Raises: OSError."""
+        """Write gauge pressure, Pa, and depth below the free surface, m, to a VTU file. Raises: OSError."""
         ...
 
-    def outside(self) -> Outside:
+    def outside(self) -> _Outside:
         """What bounds the liquid."""
         ...
 
@@ -110,7 +110,6 @@ class ChamberField:
     """On the three-dimensional mesh."""
 
     def record(self) -> Record:
-        """Sizes and quality of the mesh, and how the solve ended."""
         chamber, solution = self.solution.chamber, self.solution
         quality = chamber.quality()
         return {
@@ -129,8 +128,7 @@ class ChamberField:
         radius = np.hypot(*chamber.places[:2, line])
         return _profile(scene, self.fill_ratio, radius, self.solution.pressure[line])
 
-    def outside(self) -> Outside:
-        """What bounds the liquid."""
+    def outside(self) -> _Outside:
         chamber = self.solution.chamber
         corners = chamber.grid[(slice(None, None, chamber.order),) * 3]
         sides = [np.take(corners, end, axis=axis) for axis in range(3) for end in (0, -1)]
@@ -138,13 +136,9 @@ class ChamberField:
             np.stack([side[:-1, :-1], side[1:, :-1], side[1:, 1:], side[:-1, 1:]], axis=-1).reshape(-1, 4)
             for side in sides
         ]
-        return Outside(places=chamber.places.T, faces=np.concatenate(faces), pressure=self.solution.pressure)
+        return _Outside(places=chamber.places.T, faces=np.concatenate(faces), pressure=self.solution.pressure)
 
     def write(self, *, path: Path) -> Path:
-        """Write the field to a VTU file: gauge pressure in Pa and depth below the free surface in m.
-
-        Raises: OSError: the file cannot be written.
-        """
         chamber = self.solution.chamber
         radius = np.hypot(*chamber.places[:2])
         fields = {
@@ -210,11 +204,11 @@ class ImportedField:
         }
         return write_cells(path, kind="tetra10", points=self.body.nodes, cells=self.body.cells, fields=fields)
 
-    def outside(self) -> Outside:
+    def outside(self) -> _Outside:
         cell, face = np.nonzero(self.body.faces >= 0)
         corners = np.take_along_axis(self.body.cells[cell], FACES[face], axis=1)
         faces = np.concatenate([corners, corners[:, -1:]], axis=1)
-        return Outside(places=self.body.nodes, faces=faces, pressure=self.solution.values)
+        return _Outside(places=self.body.nodes, faces=faces, pressure=self.solution.values)
 
 
 def _imported_field(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: float) -> ImportedField:

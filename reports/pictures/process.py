@@ -33,7 +33,7 @@ _LOG: Final = "drawing.txt"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drawing3D:
+class _Drawing3D:
     """Pictures that are being drawn, or the reason why they are not."""
 
     process: subprocess.Popen[bytes] | None
@@ -94,7 +94,7 @@ def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
 
 def start_drawing(
     *, scene: Scene, fields: Mapping[str, Path], folder: Path, opengl: OpenGL | None = None
-) -> Drawing3D:
+) -> _Drawing3D:
     """Begin to draw in a process of its own, or say why nothing can be drawn.
 
     Raises: OSError: the folder cannot be written.
@@ -105,7 +105,7 @@ def start_drawing(
     tube = tube_field(scene)
     captions = _captions(scene, tube)
     if not found.available:
-        return Drawing3D(process=None, text=found.text, folder=figures, captions=captions)
+        return _Drawing3D(process=None, text=found.text, folder=figures, captions=captions)
     job = folder / _JOB
     job.write_text(json.dumps({**_job(scene, fields, figures), "tube": tube}), encoding="utf-8")
     with open(folder / _LOG, "wb") as log:
@@ -117,7 +117,7 @@ def start_drawing(
             stdout=subprocess.DEVNULL,
             stderr=log,
         )
-    return Drawing3D(process=process, text=found.text, folder=figures, captions=captions)
+    return _Drawing3D(process=process, text=found.text, folder=figures, captions=captions)
 
 
 def _fault(process: subprocess.Popen[bytes], log: Path) -> str:

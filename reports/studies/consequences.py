@@ -10,11 +10,7 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.ensemble.monte_carlo import (
-    Ensemble,
-    ensemble_transfer,
-    simulate_ensemble,
-)
+from ringbalance.controller.ensemble.monte_carlo import Ensemble, ensemble_transfer, simulate_ensemble
 from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
@@ -22,7 +18,7 @@ from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reports.studies.consequences_gain import GainCurve, LoopGain, loop_gain
+from ringbalance.reports.studies.consequences_gain import LoopGain, loop_gain
 from ringbalance.scene.models import Scene
 from ringbalance.verification.assumptions import KNOWN
 
@@ -258,6 +254,10 @@ def _run_document(run: Run) -> dict[str, Any]:
 
 
 def _gain_document(gain: LoopGain) -> dict[str, Any]:
+    curve = {
+        name: [float(v) if np.isfinite(v) else None for v in values]
+        for name, values in vars(gain.over_drag).items()
+    }
     return {
         "law": gain.law,
         "velocity_m_s": gain.velocity,
@@ -271,13 +271,5 @@ def _gain_document(gain: LoopGain) -> dict[str, Any]:
         "margin_to_overshoot": 1 / gain.per_operation,
         "margin_to_instability": 2 / gain.per_operation,
         "lag_margin_rad": gain.lag_margin,
-        "over_drag_coefficient": _curve_document(gain.over_drag),
+        "over_drag_coefficient": curve,
     }
-
-
-def _curve_document(curve: GainCurve) -> dict[str, Any]:
-    return {name: [_number(v) for v in values] for name, values in vars(curve).items()}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -101,11 +101,6 @@ class DragMap:
             velocity_paper=float(_velocity_paper(rho, scene.gas.pressure)),
         )
 
-    @property
-    def velocity_error(self) -> FloatArray:
-        """Eq. 19's velocity over the operating point's, less one; zero where nothing flows, shape (n, m)."""
-        return _over(self.velocity_paper, self.point)
-
     def contour(
         self, *, k: float = paper.PAPER_DRAG_COEFFICIENT, apparent: bool = False
     ) -> tuple[FloatArray, FloatArray]:

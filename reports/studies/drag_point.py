@@ -13,8 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.loss import flow_states
-from ringbalance.physics.tube.range import range_notes
+from ringbalance.physics.tube.loss import flow_states, range_notes
 from ringbalance.physics.tube.state import TubeState, tube_state_at
 from ringbalance.physics.tube.uncertainty import input_parts, model_parts
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -273,19 +272,14 @@ def _parts(
     at_hand = replace(scene, tube=tube, uncertainty=(*stated, _EXACT_VISCOSITY))
     parts |= input_parts(at_hand, k_of=lambda moved: k_of(moved.tube, nu, moved.rotor.speed), k=state.k)
     if np.any(batch.relative_viscosity > 0):
-        sides = [
-            k_of(tube, nu * factor, scene.rotor.speed) for factor in _either_way(batch.relative_viscosity)
-        ]
+        factors = (np.maximum(1 - batch.relative_viscosity, 0.1), 1 + batch.relative_viscosity)
+        sides = [k_of(tube, nu * factor, scene.rotor.speed) for factor in factors]
         parts["input: kinematic_viscosity"] = np.max(np.abs(np.array(sides) - state.k), axis=0)
     return parts
 
 
 _EXACT_VISCOSITY: Final = InputUncertainty(quantity="kinematic_viscosity", half_width=0.0, relative=True)
 """Viscosities are those of the charge, each with its own uncertainty."""
-
-
-def _either_way(relative: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return np.maximum(1 - relative, 0.1), 1 + relative
 
 
 def _half_widths(

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Final, Protocol
 
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.contents import Contents, Elements, MeshFileError, numbers_in, whole
-from ringbalance.scene.chamber_file.elements import GMSH_KINDS, GMSH_ORDER, NODES
+from ringbalance.scene.chamber_file.elements import GMSH_KINDS, GMSH_ORDER, NODES, dimension
 
 _FORMATS: Final = "Gmsh 2.2 or 4.1 (File > Export, or -format msh41), Abaqus .inp, .vtu, or .step"
 _SECTION: Final = re.compile(rb"^\$(\w{1,40})[ \t]*\r?\n", re.MULTILINE)
@@ -153,13 +154,13 @@ def _read_4(sections: Mapping[str, bytes], names: Names, binary: bool) -> Conten
 def _entities(stream: _Stream) -> dict[tuple[int, int], tuple[int, ...]]:
     """Physical numbers of each entity, by dimension and number."""
     found = {}
-    for dimension, count in enumerate(stream.sizes(4).tolist()):
+    for of, count in enumerate(stream.sizes(4).tolist()):
         for _ in range(count):
             tag = int(stream.integers(1)[0])
-            stream.reals(3 if dimension == 0 else 6)
+            stream.reals(3 if of == 0 else 6)
             groups = stream.integers(int(stream.sizes(1)[0]))
-            found[dimension, tag] = tuple(dict.fromkeys(np.abs(groups).tolist()))
-            if dimension:
+            found[of, tag] = tuple(dict.fromkeys(np.abs(groups).tolist()))
+            if of:
                 stream.integers(int(stream.sizes(1)[0]))
     return found
 
@@ -241,16 +242,14 @@ def _runs_binary(body: bytes, count: int) -> Iterator[tuple[int, int, IntArray]]
 
 
 def _named_2(kind: int, tags: int, rows: IntArray, names: Names) -> Iterator[Elements]:
-    dimension = _dimension(kind)
+    """Elements of one kind by the group that each belongs to; group 0 is no name."""
+    of = dimension(GMSH_KINDS[kind])
     groups = np.abs(rows[:, 1]) if tags else np.zeros(len(rows), dtype=np.int64)
-    named = {group: _name(names, dimension, group) for group in set(groups.tolist()) if group}
-    whole_block = _block(kind, rows[:, 0], rows[:, 1 + tags :], ())
-    yield from _grouped(whole_block.kind, whole_block.numbers, whole_block.nodes, groups, named)
-
-
-def _dimension(kind: int) -> int:
-    name = GMSH_KINDS[kind]
-    return 0 if name == "vertex" else 1 if "line" in name else 2 if name.startswith(("tri", "quad")) else 3
+    block = _block(kind, rows[:, 0], rows[:, 1 + tags :], ())
+    for group in np.unique(groups).tolist():
+        inside = groups == group
+        named = (_name(names, of, group),) if group else ()
+        yield replace(block, numbers=block.numbers[inside], nodes=block.nodes[inside], names=named)
 
 
 def _nodes_of(kind: int) -> int:
@@ -277,13 +276,3 @@ def _contents(numbers: IntArray, places: FloatArray, blocks: list[Elements], nam
     used = {name for block in blocks for name in block.names}
     other = tuple(name for name in names.values() if name not in used)
     return Contents(node_numbers=numbers, coordinates=places, blocks=tuple(blocks), other_names=other)
-
-
-def _grouped(
-    kind: str, numbers: IntArray, nodes: IntArray, groups: IntArray, names: dict[int, str]
-) -> Iterator[Elements]:
-    """Elements of one kind by the group that each belongs to; group 0, or one without entry, is no name."""
-    for group in np.unique(groups).tolist():
-        inside = groups == group
-        named = (names[group],) if group in names else ()
-        yield Elements(kind=kind, numbers=numbers[inside], nodes=nodes[inside], names=named)

@@ -122,16 +122,12 @@ def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
     """Nodes at one place that are not the same node: the body has a slit there."""
     nodes = np.unique(facets.nodes[facets.outer])
     points = body.points[nodes]
-    step = _SAME * _extent(points)
+    step = _SAME * (float(np.ptp(points, axis=0).max()) or 1.0)
     found = [_same_rows(np.floor(points / step + shift).astype(np.int64)) for shift in (0.0, 0.5)]
     twice = nodes[np.unique(np.concatenate(found))]
     if len(twice):
         problem = f"nodes lie where another node lies already ({len(twice)}): {body.node_labels(twice)}"
         yield Finding(problem=problem, allowed="merged nodes (Gmsh: Coherence Mesh), so that cells meet")
-
-
-def _extent(points: FloatArray) -> float:
-    return float(np.ptp(points, axis=0).max()) or 1.0
 
 
 def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Finding]:

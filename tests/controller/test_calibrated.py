@@ -16,7 +16,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import InputUncertainty, Scene
-from ringbalance.verification.reference.adaptive_ode import adaptive_ode
+from ringbalance.verification.reference.transfers import adaptive_ode
 
 
 @pytest.fixture(scope="module")

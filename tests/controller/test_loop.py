@@ -23,7 +23,7 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.adaptive_ode import adaptive_ode
+from ringbalance.verification.reference.transfers import adaptive_ode
 
 
 def with_controller(scene: Scene, **changes: Any) -> Scene:

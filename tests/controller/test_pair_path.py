@@ -17,7 +17,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.adaptive_ode import adaptive_ode
+from ringbalance.verification.reference.transfers import adaptive_ode
 
 ODE = adaptive_ode(tolerance=1e-13)
 

@@ -21,7 +21,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.adaptive_ode import adaptive_ode
+from ringbalance.verification.reference.transfers import adaptive_ode
 
 DriveBy = Callable[..., Drive]
 NAMES = ("tube inertia", "gas filling", "valve lag")

@@ -12,8 +12,7 @@ import pytest
 from ringbalance.controller.liquid_ring.integrators import closed_form, integrator_of, quadrature
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.verification.reference.adaptive_ode import adaptive_ode
-from ringbalance.verification.reference.explicit_segments import explicit_segments
+from ringbalance.verification.reference.transfers import adaptive_ode, explicit_segments
 
 DriveBy = Callable[..., Drive]
 

@@ -21,7 +21,7 @@ from ringbalance.physics.pressure.sparse import stiffness_matrix
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.reference.mutated_pressure import mutated_pressure
+from ringbalance.verification.rings import mutated_pressure
 
 WATER = RotatingLiquid(density=1000.0, angular_velocity=1047.2)
 

@@ -15,7 +15,7 @@ from ringbalance.physics.pressure.surface import find_surface, refined_surface, 
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.reference.mutated_pressure import mutated_pressure
+from ringbalance.verification.rings import mutated_pressure
 
 G = 9.80665
 

@@ -16,14 +16,13 @@ from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
 from ringbalance.physics.convergence import Verdict
 from ringbalance.physics.pressure import linear as pressure_linear
-from ringbalance.physics.pressure.integrals import liquid_integrals
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
-from ringbalance.physics.pressure.ring_samples import QUANTITIES
+from ringbalance.physics.pressure.ring_samples import QUANTITIES, liquid_integrals
 from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.reference.mutated_pressure import mutated_pressure
+from ringbalance.verification.rings import mutated_pressure
 
 RHO, OMEGA = 1000.0, 10_000 * np.pi / 30
 FILLS = np.linspace(0.0, 0.5, 11)

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 import ringbalance
 from ringbalance.physics.tube.bends import bend_loss
+from ringbalance.physics.tube.friction import reynolds_number, rotation_reynolds_number
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
-from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
 from ringbalance.scene.models import Bend, InputUncertainty, Liquid, Scene, Tube
 
 SCENE = cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper")))

@@ -15,10 +15,10 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import share_across
+from ringbalance.reduced_model.cli import _summary_rows
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.loading import load_law
-from ringbalance.reduced_model.show import _summary_rows
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.block_chambers import imported, turned
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.tube.draw_down import draw_down_depth
+from ringbalance.physics.tube.ends import draw_down_depth
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio

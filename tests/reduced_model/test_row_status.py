@@ -11,8 +11,8 @@ from rich.console import Console
 import ringbalance as rb
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.cli import _calibration_view
 from ringbalance.reduced_model.documents import REMEDIES, RowStatus, _row_status, calibration_document
-from ringbalance.reduced_model.show import calibration_view
 from ringbalance.scene import Scene
 
 FILLS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
@@ -98,5 +98,5 @@ def test_table_and_document_mark_the_row(
     console = Console(width=200, record=True, quiet=True)
     with console.capture() as shown:
         console.quiet = False
-        console.print(calibration_view(calibration))
+        console.print(_calibration_view(calibration))
     assert REMEDIES[expected].split(":")[0] in " ".join(shown.get().split())

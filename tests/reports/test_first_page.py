@@ -17,8 +17,8 @@ from ringbalance.reports.pages.requirements import (
     requirement_record,
     requirements,
 )
+from ringbalance.reports.prose import untraced
 from ringbalance.reports.summary import OPEN
-from ringbalance.reports.traces import untraced
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
 

@@ -18,10 +18,9 @@ from ringbalance.reports.figures.operation import (
     settling_histogram,
     tornado,
 )
-from ringbalance.reports.figures.section import _letter_radius, disc_section
 from ringbalance.reports.figures.style import NARROW, Drawing
 from ringbalance.reports.pages.loop import SECTION as LOOP
-from ringbalance.reports.pages.operation import SECTION
+from ringbalance.reports.pages.operation import SECTION, _letter_radius, disc_section
 from ringbalance.reports.section import Work
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.verification.loops import calibration_of

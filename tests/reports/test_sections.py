@@ -22,10 +22,10 @@ from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.pictures.view import VIEW
+from ringbalance.reports.prose import untraced
 from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
 from ringbalance.reports.sections import SECTIONS, collected, completed, drawings_in, section_views, viewed
-from ringbalance.reports.traces import untraced
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.loops import calibration_of, loop_scene

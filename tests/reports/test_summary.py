@@ -62,7 +62,5 @@ def test_claims_are_grouped_by_what_they_have_in_common() -> None:
         claim(4, "refuted", "plates left out"),
         claim(5, "not run", ""),
     ]
-    first, second = common_causes(cases)
-    assert (first["cause"], first["numbers"]) == ("plates left out", [3, 4])
-    assert first["verdicts"] == ["confirmed with correction", "refuted"]
-    assert second["numbers"] == [2]
+    more = [claim(number, "refuted", "the settings") for number in (6, 7, 8)]
+    assert common_causes([*cases, *more]) == ["the settings: claims 6, 7, 8", "plates left out: claims 3, 4"]

@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -19,12 +19,13 @@ from ringbalance.mesh.geometry import chamber_volume, half_angle
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Scene
+from ringbalance.verification import cases
+from ringbalance.verification.case import placeholders
 from ringbalance.verification.catalogue import case_code, load_cases
 from ringbalance.verification.document import case_document
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases
-from ringbalance.verification.text import placeholders
 from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
 
 FOLDER = Path(__file__).resolve().parents[2] / "verification" / "cases"
@@ -58,8 +59,12 @@ def test_other_cases_come_first_each_with_its_own_order() -> None:
 def test_a_case_s_code_is_a_module_that_other_processes_import_by_name() -> None:
     for case, definition in CASES.items():
         name = f"ringbalance.verification.cases.{case}.case"
-        shared = "ringbalance.verification.catalogue"
-        assert case_code(case).compute.__module__ == (shared if definition.study else name)
+        compute = case_code(case).compute
+        if definition.study is not None:
+            compute = cast(Any, compute).func
+            assert compute.__name__ == "study"
+            name = f"ringbalance.verification.{cases._STUDIES[definition.study.of]}"
+        assert compute.__module__ == name
         assert (FOLDER / case / "case.py").is_file() != bool(definition.study)
 
 

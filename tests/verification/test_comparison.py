@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.verification.comparison import compare, from_half_width, from_rounding
+from ringbalance.verification.evidence import from_half_width, from_rounding
+from ringbalance.verification.verdicts import compare
 
 SMALL = st.floats(min_value=0, max_value=1e6)
 ANY = st.floats(min_value=-1e6, max_value=1e6)

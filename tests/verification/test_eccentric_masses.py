@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.verification.eccentric_mass.scenes import driven_scene, envelope, thinned
+from ringbalance.verification.eccentric_scenes import driven_scene, envelope, thinned
 
 
 def test_a_thinned_curve_keeps_its_ends_and_its_order() -> None:

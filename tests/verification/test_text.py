@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ringbalance.verification.text import fill, placeholders
+from ringbalance.verification.case import fill, placeholders
 
 
 @pytest.mark.parametrize(

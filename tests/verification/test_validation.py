@@ -23,12 +23,9 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     friction_ratio,
     solve_section_without_inertia,
 )
-from ringbalance.verification.validation import tube_at_rest
-from ringbalance.verification.validation.comparison import KINDS, compare, friction
-from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.model_bias import ModelStatistics
-from ringbalance.verification.validation.tube_friction import laminar_ratio
-from ringbalance.verification.validation.wave_frequency import tank_frequency
+from ringbalance.verification.validation import kinds
+from ringbalance.verification.validation.comparison import Comparison, ModelStatistics, compare, friction
+from ringbalance.verification.validation.kinds import KINDS, laminar_ratio, measurements, tank_frequency
 
 _DATA = files("ringbalance.verification.validation") / "data"
 _NAMES = sorted(path.name.removesuffix(".csv") for path in _DATA.iterdir() if path.name.endswith(".csv"))
@@ -53,13 +50,14 @@ def _synthetic(
     series = np.repeat(np.array([f"rig {i}" for i in range(20)]), count // 20)
     measured = true * np.exp(0.01 * rng.standard_normal(count))
     predicted = true * (1 + bias) * np.exp(scatter * rng.standard_normal(count))
-    return ModelStatistics.of(
+    return Comparison(
         predicted=predicted,
         measured=measured,
         series=series,
         stated=2 * np.hypot(scatter, bias) * predicted,
-        measurement_uncertainty=np.full(count, 0.02),
-    )
+        uncertainty=np.full(count, 0.02),
+        columns={},
+    ).statistics
 
 
 def test_bias_and_scatter_of_a_made_up_model_are_found() -> None:
@@ -88,13 +86,14 @@ def test_the_interval_of_the_bias_covers_when_rigs_differ() -> None:
     series = np.repeat(np.array([f"rig {i}" for i in range(8)]), 50)
     for _ in range(400):
         measured = np.exp(np.repeat(0.02 * rng.standard_normal(8), 50) + 0.005 * rng.standard_normal(400))
-        found = ModelStatistics.of(
+        found = Comparison(
             predicted=np.ones(400),
             measured=measured,
             series=series,
             stated=np.full(400, 0.04),
-            measurement_uncertainty=np.full(400, 0.01),
-        )
+            uncertainty=np.full(400, 0.01),
+            columns={},
+        ).statistics
         covered += abs(found.bias) <= found.bias_uncertainty
     assert binomtest(covered, 400, 0.95).pvalue > 1e-3
 
@@ -215,19 +214,19 @@ def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judge
 
 def test_the_bore_of_a_tube_comes_from_a_point_that_is_not_judged() -> None:
     data = measurements("eisenklam_1958")
-    taught = compare(data.where(np.isin(data.series, tube_at_rest.CALIBRATING)))
+    taught = compare(data.where(np.isin(data.series, kinds.CALIBRATING)))
     assert taught.predicted == pytest.approx(taught.measured, rel=1e-3)
-    assert taught.measured.size == len(tube_at_rest.CALIBRATING)
+    assert taught.measured.size == len(kinds.CALIBRATING)
 
 
 def test_end_losses_that_are_left_out_are_noticed() -> None:
     data = measurements("eisenklam_1958")
     long = data.where(np.char.startswith(data.series, "tube"))
-    reynolds, slenderness = tube_at_rest.tube_numbers(long)
+    reynolds, slenderness = kinds.tube_numbers(long)
     friction = slenderness * 64 / reynolds
     found = compare(long)
     pairs = zip(slenderness, reynolds, strict=True)
-    dynamic = found.predicted / (1 + np.array([tube_at_rest.tube_loss(*pair, 100.0)[0] for pair in pairs]))
+    dynamic = found.predicted / (1 + np.array([kinds.tube_loss(*pair, 100.0)[0] for pair in pairs]))
     assert np.max(np.abs(found.predicted / found.measured - 1)) < 0.04
     assert np.min(dynamic * (1 + friction) / found.measured) < 0.8
 

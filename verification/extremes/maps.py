@@ -22,7 +22,7 @@ from ringbalance.verification.extremes.axes import AXES, Axis
 from ringbalance.verification.extremes.design import Base, Point
 from ringbalance.verification.extremes.point import ROUND_OFF, Ending, Judgement
 from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
-from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
+from ringbalance.verification.reference.transfers import explicit_segments, paper_drive
 
 Progress = Callable[[int, int], None]
 
@@ -112,10 +112,6 @@ class StabilityMap:
     y_values: FloatArray
     judgements: tuple[Judgement, ...]
     """Row by row: all x for the first y, then for the next."""
-
-    def at(self, row: int, column: int) -> Judgement:
-        """One cell. Args: `row`: index of y. `column`: index of x."""
-        return self.judgements[row * self.x_values.size + column]
 
 
 def _answered(judgement: Judgement) -> bool:
@@ -248,7 +244,6 @@ def at_aspect(scene: Scene, aspect: float) -> Judgement:
         text="",
         violations=faults,
         residual=ring.statistics.relative_residual,
-        unknowns=float(ring.statistics.unknowns),
         worst_ratio=ratio,
     )
 

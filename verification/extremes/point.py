@@ -54,7 +54,6 @@ class Judgement:
     """What should have held and did not."""
     residual: float = 0.0
     """Largest relative residual of its linear solves."""
-    unknowns: float = 0.0
     worst_ratio: float = -1.0
     """Largest |error| over half-width against the closed form; -1 where gravity is modelled, without one."""
     loop: str = ""
@@ -96,14 +95,13 @@ def judge_point(
         # Whatever it is: finding it is what this is for.
         text = f"{type(error).__name__}: {error}"
         return Judgement(ending=Ending.BROKEN, text=text, violations=(f"exception {text}",))
-    ratio = _worst_ratio(calibration, defect.width_factor)
+    ratio, status = _worst_ratio(calibration, defect.width_factor), calibration.chamber.status
     violations = (*_calibration_faults(calibration, ratio), *_loop_faults(scene, run, defect.leak))
     return Judgement(
         ending=Ending.BROKEN if violations else _ending(calibration),
-        text=_reservation(calibration),
+        text="" if status.ok else status.text,
         violations=violations,
         residual=float(calibration.statistics["relative_residual"]),
-        unknowns=float(calibration.statistics["unknowns"]),
         worst_ratio=ratio,
         loop=str(run.outcome),
     )
@@ -124,11 +122,6 @@ def _ending(calibration: Calibration) -> Ending:
     k, uncertainty_95 = calibration.tube.k.value, calibration.tube.k.uncertainty
     tube = float(np.median(uncertainty_95 / (np.abs(k) + 1)))
     return Ending.WIDE if max(width, tube) > WIDE else Ending.SOLVED
-
-
-def _reservation(calibration: Calibration) -> str:
-    status = calibration.chamber.status
-    return "" if status.ok else status.text
 
 
 def _worst_ratio(calibration: Calibration, width_factor: float) -> float:

@@ -13,12 +13,7 @@ import numpy as np
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import MAP_PREFIX
 from ringbalance.verification.extremes.design import Base, Point, design
-from ringbalance.verification.extremes.maps import (
-    StabilityMap,
-    Sweep,
-    stability_maps,
-    sweeps,
-)
+from ringbalance.verification.extremes.maps import StabilityMap, Sweep, stability_maps, sweeps
 from ringbalance.verification.extremes.point import Ending, Judgement
 
 Progress = Callable[[str, int, int], None]

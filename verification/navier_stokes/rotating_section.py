@@ -156,29 +156,51 @@ def _coefficients(*, kl: float, s: float, inertia: float) -> Coefficients:
     return Coefficients(inertia=inertia, viscosity=1.0, rotation=rotation)
 
 
-def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> March:
+def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> _March:
     """The same in time, from the flow without inertia and a disturbance of one per cent.
 
     It finds what a steady solution leaves out where that is unstable; flow is alike along the tube.
+    Second-order backward differences, convection extrapolated from two steps:
+
+        (3 u - 4 u' + u'')/(2 dt) + inertia (2 N' - N'') + rotation C u = -grad p + viscosity lap u + G e
+
+    div u = 0, N is convection and ' the step before.  One set of factors serves all steps.  Stable while a
+    step carries flow through less than about a third of a cell.
     Args: `step`: dt over d^2/nu.
-    Raises: ArithmeticError: the step is too long.
+    Raises: ArithmeticError: the flow grew without bound; the step is too long.
     """
+    coefficients, start = _coefficients(kl=kl, s=s, inertia=1.0), _disturbed(system, kl, s)
+    free, border = system.free, system.flow_load[system.free]
     area = float(system.space.weights.sum())
+    mass = _mass(system)[free]
+    factors = _factors(system, coefficients, mass, step)
+    bordering = factors.solve(border)
+    now, before = start, start
+    convection = system.convection_vector(now)
+    found = np.empty(steps)
+    for i in range(steps):
+        carried, convection = convection, system.convection_vector(now)
+        pull = coefficients.inertia * (2 * convection - carried)[free]
+        change = factors.factors.solve(mass @ (4 * now - before) / (2 * step) - pull)
+        found[i] = (area - border @ change) / (border @ bordering)
+        now, before = start.copy(), now
+        now[free] = change + found[i] * bordering
+        if not np.isfinite(found[i]) or np.abs(now).max() > 1e12:
+            raise ArithmeticError("the flow grew without bound: take shorter steps")
+    return _March(gradients=found)
+
+
+def _disturbed(system: FlowSystem, kl: float, s: float) -> FloatArray:
+    """The flow without inertia, with noise of one per cent of each component's largest velocity."""
     linear = _coefficients(kl=kl, s=s, inertia=0.0)
+    area = float(system.space.weights.sum())
     start = solve_flow(system=system, coefficients=linear, flow_rate=area).vector.copy()
     velocity = system.space.split(start)[0]
     noise = np.random.default_rng(0).standard_normal(velocity.shape)
     noise *= 0.01 * np.abs(velocity).max(axis=1, keepdims=True)
     moving = system.free[system.free < velocity.size]
     start[moving] += noise.ravel()[moving]
-    return _march_flow(
-        system=system,
-        coefficients=_coefficients(kl=kl, s=s, inertia=1.0),
-        flow_rate=area,
-        start=start,
-        step=step,
-        steps=steps,
-    )
+    return start
 
 
 def developed_section(
@@ -206,57 +228,15 @@ def friction_ratio(solution: FlowSolution) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class March:
+class _March:
     """A flow at constant flow rate over equal steps."""
 
     gradients: FloatArray
     """G of each step."""
-    vector: FloatArray
-    """All unknowns after the last."""
 
     def mean_gradient(self) -> float:
         """Mean of G over the second half of the steps."""
         return float(np.mean(self.gradients[-round(self.gradients.size / 2) :]))
-
-
-def _march_flow(
-    *,
-    system: FlowSystem,
-    coefficients: Coefficients,
-    flow_rate: float,
-    start: FloatArray,
-    step: float,
-    steps: int,
-) -> March:
-    """Flow from a given one on, with the boundary values zero or those of `start`.
-
-    Second-order backward differences, convection extrapolated from two steps:
-
-        (3 u - 4 u' + u'')/(2 dt) + inertia (2 N' - N'') + rotation C u = -grad p + viscosity lap u + G e
-
-    div u = 0, N is convection and ' the step before.  One set of factors serves all steps.  Stable while a
-    step carries flow through less than about a third of a cell.
-
-    Args: `start`: all unknowns. `step`: dt.
-    Raises: ArithmeticError: the flow grew without bound; the step is too long.
-    """
-    free, border = system.free, system.flow_load[system.free]
-    mass = _mass(system)[free]
-    factors = _factors(system, coefficients, mass, step)
-    bordering = factors.solve(border)
-    now, before = start, start
-    convection = system.convection_vector(now)
-    found = np.empty(steps)
-    for i in range(steps):
-        carried, convection = convection, system.convection_vector(now)
-        pull = coefficients.inertia * (2 * convection - carried)[free]
-        change = factors.factors.solve(mass @ (4 * now - before) / (2 * step) - pull)
-        found[i] = (flow_rate - border @ change) / (border @ bordering)
-        now, before = start.copy(), now
-        now[free] = change + found[i] * bordering
-        if not np.isfinite(found[i]) or np.abs(now).max() > 1e12:
-            raise ArithmeticError("the flow grew without bound: take shorter steps")
-    return March(gradients=found, vector=now)
 
 
 def _mass(system: FlowSystem) -> Any:

@@ -49,9 +49,8 @@ class BentTubeFlow:
     tube: SweptTube
     system: FlowSystem
     solution: FlowSolution
-    section: FlowSystem
     developed: FlowSolution
-    """Of the section; in-plane velocity over nu/d."""
+    """In the section; in-plane velocity over nu/d."""
     reynolds: float
     rotation_reynolds: float
     arc_length: FloatArray
@@ -114,7 +113,6 @@ class BentTubeFlow:
             tube=tube,
             system=system,
             solution=solution,
-            section=section,
             developed=developed,
             reynolds=reynolds,
             rotation_reynolds=rotation_reynolds,

@@ -25,7 +25,7 @@ from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level
 from ringbalance.verification.orders import OrderStudy, field_error, order_figure, orders_found, refined_cells
-from ringbalance.verification.reference.mutated_pressure import mutated_pressure
+from ringbalance.verification.rings import mutated_pressure
 
 _GAUSS: Final = 60
 _TILT: Final = 0.1

@@ -30,7 +30,7 @@ from ringbalance.reduced_model.selection.tube_terms import flow_contributions
 from ringbalance.reduced_model.time_scales import first_gas_time
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.explicit_segments import explicit_segments
+from ringbalance.verification.reference.transfers import explicit_segments
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy
 from ringbalance.verification.selection_studies.laws import CLOSED, EQ_12, Course, LawBook, LawModels
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.tube.numbers import reynolds_number, rotation_reynolds_number
+from ringbalance.physics.tube.friction import reynolds_number, rotation_reynolds_number
 from ringbalance.reduced_model.chamber.terms import amplification, surface_tension, wall_layers
 from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.selection.estimates import (

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,32 +12,47 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+from scipy import special
 
 from ringbalance.identification.data.measurements import Measurements, MeasurementsError
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
-from ringbalance.verification.validation.kinds import Kind, measurements
-from ringbalance.verification.validation.model_bias import MUTATIONS, ModelStatistics, bias, within
-from ringbalance.verification.validation.tube_at_rest import TUBE_AT_REST
-from ringbalance.verification.validation.tube_friction import FRICTION
-from ringbalance.verification.validation.vessel import VESSEL
-from ringbalance.verification.validation.wave_frequency import WAVE_FREQUENCY
+from ringbalance.verification.validation.kinds import KINDS, Kind, measurements
 from ringbalance.verification.verdicts import Verdict, judge_quantity
 
-KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
-    {
-        "friction": FRICTION,
-        "tube_at_rest": TUBE_AT_REST,
-        "vessel": VESSEL,
-        "wave_frequency": WAVE_FREQUENCY,
-    }
-)
-"""Kinds of data that the program can predict."""
 PROMISED: Final = 0.93
 """Fraction of the points that both 95 % uncertainties must hold: 0.95, less the chance of a small sample."""
+MUTATIONS: Final[Mapping[str | None, float]] = MappingProxyType(
+    {None: 1.0, "ten_per_cent_high": 1.1, "ten_per_cent_low": 0.9}
+)
+"""Factors on what is predicted; every comparison with measurements must notice the last two."""
 _FEWEST: Final = 2
 """Points of a user's file from which a scatter can be had."""
+_FEWEST_SERIES: Final = 3
+_HELD: Final = 0.95
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelStatistics:
+    """How a model stands to measurements, relative to the measured values."""
+
+    points: int
+    series: int
+    bias: float
+    """Geometric mean of predicted over measured, less one: above zero where the model reads high."""
+    bias_uncertainty: float
+    """Expanded (95 %)."""
+    standard_deviation: float
+    """Of the model alone: the scatter less the measurements' own."""
+    share_within: float
+    """Of the points whose deviation lies within both 95 % uncertainties, the model's stated one and U_D."""
+    width_needed: float
+    """Factor on both uncertainties at which they hold 95 % of the points."""
+
+    def numbers(self) -> dict[str, float]:
+        """Numbers for a case's text, by the names of `ModelStatistics`."""
+        return {key: float(value) for key, value in vars(self).items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +69,17 @@ class Comparison:
     columns: Mapping[str, FloatArray]
     """What the predictions need, and what else all data sets have."""
 
+    @property
+    def bias(self) -> float:
+        """Geometric mean of predicted over measured, less one."""
+        return math.expm1(float(np.mean(np.log(self.predicted / self.measured))))
+
+    @property
+    def used(self) -> FloatArray:
+        """Size of each deviation over what both uncertainties allow."""
+        allowed = np.hypot(self.stated, self.uncertainty * self.measured)
+        return np.asarray(np.abs(self.predicted - self.measured) / allowed)
+
     def where(self, chosen: BoolArray | IntArray | slice) -> Comparison:
         """Some of the points, or all in another order."""
         own = {name: column[chosen] for name, column in vars(self).items() if name != "columns"}
@@ -60,13 +87,24 @@ class Comparison:
 
     @property
     def statistics(self) -> ModelStatistics:
-        """How the predictions stand to the measurements."""
-        return ModelStatistics.of(
-            predicted=self.predicted,
-            measured=self.measured,
-            series=self.series,
-            stated=self.stated,
-            measurement_uncertainty=self.uncertainty,
+        """Statistics of ln(predicted/measured).
+
+        bias = exp(mean) - 1; s_model^2 = s^2 - (U_D/2)^2, zero where the measurements alone explain the
+        scatter.  The points of a series share their systematic errors, so the bias is known to t s/sqrt(n) of
+        the n means of the series; from fewer than three series to U_D.
+        Source: McGrattan and Toman, Metrologia 48 (2011) 173, for the split of the scatter.
+        """
+        ratio, used, names = np.log(self.predicted / self.measured), self.used, np.unique(self.series)
+        means = np.array([np.mean(ratio[self.series == name]) for name in names])
+        unexplained = float(np.var(ratio, ddof=1) - np.mean((self.uncertainty / 2) ** 2))
+        return ModelStatistics(
+            points=ratio.size,
+            series=names.size,
+            bias=self.bias,
+            bias_uncertainty=_mean_uncertainty(means, float(np.mean(self.uncertainty))),
+            standard_deviation=math.sqrt(max(unexplained, 0.0)),
+            share_within=float(np.mean(used <= 1)),
+            width_needed=float(np.quantile(used, _HELD)),
         )
 
     @property
@@ -101,6 +139,13 @@ class Comparison:
             Curve("predicted", unit, predicted, style="points"),
             log=bool(measured[-1] > 10 * measured[0]),
         )
+
+
+def _mean_uncertainty(means: FloatArray, measurement_uncertainty: float) -> float:
+    if means.size < _FEWEST_SERIES:
+        return measurement_uncertainty
+    factor = float(special.stdtrit(means.size - 1, 0.975))
+    return factor * float(np.std(means, ddof=1)) / math.sqrt(means.size)
 
 
 def compare(*sets: Measurements, mutation: str | None = None) -> Comparison:
@@ -144,7 +189,8 @@ def _check(data: Measurements, kind: Kind) -> None:
     missing = [name for name in wanted if name not in data.columns]
     known = {*wanted, *kind.optional, "uncertainty"}
     strange = [name for name in data.columns if name not in known]
-    faults = [f'the column "{name}" is missing: {_meaning(kind, name)}' for name in missing]
+    meaning = {kind.measured: f"the measured {kind.title}", **kind.columns}
+    faults = [f'the column "{name}" is missing: {meaning[name]}' for name in missing]
     faults += [f'the column "{name}" is not known; allowed: {", ".join(sorted(known))}' for name in strange]
     faults += [
         f'the column "{name}" must be positive in every row'
@@ -158,10 +204,6 @@ def _check(data: Measurements, kind: Kind) -> None:
     ]
     if faults:
         raise MeasurementsError("\n".join(faults))
-
-
-def _meaning(kind: Kind, name: str) -> str:
-    return kind.columns.get(name, f"the measured {kind.title}")
 
 
 def study(
@@ -237,9 +279,8 @@ def data_document(path: Path) -> dict[str, Any]:
 
 def _of_series(comparison: Comparison, name: str) -> Mapping[str, float]:
     one = comparison.where(comparison.series == name)
-    held = within(one.predicted, one.measured, one.stated, one.uncertainty)
     return {
         "points": one.measured.size,
-        "bias": bias(one.predicted, one.measured),
-        "share_within": float(np.mean(held)),
+        "bias": one.bias,
+        "share_within": float(np.mean(one.used <= 1)),
     }

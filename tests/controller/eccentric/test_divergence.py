@@ -14,7 +14,7 @@ from ringbalance.controller.eccentric_mass.document import eccentric_document, s
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.scene import EccentricScene, SceneError, bundled_scene, load_scene
-from ringbalance.verification.eccentric_mass.scenes import changed
+from ringbalance.verification.eccentric_scenes import changed
 
 
 @pytest.fixture(scope="module")

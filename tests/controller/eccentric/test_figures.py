@@ -25,9 +25,9 @@ from ringbalance.verification.cases.driven_fig4_imbalance.case import (
 )
 from ringbalance.verification.cases.driven_fig5_friction.case import friction_runs, friction_time
 from ringbalance.verification.cases.driven_fig6_effort.case import efforts, growth, printed_compensation
+from ringbalance.verification.cases.driven_fig7_positioning.case import BalancingFigure
 from ringbalance.verification.cases.driven_fig9_run_up.case import compute as run_up
-from ringbalance.verification.eccentric_mass.runs import BalancingFigure
-from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 
 
 @pytest.fixture(scope="module")

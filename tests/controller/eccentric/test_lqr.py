@@ -15,7 +15,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, Rec
 from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.verification.eccentric_mass.scenes import changed
+from ringbalance.verification.eccentric_scenes import changed
 
 TRACKS = [TrackModel(0.0112, 0.16, 0.0414), TrackModel(0.5, 0.0, 0.1), TrackModel(0.01, 2.0, 0.03)]
 PAPER = TRACKS[0]

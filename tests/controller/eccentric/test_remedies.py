@@ -26,7 +26,7 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun, Remed
 from ringbalance.controller.eccentric_mass.strategy.plan import Stage
 from ringbalance.scene import EccentricScene, SceneError, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import SpeedPoint
-from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 
 SEEDS = range(3)
 

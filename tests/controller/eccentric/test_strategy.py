@@ -25,7 +25,7 @@ from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, 
 from ringbalance.reports.simulate_cli import simulate as command
 from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import SpeedPoint
-from ringbalance.verification.eccentric_mass.scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from ringbalance.controller.eccentric_mass.study import (
 from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import InputUncertainty
-from ringbalance.verification.eccentric_mass.scenes import changed
+from ringbalance.verification.eccentric_scenes import changed
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,8 @@ import numpy as np
 
 from ringbalance.mesh.bent_tube import Segment
 from ringbalance.physics.convergence import gci
+from ringbalance.physics.tube.friction import rotation_reynolds_number
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.physics.tube.numbers import rotation_reynolds_number
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (

@@ -10,8 +10,15 @@ from scipy.optimize import brentq
 from ringbalance.mesh.geometry import chamber_volume, liquid_area, surface_radius
 from ringbalance.reduced_model.paper import chamber_volume_paper
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import COVERAGE_FACTOR, from_rounding, input_uncertainty
-from ringbalance.verification.evidence import Evidence, Found, Level, Table
+from ringbalance.verification.evidence import (
+    COVERAGE_FACTOR,
+    Evidence,
+    Found,
+    Level,
+    Table,
+    from_rounding,
+    input_uncertainty,
+)
 from ringbalance.verification.paper_numbers import (
     CHAMBER_VOLUME,
     DENSITY,

@@ -1,24 +1,32 @@
-"""The three things that Eqs. 13 to 18 take for granted: one k, '+1', and a tube that runs full."""
+"""The three things that Eqs. 13 to 18 take for granted: one k, '+1', and a tube that runs full.
+
+The velocity is the one that a full tube takes by itself under a head, and k is taken there.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
+from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.selection.range_flow import TABLES, velocity_under_head
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure, from_half_width
 from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.paper_numbers import fig_7_readings
-from ringbalance.verification.reference.tube_running import driving_head, running_tube, running_tubes
+from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
 _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
 """In units of the scene's."""
 _FILLS: Final = np.linspace(0.02, 1.0, 50)
 """In units of the largest."""
+_LEAST: Final = 0.05
+"""Smallest head asked for, in units of the gas pressure's: below it lies a stall."""
 
 
 def values(scene: Scene) -> dict[str, float]:
@@ -83,3 +91,53 @@ def _figure(scene: Scene) -> Series:
         Curve("calibrated law", "m/s", flow.velocity, uncertainty=flow.uncertainty),
         Curve("Eq. 14 with one k", "m/s", np.array(one_k), style="paper"),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Running:
+    """A full tube at its own velocity."""
+
+    velocity: float
+    """m/s."""
+    k: float
+    half_width: float
+    """95 %, of k."""
+    exit_loss: float
+    """What a laminar exit adds to k."""
+    reynolds: float
+    flow_state: str
+
+
+def running_tube(scene: Scene, *, head: float) -> Running:
+    """The velocity with (k(u) + 1) u^2/2 = head, m^2/s^2, above zero."""
+    return running_tubes(scene, (head,))[0]
+
+
+@lru_cache(maxsize=64)
+def running_tubes(scene: Scene, heads: tuple[float, ...]) -> tuple[Running, ...]:
+    """The same under several heads at once."""
+    found = tube_loss(scene, velocity_under_head(scene, loss=TABLES, head=heads))
+    leaving = found.terms.get("exit", np.zeros(len(heads)))
+    return tuple(
+        Running(
+            velocity=float(found.velocity[i]),
+            k=float(found.k.value[i]),
+            half_width=float(found.k.uncertainty[i]),
+            exit_loss=float(leaving[i]),
+            reynolds=float(found.reynolds[i]),
+            flow_state=str(found.flow_state[i]),
+        )
+        for i in range(len(heads))
+    )
+
+
+def driving_head(scene: Scene, *, share: float) -> float:
+    """Head between two chambers, H = [p0 + p_wall(x) - p_wall(x_max - x)]/rho, m^2/s^2.
+
+    At least a twentieth of the gas pressure's own, short of a stall.
+    Args: `share`: fill of the driven chamber in units of the largest.
+    """
+    fills = np.array([share, 1 - share]) * scene.disc.max_fill_ratio
+    wall = wall_pressure_of(scene, fills)
+    driving = scene.gas.pressure + float(wall[0] - wall[1])
+    return max(driving, _LEAST * scene.gas.pressure) / scene.liquid.density

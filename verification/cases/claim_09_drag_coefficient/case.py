@@ -16,17 +16,25 @@ from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.scene import known_liquids, liquid_at
 from ringbalance.scene.models import Liquid, Scene
-from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, Table, figure
-from ringbalance.verification.loops import flow_law_of
-from ringbalance.verification.paper_numbers import fig_7_readings
-from ringbalance.verification.reference.tube_running import (
+from ringbalance.verification.cases.claim_07_bernoulli.case import (
     Running,
     driving_head,
     running_tube,
     running_tubes,
-    with_bore,
 )
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Reference,
+    Series,
+    Table,
+    figure,
+    from_half_width,
+)
+from ringbalance.verification.loops import flow_law_of
+from ringbalance.verification.paper_numbers import fig_7_readings
 
 _ABOUT: Final = 0.1
 _BORES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
@@ -112,7 +120,11 @@ def _with_liquid(scene: Scene, liquid: Liquid) -> Running:
 
 
 def _with_bore(scene: Scene, factor: float) -> Running:
-    return running_tube(with_bore(scene, factor), head=scene.gas.pressure / scene.liquid.density)
+    """With the bore multiplied; a bend's radius is at least the bore, so a wide tube still bends."""
+    tube, bore = scene.tube, factor * scene.tube.bore
+    bends = tuple(dataclasses.replace(bend, radius=max(bend.radius, bore)) for bend in tube.bends)
+    changed = dataclasses.replace(scene, tube=dataclasses.replace(tube, bore=bore, bends=bends))
+    return running_tube(changed, head=scene.gas.pressure / scene.liquid.density)
 
 
 def _range(runs: Sequence[Running]) -> Found:

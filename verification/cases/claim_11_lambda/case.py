@@ -12,8 +12,17 @@ from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.pressure.ring import RingQuantities
 from ringbalance.reduced_model.paper import PAPER_LAMBDA
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_half_width, from_rounding
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Reference,
+    Series,
+    figure,
+    from_half_width,
+    from_rounding,
+)
 from ringbalance.verification.paper_numbers import LAMBDA_TOLERANCE, with_plate
 from ringbalance.verification.reference.exact_chamber import central_lambda
 from ringbalance.verification.rings import found_of, mesh_table, ring_of

@@ -6,8 +6,7 @@ import math
 
 from ringbalance.reduced_model.paper import PAPER_LAMBDA, correction_mass, correction_moment
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_half_width, from_rounding
-from ringbalance.verification.evidence import Evidence, Found, Level, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Table, from_half_width, from_rounding
 from ringbalance.verification.paper_numbers import CHAMBER_MOMENT, DENSITY, DISC_MOMENT, LAMBDA_TOLERANCE
 from ringbalance.verification.reference.exact_chamber import exact_moment
 

@@ -11,7 +11,6 @@ from ringbalance.controller.liquid_ring.integrators import closed_form
 from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_half_width
 from ringbalance.verification.evidence import (
     Curve,
     Evidence,
@@ -21,9 +20,10 @@ from ringbalance.verification.evidence import (
     Reference,
     Series,
     figure,
+    from_half_width,
 )
 from ringbalance.verification.orders import OrderStudy
-from ringbalance.verification.reference.explicit_segments import explicit_segments, paper_drive
+from ringbalance.verification.reference.transfers import explicit_segments, paper_drive
 
 _COUNTS = (4, 8, 16, 32, 64, 128, 256, 512)
 _SHARE = 0.9

@@ -11,8 +11,7 @@ import numpy as np
 
 from ringbalance.controller.simulation import Simulation
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_rounding
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Series, Table
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Series, Table, from_rounding
 from ringbalance.verification.loops import (
     PHASES,
     amplitude_series,

@@ -13,13 +13,17 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_range
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table
-from ringbalance.verification.loops import amplitude_series, flow_law_of, loop_scene, run_loop, settled_after
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table, from_range
+from ringbalance.verification.loops import (
+    GAINS,
+    amplitude_series,
+    flow_law_of,
+    loop_scene,
+    run_loop,
+    settled_after,
+)
 from ringbalance.verification.paper_numbers import fig_7_readings
 
-_GAINS: Final = (0.04e6, 0.08e6, 0.12e6, 0.16e6, 0.20e6)
-"""Kp of Fig. 7, s/m."""
 _SEARCHED: Final = tuple((np.arange(2, 41) * 0.01e6).tolist())
 _LAST_WITHOUT: Final = 0.12e6
 _FIRST_WITH: Final = 0.16e6
@@ -38,7 +42,7 @@ def values(scene: Scene) -> dict[str, float]:
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    runs = {gain: _run(scene, gain) for gain in _GAINS}
+    runs = {gain: _run(scene, gain) for gain in GAINS}
     rate = _rate(scene, paper_model(scene))
     _, bare = fig_7_readings()
     calibrated = _rate(bare, BalancerModel.of(flow_law_of(bare)))
@@ -101,7 +105,7 @@ def _turn(scene: Scene) -> Found:
     """The vibration along a chamber's own axis, so that a single valve answers for the overshoot."""
     phase = -scene.rotor.lag_angle
     run = run_loop(
-        loop_scene(scene, kind="target_vector", proportional=_GAINS[-1], integral_time=None, phase=phase)
+        loop_scene(scene, kind="target_vector", proportional=GAINS[-1], integral_time=None, phase=phase)
     )
     seen = [sample.measurement for sample in run.samples if sample.measurement is not None]
     turn = abs(math.remainder(seen[1].phase - seen[0].phase, 2 * math.pi))

@@ -75,8 +75,9 @@ def _run(scene: Scene, kind: Any, period: float, phase: float, **settings: float
 
 
 def _largest_rise(run: Simulation) -> float:
-    amplitude = _sampled_amplitudes(run)
-    return float(np.max(np.diff(amplitude), initial=-np.inf)) if amplitude.size > 1 else 0.0
+    """From one amplitude that the controller saw to the next, m."""
+    seen = [sample.measurement.amplitude for sample in run.samples if sample.measurement is not None]
+    return float(np.max(np.diff(seen), initial=-np.inf)) if len(seen) > 1 else 0.0
 
 
 def _table(runs: Mapping[float, tuple[list[Simulation], list[Simulation]]]) -> Table:
@@ -98,9 +99,3 @@ def _table(runs: Mapping[float, tuple[list[Simulation], list[Simulation]]]) -> T
         },
         units={"period": "s", "phase": "rad", "target vector": "s", "trial": "s"},
     )
-
-
-def _sampled_amplitudes(run: Simulation) -> np.ndarray:
-    """Amplitudes that the controller saw, m, in order."""
-    seen = [sample.measurement.amplitude for sample in run.samples if sample.measurement is not None]
-    return np.array(seen)

@@ -14,8 +14,16 @@ from ringbalance.mesh.quadratic_tetrahedra import derivatives, shapes, tetrahedr
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, NotRunError, Series, figure
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Series,
+    figure,
+    from_half_width,
+)
 
 _GRIDS = ((30, 45, 4), (60, 90, 8))
 """Radial and angular cells, and of an imported cell Gauss points along each direction; coarse and fine."""

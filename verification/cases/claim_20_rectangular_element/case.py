@@ -9,8 +9,16 @@ import numpy as np
 
 from ringbalance.physics.pressure.ring import RingQuantities
 from ringbalance.scene.models import Scene
-from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Reference,
+    Series,
+    figure,
+    from_half_width,
+)
 from ringbalance.verification.reference.exact_chamber import (
     exact_moment,
     wall_pressure_of,

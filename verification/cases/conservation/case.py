@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -10,27 +9,16 @@ import numpy as np
 from ringbalance.mesh.chamber import FREE_SURFACE, default_cells
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.pressure.assembly import facet_points, volume_points
-from ringbalance.physics.pressure.integrals import liquid_integrals
+from ringbalance.physics.pressure.ring_samples import liquid_integrals
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
 from ringbalance.verification.reference.gravity import tilted_liquid
-from ringbalance.verification.reference.mutated_pressure import mutated_pressure
-from ringbalance.verification.rings import ring_of
+from ringbalance.verification.rings import mutated_pressure, ring_of
 
 _FILL_SHARE: Final = 0.8
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Balance:
-    """Relative residuals of one two-dimensional solution."""
-
-    force: float
-    torque: float
-    flux: float
-    volume: float
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -39,17 +27,17 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     balances = [_section_balance(scene, fill, (radial // k, angular // k), defect) for k in (4, 2, 1)]
     drawn = float(ring_of(scene, (fill,)).liquid_volume.value[0])
     found = {
-        "flux_balance": max(balance.flux for balance in balances),
-        "force_balance": max(balance.force for balance in balances),
-        "torque_balance": max(balance.torque for balance in balances),
+        **{name: max(balance[name] for balance in balances) for name in balances[0]},
         "weight_balance": _weight_balance(scene, fill, (radial // 2, angular // 2, 4)),
-        "volume_found": max(balance.volume for balance in balances),
         "volume_drawn": abs(drawn / (fill * chamber_volume(disc=scene.disc)) - 1),
     }
     return Evidence(found=as_found(**found))
 
 
-def _section_balance(scene: Scene, fill: float, cells: tuple[int, ...], defect: str | None) -> _Balance:
+def _section_balance(
+    scene: Scene, fill: float, cells: tuple[int, ...], defect: str | None
+) -> dict[str, float]:
+    """Relative residuals of one two-dimensional solution."""
     true = tilted_liquid(disc=scene.disc, density=scene.liquid.density, fill_ratio=fill, shaft="horizontal")
     with mutated_pressure(wall=1.01 if defect == "wall_condition_off_by_a_percent" else 1.0):
         solution = _solved(scene, true, fill, cells)
@@ -62,12 +50,12 @@ def _section_balance(scene: Scene, fill: float, cells: tuple[int, ...], defect: 
     turning = moment[0] * gravity[1] - moment[1] * gravity[0]
     size = float(np.linalg.norm(body))
     torque = sum(loads.torque.values()) - turning
-    return _Balance(
-        force=float(np.linalg.norm(sum(forces.values()) - body)) / size,
-        torque=abs(float(torque)) / (size * scene.disc.outer_radius),
-        flux=_flux_residual(solution, true),
-        volume=abs(solution.statistics.extra["volume_error"]),
-    )
+    return {
+        "force_balance": float(np.linalg.norm(sum(forces.values()) - body)) / size,
+        "torque_balance": abs(float(torque)) / (size * scene.disc.outer_radius),
+        "flux_balance": _flux_residual(solution, true),
+        "volume_found": abs(solution.statistics.extra["volume_error"]),
+    }
 
 
 def _solved(scene: Scene, liquid: RotatingLiquid, fill: float, cells: tuple[int, ...]) -> PressureSolution:

@@ -1,19 +1,42 @@
-"""Decay rates along the turning tube: creeping flow at rest, fast rotation, and the bound that k(u) uses."""
+"""Decay rates along the turning tube: creeping flow at rest, fast rotation, and the bound that k(u) uses.
+
+How fast laminar flow in a rotating tube becomes developed is the decay along it of what disturbs it.  A small
+steady disturbance of developed flow goes as exp(lambda x/d).  With lengths over d, axial velocity over U and
+mu = lambda Re, its equations in the section are quadratic in mu, pressure and diffusion along the tube
+included:
+
+    [A0 + mu A1 + mu^2 A2] q = 0
+
+A0 is the section's own Jacobian, A1 carries with the axial velocity and couples pressure and continuity along
+the tube, A2 diffuses.  At Re = 0 velocities are over U throughout and mu is lambda itself.  Modes are those
+that are mirror images of themselves in the plane across the rotation axis.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigs
 
-from ringbalance.physics.tube.development import developing_length
+from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
+from ringbalance.physics.tube.uncertainty import developing_length
+from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found
-from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
-from ringbalance.verification.navier_stokes.system import FlowSystem
-from ringbalance.verification.reference.entry_length import slowest_decay
+from ringbalance.verification.navier_stokes.linear import Factors
+from ringbalance.verification.navier_stokes.newton import FlowSolution
+from ringbalance.verification.navier_stokes.rotating_section import (
+    SectionMesh,
+    developed_section,
+    solve_section_without_inertia,
+)
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 
 _CREEPING: Final = 2 * (4.46629832 + 1.46746761j)
 """Per diameter: root of z (J0^2 + J1^2) = 2 J0 J1 per radius."""
@@ -37,7 +60,12 @@ _MESHES: Final = MappingProxyType(
     }
 )
 _SPEED: Final = MappingProxyType({None: 1.0, "radius_for_bore": 1.0, "coriolis_too_weak": 0.7})
-
+_SHIFTS = (1.0, 0.35, 0.12)
+"""Of the expected rate, about which modes are looked for."""
+_TOLERANCE = 1e-8
+"""Of the eigenvalues: rates are told apart at 1e-4 of the expected one."""
+_NOT_A_MODE = 0.03
+"""Times the expected rate: below, only the flow rate and the pressure level are found, at zero."""
 
 reference = {"fast": Reference(value=_GEOSTROPHIC)}
 
@@ -83,3 +111,117 @@ def _lengths(system: FlowSystem, reynolds: float, rotation: float) -> tuple[floa
     bound = developing_length(reynolds=reynolds, rotation_reynolds=rotation, friction_ratio=ratio)
     found = slowest_decay(system=system, reynolds=reynolds, rotation_reynolds=rotation, count=1)
     return found.length, float(bound)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Decay:
+    """The slowest disturbances that decay downstream."""
+
+    rates: ComplexArray
+    """lambda d, slowest first, real parts negative."""
+    residual: float
+    """Largest relative residual of these modes."""
+    status: Status
+
+    @property
+    def length(self) -> float:
+        """Way on which the slowest one falls by e, in diameters."""
+        return -1 / float(self.rates[0].real)
+
+
+def slowest_decay(*, system: FlowSystem, reynolds: float, rotation_reynolds: float, count: int = 4) -> _Decay:
+    """Rates per diameter of the slowest disturbances downstream of laminar developed flow, mirror-symmetric.
+
+    Raises: ArithmeticError: the developed flow was not found.
+    Source: quadratic eigenproblem by finite elements, solved by shift and invert.
+    """
+    flow, matrices = _pencil(system, reynolds, rotation_reynolds)
+    scale = reynolds or 1.0
+    expected = _expected(reynolds, rotation_reynolds)
+    found, worst = [], 0.0
+    for share in _SHIFTS:
+        mu, residual = _modes(matrices, -share * scale / expected, count + 4)
+        rates = mu / scale
+        kept = (rates.real < 0) & (np.abs(rates) > _NOT_A_MODE / expected)
+        found.append(rates[kept])
+        worst = max(worst, float(np.max(residual[kept], initial=0.0)))
+    rates = np.concatenate(found)
+    ordered = rates[np.lexsort((rates.imag, -np.round(rates.real, 6)))]
+    distinct = np.append(True, np.abs(np.diff(ordered)) > 1e-4 / expected)[: ordered.size]
+    status = Status()
+    if ordered.size == 0 or not flow.status.ok:
+        status = Status(code=StatusCode.NOT_CONVERGED, text="no mode found: refine the section's mesh")
+    return _Decay(rates=ordered[distinct][:count], residual=worst, status=status)
+
+
+def _expected(reynolds: float, rotation_reynolds: float) -> float:
+    ratio = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation_reynolds).value
+    return float(
+        developing_length(reynolds=reynolds, rotation_reynolds=rotation_reynolds, friction_ratio=ratio)
+    )
+
+
+def _pencil(
+    system: FlowSystem, reynolds: float, rotation_reynolds: float
+) -> tuple[FlowSolution, tuple[Any, Any, Any]]:
+    """Developed flow and the matrices A0, A1, A2 about it, without the wall's unknowns."""
+    if reynolds == 0:
+        flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation_reynolds)
+        c = Coefficients(inertia=0.0, viscosity=1.0, rotation=2 * rotation_reynolds)
+        return flow, _matrices(system, flow, c, 1.0)
+    kl, s = reynolds * rotation_reynolds, rotation_reynolds / reynolds
+    flow = developed_section(system=system, kl=kl, s=s)
+    turning = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
+    c = Coefficients(inertia=1.0, viscosity=1.0, rotation=turning)
+    return flow, _matrices(system, flow, c, reynolds**-2)
+
+
+def _matrices(system: FlowSystem, flow: FlowSolution, c: Coefficients, along: float) -> tuple[Any, Any, Any]:
+    """A0, A1 and A2; `along` is the factor of pressure and diffusion along the tube."""
+    space = system.space
+    entries = system.linear_entries(c)
+    if c.inertia != 0.0:
+        entries = entries + c.inertia * system.convection_entries(flow.vector)
+    n, v, b = space.velocity_nodes, space.velocity_pattern, space.coupling_pattern
+    axial = space.at_points(flow.velocity)[0][2]
+    carried = c.inertia * space.mass_entries(axial)
+    diffused = -along * space.mass_entries(np.ones_like(axial))
+    coupling = space.pressure_mass_entries()
+    first = 3 * n
+    blocks = [(k * n + v.rows, k * n + v.cols) for k in range(3)]
+    rows = [r for r, _ in blocks] + [2 * n + b.cols, first + b.rows]
+    cols = [q for _, q in blocks] + [first + b.rows, 2 * n + b.cols]
+    one = _sparse(space, rows, cols, [carried] * 3 + [along * coupling, -coupling])
+    two = _sparse(space, rows[:3], cols[:3], [diffused] * 3)
+    # The pressure's level, pinned in the section's own problem, is a part of what varies along the tube.
+    free = np.union1d(system.free, [first])
+    zero, one, two = (m[free][:, free].tocsc() for m in (system.full_matrix(entries), one, two))
+    return zero, one, two
+
+
+def _sparse(space: FlowSpace, rows: list[Any], cols: list[Any], values: list[FloatArray]) -> Any:
+    size = space.unknowns
+    where = (np.concatenate(rows), np.concatenate(cols))
+    return sparse.csr_matrix((np.concatenate(values), where), shape=(size, size))
+
+
+def _modes(matrices: tuple[Any, Any, Any], shift: float, count: int) -> tuple[ComplexArray, FloatArray]:
+    """Eigenvalues mu next to a shift, and the relative residuals of their modes."""
+    zero, one, two = matrices
+    size = zero.shape[0]
+    factors = Factors.of(matrix=(zero + shift * one + shift**2 * two).tocsc(), along_diagonal=True)
+
+    def inverse(y: FloatArray) -> FloatArray:
+        # (q, mu q) linearises the square; one factored matrix of the section's size serves.
+        low, high = y[:size], y[size:]
+        first = -factors.solve(one @ low + two @ (high + shift * low))
+        return np.concatenate([first, shift * first + low])
+
+    start = np.random.default_rng(0).standard_normal(2 * size)
+    operator = LinearOperator((2 * size, 2 * size), matvec=inverse, dtype=np.float64)
+    nearness, vectors = eigs(operator, k=count, v0=start, tol=_TOLERANCE)
+    mu = shift + 1 / nearness
+    q = vectors[:size]
+    rest = zero @ q + (one @ q) * mu + (two @ q) * mu**2
+    scale = abs(zero) @ np.abs(q) + (abs(one) @ np.abs(q)) * np.abs(mu)
+    return mu, np.linalg.norm(rest, axis=0) / np.linalg.norm(scale, axis=0)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.runs import BalancingFigure
+from ringbalance.verification.cases.driven_fig7_positioning.case import BalancingFigure
 from ringbalance.verification.evidence import Evidence, Found, Level
 
 _RATE = 1.0

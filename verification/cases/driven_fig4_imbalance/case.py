@@ -22,12 +22,7 @@ from ringbalance.controller.eccentric_mass.plant.parameters import PlantParamete
 from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.scenes import (
-    at_constant_speed,
-    changed,
-    convergence_time,
-    thinned,
-)
+from ringbalance.verification.eccentric_scenes import at_constant_speed, changed, convergence_time, thinned
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 
 _PRINTED = 3.5

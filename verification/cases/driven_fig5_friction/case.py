@@ -10,12 +10,7 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.scenes import (
-    at_constant_speed,
-    changed,
-    convergence_time,
-    thinned,
-)
+from ringbalance.verification.eccentric_scenes import at_constant_speed, changed, convergence_time, thinned
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 
 _BEFORE, _AFTER = 0.1, 0.6

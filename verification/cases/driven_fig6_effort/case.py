@@ -16,7 +16,7 @@ from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torq
 from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.scenes import changed
+from ringbalance.verification.eccentric_scenes import changed
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 
 _STEP = {"light": 4e-4, "heavy": 1e-4}

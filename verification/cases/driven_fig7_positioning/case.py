@@ -1,16 +1,25 @@
-"""Two imbalances balanced at constant speed."""
+"""Two imbalances balanced at constant speed: positioning (Fig. 7), and with fine tuning after it (Fig. 8)."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.runs import BalancingFigure
-from ringbalance.verification.eccentric_mass.scenes import thinned
+from ringbalance.verification.cases.driven_fig9_run_up.case import _amplitude_figure
+from ringbalance.verification.eccentric_scenes import at_constant_speed, changed, thinned
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 
 _SHOWN = 12.0
 """s."""
+_PAPER_PLACES = (45.0, 135.0)
+"""Phases of the imbalance in Figs. 7 and 8, deg."""
+_PAPER_ERROR = math.radians(10.0)
+"""Of the masses' places in Fig. 8, rad."""
 
 
 def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
@@ -39,3 +48,55 @@ def _angles(found: BalancingFigure) -> Series:
         ("time", "s", thinned(run.time[shown])),
         *(Curve(name, "rad", thinned(angle[shown])) for name, angle in angles),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class BalancingFigure:
+    """Runs for several phases of the imbalance."""
+
+    phases: tuple[float, ...]
+    """deg."""
+    runs: tuple[EccentricRun, ...]
+    before: tuple[float, ...]
+    """Steady amplitude before anything is moved, m."""
+    positioned: tuple[float, ...]
+    """Mean amplitude in the last second of the check, m."""
+    after: tuple[float, ...]
+    """Mean amplitude in the last second of the run, m."""
+
+    @classmethod
+    def seven(cls, scene: EccentricScene, *, time_limit: float = 30.0) -> BalancingFigure:
+        """Balance the two imbalances of the paper's Fig. 7 at constant speed."""
+        return _balanced(at_constant_speed(scene, time_limit=time_limit))
+
+    @classmethod
+    def eight(cls, scene: EccentricScene, *, time_limit: float = 400.0) -> BalancingFigure:
+        """The same with masses that stop 10 degrees beside their targets, then fine tuning: Fig. 8."""
+        level = at_constant_speed(scene, time_limit=time_limit)
+        return _balanced(changed(level, "supervisor", target_error=(_PAPER_ERROR, _PAPER_ERROR)))
+
+    def amplitudes(self, *, until: float = math.inf) -> Series:
+        """Amplitude over time of every run."""
+        names = [f"imbalance at {phase:.0f} degrees" for phase in self.phases]
+        return _amplitude_figure("amplitude", dict(zip(names, self.runs, strict=True)), until=until)
+
+
+def _balanced(scene: EccentricScene) -> BalancingFigure:
+    turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in _PAPER_PLACES]
+    runs = tuple(simulate_eccentric(one) for one in turned)
+    return BalancingFigure(
+        phases=_PAPER_PLACES,
+        runs=runs,
+        before=tuple(run.unbalanced_amplitude for run in runs),
+        positioned=tuple(_in_check(run) for run in runs),
+        after=tuple(run.final_amplitude for run in runs),
+    )
+
+
+def _in_check(run: EccentricRun) -> float:
+    """Mean amplitude over the last second of the check; infinite without one."""
+    ends = [stage.end for stage in run.stages if stage.name == "check"]
+    if not ends:
+        return math.inf
+    during = (run.time > ends[0] - 1.0) & (run.time <= ends[0])
+    return float(np.mean(run.amplitude[during]))

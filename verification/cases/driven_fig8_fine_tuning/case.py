@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.eccentric_mass.runs import BalancingFigure
+from ringbalance.verification.cases.driven_fig7_positioning.case import BalancingFigure
 from ringbalance.verification.evidence import Evidence, Level, as_found
 
 _TIME = {None: 200.0, "tuning_given_up": 25.0}

@@ -15,9 +15,17 @@ from ringbalance.controller.eccentric_mass.plant.parameters import PlantParamete
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.verification.comparison import from_rounding
-from ringbalance.verification.eccentric_mass.scenes import changed, envelope, thinned
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, Series, figure
+from ringbalance.verification.eccentric_scenes import changed, envelope, thinned
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Reference,
+    Series,
+    figure,
+    from_rounding,
+)
 
 _RPM = 30 / np.pi
 _PRINTED = 135.0

@@ -26,8 +26,7 @@ from ringbalance.scene import liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import with_value
 from ringbalance.verification.cases.claim_18_gas_hole.case import compute as judge_hole
-from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference, from_half_width
 
 _FILE: Final = Path(__file__).parent / "data" / "scene.toml"
 _RADIUS, _TIP = 2e-3, 31e-3

@@ -17,8 +17,7 @@ from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.comparison import from_half_width
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference, from_half_width
 from ringbalance.verification.orders import OrderStudy
 from ringbalance.verification.reference.block_chambers import disc_chamber
 from ringbalance.verification.reference.exact_chamber import exact_totals

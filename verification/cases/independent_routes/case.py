@@ -9,8 +9,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference
 from ringbalance.verification.paper_numbers import with_plate
 from ringbalance.verification.reference.exact_chamber import exact_totals
-from ringbalance.verification.reference.mutated_pressure import mutated_pressure
-from ringbalance.verification.rings import found_of, mesh_table
+from ringbalance.verification.rings import found_of, mesh_table, mutated_pressure
 
 _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
 

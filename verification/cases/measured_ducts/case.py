@@ -9,9 +9,8 @@ import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.validation.comparison import friction
+from ringbalance.verification.validation.comparison import MUTATIONS, friction
 from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.model_bias import MUTATIONS
 
 _LAMINAR: Final = 1800.0
 _TURBULENT: Final = 4000.0

@@ -12,8 +12,7 @@ from ringbalance.scene.arrays import BoolArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level
 from ringbalance.verification.validation.comparison import compare, data_evidence
-from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.tube_at_rest import CALIBRATING, tube_numbers
+from ringbalance.verification.validation.kinds import CALIBRATING, measurements, tube_numbers
 
 _DEVELOPED: Final = 0.0125
 """L/(d Re) from which an undeveloped profile was expected to cost no more than the interval of the outlet."""

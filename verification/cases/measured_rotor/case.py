@@ -13,8 +13,8 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, figure
+from ringbalance.verification.validation.comparison import MUTATIONS
 from ringbalance.verification.validation.kinds import measurements
-from ringbalance.verification.validation.model_bias import MUTATIONS
 
 _WASHER: Final = 12.4e-6
 """Unbalance of a washer, kg m."""

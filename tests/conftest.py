@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, cast
 
 import pytest
 from hypothesis import settings
@@ -21,6 +22,32 @@ os.environ["MPLBACKEND"] = "Agg"
 settings.register_profile("ci", derandomize=True, deadline=None, max_examples=25, database=None)
 settings.register_profile("dev", deadline=None, max_examples=200)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+_FOLDER: Final = Path(__file__).parent
+_FIRST: Final = (
+    "verification/test_cases.py",
+    "physics",
+    "mesh",
+    "reduced_model",
+    "reports/test_report.py",
+    "reports/test_eccentric_report.py",
+    "controller",
+    "identification",
+    "reports",
+    "verification",
+)
+"""Beside the cases, which take longest and compile most, what compiles nothing; last what is short."""
+
+
+def _place(item: pytest.Item) -> int:
+    path = item.path.relative_to(_FOLDER)
+    names = {path.as_posix(), path.parts[0]}
+    return next((place for place, name in enumerate(_FIRST) if name in names), len(_FIRST))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Modules in the order in which processes take them: nothing is compiled in two of them at once."""
+    items.sort(key=_place)
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -28,16 +29,43 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 print("ready", flush=True)
 sys.exit(main())
 """
+AT_WORK = """
+import signal, sys
+from ringbalance.cli import main
+from ringbalance.reports import report
+signal.signal(signal.SIGINT, signal.default_int_handler)
+collect = report.collect_evidence
+def begin(*given, **named):
+    print("ready", flush=True)
+    return collect(*given, **named)
+report.collect_evidence = begin
+sys.exit(main())
+"""
+
+Finished = subprocess.CompletedProcess[str]
+Run = Callable[..., Finished]
 
 
-def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
+def run(*words: str | Path) -> Finished:
     """One command line in a process of its own."""
     return subprocess.run(
         [*LAUNCH, *map(str, words)], capture_output=True, text=True, check=False, timeout=120
     )
 
 
-def assert_bad_input(found: subprocess.CompletedProcess[str], *told: str) -> None:
+@pytest.fixture
+def here(capsys: pytest.CaptureFixture[str]) -> Run:
+    """One command line in this process, which has loaded everything already."""
+
+    def run_here(*words: str | Path) -> Finished:
+        capsys.readouterr()
+        code = cli.main([*map(str, words)])
+        return Finished(words, code, *capsys.readouterr())
+
+    return run_here
+
+
+def assert_bad_input(found: Finished, *told: str) -> None:
     """Exit code 2, nothing on standard output, no traceback, and the words that tell what is wrong."""
     assert found.returncode == 2
     assert found.stdout == ""
@@ -75,16 +103,26 @@ def broken_scene(tmp_path: Path) -> Path:
         (["calibrate", "no_such_scene.toml"], ["no_such_scene.toml"]),
     ],
 )
-def test_wrong_usage(words: list[str], told: list[str]) -> None:
-    assert_bad_input(run(*words), *told)
+def test_wrong_usage(words: list[str], told: list[str], here: Run) -> None:
+    assert_bad_input(here(*words), *told)
 
 
 @pytest.mark.parametrize("command", ["calibrate", "simulate", "report", "plot"])
-def test_a_broken_scene_is_reported_in_one_message(command: str, broken_scene: Path, tmp_path: Path) -> None:
+def test_a_broken_scene_is_reported_in_one_message(
+    command: str, broken_scene: Path, tmp_path: Path, here: Run
+) -> None:
     more: list[str | Path] = ["--out", tmp_path / "out"] if command in {"report", "plot"} else []
-    found = run(command, broken_scene, *more)
+    found = here(command, broken_scene, *more)
     assert_bad_input(found, "broken.toml", "outer_radiuss", "outer_radius", "furlongs", "chambers = 3")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("words", [["reprt"], ["calibrate"], ["verify", "no_such_case"], ["calibrate", None]])
+def test_a_process_ends_as_its_command_does(words: list[Any], broken_scene: Path, here: Run) -> None:
+    given = [word or broken_scene for word in words]
+    found, expected = run(*given), here(*given)
+    assert (found.returncode, found.stdout, found.stderr) == (2, "", expected.stderr)
+    assert expected.returncode == 2
 
 
 @pytest.mark.parametrize("command", ["calibrate", "simulate"])
@@ -97,17 +135,17 @@ def test_json_is_one_clean_document(command: str) -> None:
     assert "Warning" not in found.stderr
 
 
-def test_the_list_of_cases_is_clean_json() -> None:
-    found = run("verify", "--list", "--json")
+def test_the_list_of_cases_is_clean_json(here: Run) -> None:
+    found = here("verify", "--list", "--json")
     assert found.returncode == 0
     assert {"id", "kind"} <= set(json.loads(found.stdout)[0])
 
 
-def test_a_saved_law_gives_the_same_run(tmp_path: Path) -> None:
-    assert run("calibrate", PAPER, "--save", tmp_path / "law.json").returncode == 0
+def test_a_saved_law_gives_the_same_run(tmp_path: Path, here: Run) -> None:
+    assert here("calibrate", PAPER, "--save", tmp_path / "law.json").returncode == 0
     fresh, saved = (
-        run("simulate", PAPER, "--json"),
-        run("simulate", PAPER, "--law", tmp_path / "law.json", "--json"),
+        here("simulate", PAPER, "--json"),
+        here("simulate", PAPER, "--law", tmp_path / "law.json", "--json"),
     )
     # Whether the run settles is not asked.
     assert fresh.returncode in {0, 1}, fresh.stderr
@@ -116,18 +154,20 @@ def test_a_saved_law_gives_the_same_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("words", [["calibrate", PAPER, "--save"], ["plot", PAPER, "--out"]])
-def test_a_file_where_a_folder_should_be(words: list[str], tmp_path: Path) -> None:
+def test_a_file_where_a_folder_should_be(words: list[str], tmp_path: Path, here: Run) -> None:
     (tmp_path / "in_the_way").touch()
-    found = run(*words, tmp_path / "in_the_way" / "law.json")
+    found = here(*words, tmp_path / "in_the_way" / "law.json")
     assert found.returncode == 2
     assert "Traceback" not in found.stderr
     assert "in_the_way" in found.stderr
 
 
-@pytest.mark.parametrize("delay", [0.2, 5.0])
-def test_an_interrupted_report_leaves_nothing_half_written(tmp_path: Path, delay: float) -> None:
+@pytest.mark.parametrize(("program", "delay"), [(READY, 0.2), (AT_WORK, 1.0)], ids=["loading", "at work"])
+def test_an_interrupted_report_leaves_nothing_half_written(
+    tmp_path: Path, program: str, delay: float
+) -> None:
     """Interrupted while modules are loaded, and in the middle of the work."""
-    command = [sys.executable, "-c", READY, "report", PAPER, "--out", str(tmp_path / "out")]
+    command = [sys.executable, "-c", program, "report", PAPER, "--out", str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None
         child.stdout.readline()

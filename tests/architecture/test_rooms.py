@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 DYNAMIC = {"import_module", "__import__"}
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+Scope = Function | ast.ClassDef
+Scopes = tuple[ast.AST, ...]
+"""Functions and classes around a statement, the outermost first."""
 
 
 def imported_names(node: ast.AST) -> list[str]:
@@ -25,37 +30,39 @@ def _called_name(node: ast.Call) -> str:
     return getattr(node.func, "id", "") or getattr(node.func, "attr", "")
 
 
-def _function_nodes(tree: ast.AST) -> Iterator[ast.AST]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            yield from ast.walk(node)
+@cache
+def loading(source: str) -> tuple[tuple[ast.AST, Scopes], ...]:
+    """Imports and dynamic imports of a module, each with what it stands in; every test asks for them all."""
+    return tuple(_loading(ast.parse(source), ()))
 
 
-def _lazy_names(tree: ast.Module) -> set[ast.AST]:
-    """What stands inside a module's own `__getattr__`, which loads a public name when it is first used."""
-    lazy = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == "__getattr__"]
-    return {inner for function in lazy for inner in ast.walk(function)}
+def _loading(node: ast.AST, scopes: Scopes) -> Iterator[tuple[ast.AST, Scopes]]:
+    dynamic = isinstance(node, ast.Call) and _called_name(node) in DYNAMIC
+    if dynamic or isinstance(node, ast.Import | ast.ImportFrom):
+        yield node, scopes
+    inner = (*scopes, node) if isinstance(node, Scope) else scopes
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.expr_context | ast.operator):
+            yield from _loading(child, inner)
+
+
+def _lazy(scopes: Scopes) -> bool:
+    """Whether it is a module's own `__getattr__`, which loads a public name when it is first used."""
+    return bool(scopes) and isinstance(scopes[0], ast.FunctionDef) and scopes[0].name == "__getattr__"
 
 
 def style_faults(source: str) -> list[str]:
     """Imports that are relative, dynamic, or hidden in a function's body."""
-    tree = ast.parse(source)
-    lazy = _lazy_names(tree)
-    faults = [
-        f"line {node.lineno}: relative import"
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and node.level
-    ]
-    faults += [
-        f"line {node.lineno}: import inside a function"
-        for node in _function_nodes(tree)
-        if isinstance(node, ast.Import | ast.ImportFrom)
-    ]
-    faults += [
-        f"line {node.lineno}: dynamic import"
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and _called_name(node) in DYNAMIC and node not in lazy
-    ]
+    faults = []
+    for node, scopes in loading(source):
+        line = f"line {getattr(node, 'lineno', 0)}"
+        if isinstance(node, ast.Call):
+            faults += [] if _lazy(scopes) else [f"{line}: dynamic import"]
+            continue
+        if isinstance(node, ast.ImportFrom) and node.level:
+            faults.append(f"{line}: relative import")
+        if any(isinstance(scope, Function) for scope in scopes):
+            faults.append(f"{line}: import inside a function")
     return faults
 
 
@@ -63,7 +70,7 @@ def room_faults(source: str, *, room: str, room_order: Sequence[str]) -> list[st
     """Imports from the face or from a later room."""
     allowed = {*room_order[: room_order.index(room) + 1]}
     faults = []
-    for node in ast.walk(ast.parse(source)):
+    for node, _ in loading(source):
         for name in imported_names(node)[:1]:
             top, _, rest = name.partition(".")
             if top == "ringbalance" and rest.split(".")[0] not in allowed:
@@ -77,7 +84,7 @@ def import_graph(sources: Mapping[str, str]) -> dict[str, set[str]]:
 
 
 def _project_imports(source: str, sources: Mapping[str, str]) -> Iterator[str]:
-    for node in ast.walk(ast.parse(source)):
+    for node, _ in loading(source):
         names = [name for name in imported_names(node) if name in sources]
         # `from package import module` needs the module; that Python runs the package first is no cycle.
         only_submodules = isinstance(node, ast.ImportFrom) and len(names) == len(node.names) + 1

@@ -222,15 +222,23 @@ def test_dead_times_and_the_gain_are_found_once(
     assert sorted(calls) == ["dead_times", "recommended_gain"]
 
 
-def test_what_its_runs_refute_is_not_recommended(slow: Scene, calibrated: BalancerModel) -> None:
-    """Valves that open for 60 ms or not at all: other settings are tried, and what is reached is reported."""
+def test_what_its_runs_refute_is_not_recommended(
+    slow: Scene, calibrated: BalancerModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Valves that open for 60 ms or not at all: other settings are tried, and what is reached is reported.
+
+    Of each way out the last of the steps, and one limit that is not enough.
+    """
+    for name, steps in (("LIMITS", (20.0, 50.0)), ("VALVES", (10.0,)), ("_OPENINGS", (0.1,))):
+        assert getattr(search, name)[-len(steps) :] == steps
+        monkeypatch.setattr(search, name, steps)
     coarse = with_settings(slow, minimum_gas_time=0.06, limit=0.05e-6)
     found = tuned(coarse, calibrated)
     assert not found.succeeded
     assert found.search is not None
     assert len(found.search.tried) > 3
     limit = found.search.limit
-    assert limit is not None
+    assert limit == 50.0 * coarse.controller.limit
     assert f"raise controller.limit to {limit * 1e6:.3g} um" in found.status
     json.dumps(tuning_document(found), allow_nan=False)
     assert tuned(with_settings(coarse, limit=limit), calibrated).settling is not None

@@ -67,7 +67,8 @@ def slow(paper_scene: Scene) -> BalancerModel:
 
 @pytest.mark.parametrize("pressure", [2e3, 8e3, 5e4])
 def test_every_flow_of_a_calibrated_law_is_right(slow: BalancerModel, pressure: float) -> None:
-    assert worst_error(slow, pressure=pressure, tries=20) < 2e-11
+    # Eight flows have gas on and off, the tube wet and dry; twice as many notice the same defects.
+    assert worst_error(slow, pressure=pressure, tries=8) < 2e-11
 
 
 def test_that_disc_does_run_back(slow: BalancerModel) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.tuning import cli
 from ringbalance.controller.tuning.cli import _show
 from ringbalance.controller.tuning.eccentric import FIRST_RUNS, _eccentric_settling, tune_eccentric
 from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates
@@ -250,9 +252,23 @@ def washing_machine(*, time_limit: float = 80.0) -> EccentricScene:
     return replace(scene, run=replace(scene.run, time_limit=time_limit))
 
 
+def once(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The result of the first call, again for each further one."""
+    found: list[Any] = []
+
+    def known(*given: Any, **named: Any) -> Any:
+        if not found:
+            found.append(function(*given, **named))
+        return found[0]
+
+    return known
+
+
 def test_eccentric_masses_get_their_sampled_loops_and_settling_times(
-    capsys: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """As a document and as text: of the same runs."""
+    monkeypatch.setattr(cli, "tune_eccentric", once(tune_eccentric))
     scene = str(bundled_scene("washing_machine"))
     assert main(["tune", scene, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)

@@ -331,10 +331,13 @@ def test_the_work_of_a_fit_is_bounded(paper_scene: Scene) -> None:
 
 
 def test_few_rigs_are_covered() -> None:
-    """Of 30 intervals of 95 % more than four miss once in sixty such tests; these are always the same."""
-    found = [holds for number in range(9) for holds in covered(rig(number)).values()]
-    assert len(found) == 30
-    assert sum(found) >= 26
+    """Of 20 intervals of 95 % more than three miss once in sixty such tests; these are always the same.
+
+    Two rigs of each set of data: intervals a fifth too short would miss five times.
+    """
+    found = [holds for number in (1, 2, 4, 5, 7, 8) for holds in covered(rig(number)).values()]
+    assert len(found) == 20
+    assert sum(found) >= 17
 
 
 @pytest.mark.heavy

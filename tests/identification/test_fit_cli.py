@@ -353,7 +353,7 @@ def test_a_fit_that_fails_says_so(run: Run, tmp_path: Path) -> None:
 
 def test_a_disc_with_imported_chambers(run: Run) -> None:
     """Injections of the paper's disc; a mesh has no plates that could be uncertain."""
-    code, out, err = run(bundled_scene("imported_chamber"), EXAMPLES["transfer"])
+    code, out, err = run(bundled_scene("imported_chamber"), EXAMPLES["transfer"], "--parameters", "bore")
     assert code == 1, err
     exact = " ".join(out.split()).split("taken as exact: ")[1].split(".")[0].split(", ")
     assert "plate_thickness" not in exact

@@ -12,7 +12,12 @@ import pytest
 from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, Review, _power_of
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.next_measurement import _offered_rows, _words_of, next_measurement
+from ringbalance.identification.next_measurement import (
+    NextMeasurement,
+    _offered_rows,
+    _words_of,
+    next_measurement,
+)
 from ringbalance.identification.predict.device import Device, Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
@@ -114,15 +119,23 @@ def some(observations: Observations, rows: list[int], **columns: FloatArray) -> 
     )
 
 
+@pytest.fixture(scope="module")
+def four(paper_scene: Scene, true: Scene) -> tuple[Observations, FitResult, NextMeasurement]:
+    """Four measurements, the bore fitted to them, and what a further one is expected to give."""
+    data = some(transfers(true, Models.of(paper_scene), seed=0, share=0.02), [0, 6, 13, 19])
+    first = fit(paper_scene, data=[data], parameters=["bore"])
+    return data, first, next_measurement(first, "bore")
+
+
 @pytest.mark.parametrize("row", [0, 13, 26])
-def test_the_expected_gain_is_that_of_fits_made_again(paper_scene: Scene, true: Scene, row: int) -> None:
+def test_the_expected_gain_is_that_of_fits_made_again(
+    paper_scene: Scene, four: tuple[Observations, FitResult, NextMeasurement], row: int
+) -> None:
     """Interval of the bore with a candidate among four measurements, against the one expected without it.
 
     Noise is given, so that an interval depends on the draw through curvature alone: within 5 %.
     """
-    data = some(transfers(true, Models.of(paper_scene), seed=0, share=0.02), [0, 6, 13, 19])
-    first = fit(paper_scene, data=[data], parameters=["bore"])
-    told = next_measurement(first, "bore")
+    data, first, told = four
     offered = _offered_rows(first.scene, "transfer", data)
     chosen = next(g for g in told.gains if g.candidate == _words_of(offered, row))
     volume = PREDICTED["transfer"].predict(first.scene, offered, Models.of(paper_scene))

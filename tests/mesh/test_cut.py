@@ -110,15 +110,18 @@ def test_the_built_in_chamber_as_a_mesh_is_the_closed_form_but_for_its_drawn_arc
 
 @pytest.mark.parametrize(("kind", "order"), [("tetra", 2.0), ("hexahedron", 2.0), ("tetra10", 4.0)])
 def test_drawn_arcs_converge(disc: Disc, kind: CellKind, order: float) -> None:
-    """Chords leave (h^2/24) of R^2 for arcs of angle h, quadratic ones a part of h^4."""
+    """Chords leave (h^2/24) of R^2 for arcs of angle h, quadratic ones a part of h^4.
+
+    The next term is h^2/20 of that: at three cells it moves a rate by 0.015.
+    """
     errors = []
-    for angular in (6, 12, 24):
+    for angular in (3, 6, 12):
         meshed = replace(disc, geometry=disc_chamber(disc, (1, angular, 1), kind=kind))
         errors.append(abs(chamber_volume(disc=meshed) / chamber_volume(disc=disc) - 1))
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(rates, order, atol=0.05)
-    # Chords miss (theta/24)^2/6 of R2^2 theta/2 outside and gain as much of R1^2 inside.
-    assert errors[-1] < ((disc.central_angle / 24) ** order) / 6
+    # Chords miss (theta/12)^2/6 of R2^2 theta/2 outside and gain as much of R1^2 inside.
+    assert errors[-1] < ((disc.central_angle / 12) ** order) / 6
 
 
 @given(turn=st.floats(-1.0, 1.0), kind=st.sampled_from(["tetra", "hexahedron27"]))
@@ -167,7 +170,7 @@ def test_the_wall_pressure_counts_the_wet_part_of_a_flat_wall(disc: Disc) -> Non
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_facets_may_miss_holds_what_they_miss(disc: Disc, kind: CellKind) -> None:
     """The true chamber is known here; an interval three times too wide would say little."""
-    geometry, fills = disc_chamber(disc, (2, 8, 3), kind=kind), np.linspace(0.05, 0.9, 5)
+    geometry, fills = disc_chamber(disc, (1, 8, 2), kind=kind), np.linspace(0.05, 0.9, 5)
     meshed, error = replace(disc, geometry=geometry), drawing_error(geometry, fill_ratio=fills)
     missing = abs(chamber_volume(disc=meshed) - chamber_volume(disc=disc))
     assert error.volume / 3 < missing < error.volume

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,6 +20,11 @@ from ringbalance.verification.navier_stokes.flow_fields import (
     SectionFlow,
 )
 
+section = cache(SectionFlow.of)
+entrance = cache(EndFlow.entrance)
+leaving = cache(EndFlow.exit)
+"""Fields that several tests look at are found once; none changes them."""
+
 
 def _areas(flow: SectionFlow | EndFlow) -> FloatArray:
     (x0, y0), (x1, y1), (x2, y2) = (flow.points[:, flow.triangles[:, i]] for i in range(3))
@@ -32,7 +39,7 @@ def _mean(flow: SectionFlow, values: FloatArray) -> float:
 
 @pytest.mark.parametrize(("re", "rotation"), [(150.0, 47.0), (1e-3, 100.0), (200.0, 0.0), (700.0, 700.0)])
 def test_the_section_agrees_with_the_table(re: float, rotation: float) -> None:
-    flow = SectionFlow.of(reynolds=re, rotation_reynolds=rotation)
+    flow = section(reynolds=re, rotation_reynolds=rotation)
     expected = rotating_friction_ratio(reynolds=re, rotation_reynolds=rotation).value
     assert flow.status.ok
     assert (flow.reynolds, flow.rotation_reynolds) == (re, pytest.approx(rotation))
@@ -43,7 +50,7 @@ def test_the_section_agrees_with_the_table(re: float, rotation: float) -> None:
 
 
 def test_the_section_is_symmetric_and_still_at_the_wall() -> None:
-    flow = SectionFlow.of(reynolds=150.0, rotation_reynolds=47.0)
+    flow = section(reynolds=150.0, rotation_reynolds=47.0)
     order, mirrored = (np.lexsort(np.round(p, 9)) for p in (flow.points, flow.points * [[1.0], [-1.0]]))
     assert np.allclose(flow.points[:, order], (flow.points * [[1.0], [-1.0]])[:, mirrored])
     assert np.array_equal(flow.axial_velocity[order], flow.axial_velocity[mirrored])
@@ -57,14 +64,14 @@ def test_the_section_is_symmetric_and_still_at_the_wall() -> None:
 
 def test_the_sections_vortices_turn_as_the_coriolis_force_has_them() -> None:
     # Liquid faster than the mean is driven against y = z cross x, and returns along the walls.
-    flow = SectionFlow.of(reynolds=150.0, rotation_reynolds=47.0)
+    flow = section(reynolds=150.0, rotation_reynolds=47.0)
     assert _mean(flow, flow.axial_velocity * flow.velocity[0]) < -0.02
     assert abs(_mean(flow, flow.velocity[0])) < 1e-3
     assert _mean(flow, flow.axial_velocity * flow.points[0]) < -0.01
 
 
 def test_the_sections_stream_function_has_its_velocity_as_slope() -> None:
-    flow = SectionFlow.of(reynolds=150.0, rotation_reynolds=47.0)
+    flow = section(reynolds=150.0, rotation_reynolds=47.0)
     on_axis = np.flatnonzero((np.abs(flow.points[1]) < 1e-12) & (np.abs(flow.points[0]) < 0.2))
     for node in on_axis[::5]:
         near = np.flatnonzero(np.hypot(*(flow.points - flow.points[:, [node]])) < 0.06)
@@ -75,14 +82,14 @@ def test_the_sections_stream_function_has_its_velocity_as_slope() -> None:
 
 
 def test_a_section_at_rest_is_poiseuilles() -> None:
-    flow = SectionFlow.of(reynolds=300.0, rotation_reynolds=0.0)
+    flow = section(reynolds=300.0, rotation_reynolds=0.0)
     assert np.allclose(flow.axial_velocity, 2 * (1 - 4 * (flow.points**2).sum(axis=0)), atol=1e-4)
     assert np.abs(flow.velocity).max() < 1e-12
 
 
 @pytest.mark.parametrize(("re", "rotation"), [(7500.0, 2356.0), (1e6, 1e6), (1.0, 1e7)])
 def test_beyond_the_range_the_nearest_section_is_given_and_said(re: float, rotation: float) -> None:
-    flow = SectionFlow.of(reynolds=re, rotation_reynolds=rotation)
+    flow = section(reynolds=re, rotation_reynolds=rotation)
     assert flow.status.code is StatusCode.OUT_OF_RANGE
     assert flow.rotation_reynolds / flow.reynolds == pytest.approx(rotation / re)
     assert flow.reynolds * flow.rotation_reynolds <= LARGEST_KL * (1 + 1e-9)
@@ -106,16 +113,15 @@ def _wall(flow: EndFlow, inside: float) -> BoolArray:
 @pytest.mark.parametrize("re", [1.0, 5.0])
 def test_the_ends_have_the_tables_losses(re: float) -> None:
     # So slow that flow is developed at the edge of the picture.
-    entrance, leaving = EndFlow.entrance(reynolds=re), EndFlow.exit(reynolds=re)
-    k = -(_pressure_on_axis(entrance, 4.0) + 64 * 4.0 / re)
+    k = -(_pressure_on_axis(entrance(reynolds=re), 4.0) + 64 * 4.0 / re)
     assert k == pytest.approx(float(laminar_entrance_loss(reynolds=re).value), rel=0.02)
-    k = _pressure_on_axis(leaving, -1.5) - 64 * 1.5 / re
+    k = _pressure_on_axis(leaving(reynolds=re), -1.5) - 64 * 1.5 / re
     assert k == pytest.approx(float(laminar_exit_loss(reynolds=re).value), rel=0.03)
 
 
 @pytest.mark.parametrize("re", [1.0, 200.0])
 def test_the_ends_carry_the_flow_and_are_still_at_the_wall(re: float) -> None:
-    for flow, inside in ((EndFlow.entrance(reynolds=re), 1.0), (EndFlow.exit(reynolds=re), -1.0)):
+    for flow, inside in ((entrance(reynolds=re), 1.0), (leaving(reynolds=re), -1.0)):
         assert flow.status.ok
         assert np.all(_areas(flow) > 0)
         wall, axis = _wall(flow, inside), flow.points[1] == 0.0
@@ -127,7 +133,7 @@ def test_the_ends_carry_the_flow_and_are_still_at_the_wall(re: float) -> None:
 
 
 def test_the_ends_velocity_carries_the_flow_rate() -> None:
-    for flow, inside in ((EndFlow.entrance(reynolds=200.0), 1.0), (EndFlow.exit(reynolds=200.0), -1.0)):
+    for flow, inside in ((entrance(reynolds=200.0), 1.0), (leaving(reynolds=200.0), -1.0)):
         stations = [x for x in np.unique(flow.points[0]) if x * inside > 0.3]
         assert len(stations) > 5
         for x in stations:

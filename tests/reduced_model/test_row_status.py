@@ -82,12 +82,12 @@ def test_both_tables_have_the_same_rings_whatever_is_modelled(table_1_scene: Sce
 
 @pytest.mark.parametrize(
     ("speed", "crest", "expected"),
-    [(314.0, 36e-3, RowStatus.OVER_CREST), (30.0, 31.5e-3, RowStatus.NO_RING)],
+    [(314.0, 36e-3, RowStatus.OVER_CREST), (50.0, 31.5e-3, RowStatus.NO_RING)],
 )
 def test_table_and_document_mark_the_row(
     table_1_scene: Scene, speed: float, crest: float, expected: RowStatus
 ) -> None:
-    """At 30 rad/s on a shaft that lies g/omega^2 = 10.9 mm is deeper than most rings (9.6 mm at the most)."""
+    """At 50 rad/s on a shaft that lies g/omega^2 = 3.9 mm is deeper than a ring of little liquid (0.9 mm)."""
     scene = changed(table_1_scene, crest=crest)
     environment = replace(scene.environment, gravity=9.80665, shaft="horizontal")
     scene = replace(scene, rotor=replace(scene.rotor, speed=speed), environment=environment)

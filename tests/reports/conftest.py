@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from ringbalance.reports.render import render
 
@@ -317,6 +318,16 @@ def _profile() -> dict[str, Any]:
         "paper_radius_m": _floats(np.linspace(implied, R2, 17)),
         "paper_pressure_Pa": _floats(RHO * OMEGA**2 * (np.linspace(implied, R2, 17) ** 2 - implied**2) / 2),
     }
+
+
+@pytest.fixture
+def unwritten(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are painted but not written out, which takes most of a page: for tests that read its text."""
+
+    def savefig(_: object, buffer: IO[str], **__: object) -> None:
+        buffer.write('<svg ><path d="M 0 0" /></svg>')
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
 
 
 @pytest.fixture

@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 from typing import Any
 
+import pytest
+
 from ringbalance.reports import summary
 from ringbalance.reports.pages.consequences import SECTION
 from ringbalance.reports.render import render
@@ -83,6 +85,7 @@ def test_a_gain_that_no_run_found_leaves_a_gap_in_the_figure() -> None:
     assert "nan" not in view["figure"].svg.lower().replace("mountain", "")
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_the_page_has_the_section_only_with_its_evidence(evidence: Record) -> None:
     without = render({key: value for key, value in evidence.items() if key != "consequences"})["annex.html"]
     assert "consequences-title" not in without
@@ -102,6 +105,7 @@ def test_a_law_that_does_not_flow_leaves_its_tables_out() -> None:
     assert SECTION.view({}) is None
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_claims_judged_on_another_disc_are_distinguished(evidence: Record) -> None:
     changed = copy.deepcopy(evidence)
     for case in changed["verification"]:

@@ -48,6 +48,7 @@ def fitted(evidence: dict[str, Any]) -> dict[str, Any]:
     return {**evidence, "scene": {**evidence["scene"], "measured": asdict(MEASURED)}}
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_the_annex_of_a_fitted_scene_has_it(fitted: dict[str, Any]) -> None:
     page = render(fitted)["annex.html"]
     section = page.split('id="measured"')[1].split("<section")[0]
@@ -63,18 +64,21 @@ def test_the_annex_of_a_fitted_scene_has_it(fitted: dict[str, Any]) -> None:
     assert 'id="figure-fitted-profiles"' in section
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_the_report_says_what_it_was_fitted_to(fitted: dict[str, Any]) -> None:
     page = render(fitted)["report.html"]
     assert "Fitted to 31 measurements of this device" in page
     assert "No comparison with measurements of this device exists" not in page
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_findings_name_quantities_as_tables_do(fitted: dict[str, Any]) -> None:
     finding = {"about": "correlation", "text": "the errors of disc.lambda_factor (correlation -0.50)"}
     fitted["scene"]["measured"]["findings"] = [finding]
     assert "measured factor on λ (correlation −0.50)" in render(fitted)["annex.html"]
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_without_measurements_there_is_no_section(evidence: dict[str, Any]) -> None:
     assert SECTION.view(evidence) is None
     assert 'id="measured"' not in render(evidence)["annex.html"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from functools import lru_cache
 from html.parser import HTMLParser
 from importlib.resources import files
 from itertools import pairwise
@@ -47,7 +48,9 @@ class Reader(HTMLParser):
             self.text.append(data)
 
 
+@lru_cache(maxsize=8)
 def read(page: str) -> Reader:
+    """A page as read, shared: not to be changed."""
     reader = Reader()
     reader.feed(page)
     reader.close()
@@ -131,6 +134,7 @@ def pictures() -> tuple[Record, dict[str, bytes]]:
     return {"drawn": True, "text": "", "files": listed}, contents
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_pictures_come_in_both_schemes_and_can_be_read_aloud(evidence: Record) -> None:
     evidence["pictures"], contents = pictures()
     page = render(evidence, pictures=contents)["annex.html"]
@@ -182,6 +186,7 @@ CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
 )
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_the_pages_say_what_the_evidence_says(evidence: Record) -> None:
     before = both(evidence).replace("\u202f", " ")
     for path, value, said in CHANGES:
@@ -238,6 +243,7 @@ def test_a_link_to_a_case_opens_its_box(pages: dict[str, str]) -> None:
     assert links <= set(boxes)
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_what_was_not_run_is_said(evidence: Record) -> None:
     evidence["verification"][-1]["status"] = "heavy: run with --level heavy"
     evidence["closed_loop"] = {}
@@ -248,6 +254,7 @@ def test_what_was_not_run_is_said(evidence: Record) -> None:
     assert "The closed loop was not run." in text
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_markup_in_texts_is_shown_not_obeyed(evidence: Record) -> None:
     evidence["scene"]["name"] = '<b onclick="x()">disc</b> & "co"'
     evidence["verification"][0]["doubts"] = ["<script>alert()</script>"]
@@ -256,6 +263,7 @@ def test_markup_in_texts_is_shown_not_obeyed(evidence: Record) -> None:
         assert "<script" not in page
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_nothing_flows(evidence: Record) -> None:
     point = evidence["operating_point"]
     point.update(

@@ -83,6 +83,7 @@ def fifty_record(work: Work) -> Record:
     return fifty.SECTION.collect(work) or {}
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_the_page_on_fifty_says_what_the_map_says(evidence: Record, fifty_record: Record) -> None:
     view = fifty.SECTION.view(with_section(evidence, "fifty", fifty_record))
     assert view is not None
@@ -96,6 +97,7 @@ def test_the_page_on_fifty_says_what_the_map_says(evidence: Record, fifty_record
     assert "gallium needs" in page
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_where_nothing_flows_the_page_says_so(evidence: Record, fifty_record: Record) -> None:
     dry = json.loads(json.dumps(fifty_record))
     dry["map"]["runs"] = False
@@ -110,6 +112,7 @@ def test_where_nothing_flows_the_page_says_so(evidence: Record, fifty_record: Re
     assert "there is no map to draw" in render({**evidence, "fifty": dry})["annex.html"]
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_a_prescribed_k_is_named(evidence: Record, fifty_record: Record) -> None:
     prescribed = {**fifty_record, "decreed_k": 50.0}
     assert "The scene fixes k at 50" in render(with_section(evidence, "fifty", prescribed))["annex.html"]
@@ -129,6 +132,7 @@ def hump_record(work: Work) -> Record:
     return record
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_every_regime_that_is_found_is_drawn(evidence: Record, hump_record: Record) -> None:
     states = {state["regime"]: state for state in hump_record["states"]}
     assert set(states) == {"siphon", "separated", "blocked"}

@@ -81,6 +81,7 @@ def test_reading_takes_the_unit_that_suits() -> None:
     ) == "(2.50\u202f±\u202f0.10)\u202fµm".replace("\u202f±\u202f", "\u00a0±\u00a0")
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_the_report_of_changed_evidence_is_traced_too(evidence: Record) -> None:
     evidence["operating_point"]["gas_pressure_Pa"] = 1.234e6
     page = render(evidence)["report.html"]

@@ -7,10 +7,10 @@ loads the same meanwhile.
 from __future__ import annotations
 
 import os
-from importlib import import_module
 from pathlib import Path
 from typing import Final
 
+from ringbalance.reports import deferred
 from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import SceneError
@@ -23,8 +23,6 @@ from ringbalance.verification.evidence import Level
 DONE: Final = 0
 NOT_SOUND: Final = 1
 MOST_WORKERS: Final = 2
-_PROGRAM: Final = "ringbalance.reports.report"
-_DRAWING: Final = "ringbalance.reports.pictures.process"
 
 
 def report(
@@ -61,8 +59,8 @@ def report(
             option="--interactive", value=True, problem=problem, allowed="to leave it out"
         )
     console, workers = messages_console(), min(MOST_WORKERS, os.cpu_count() or 1)
-    with activity("report", "reading") as shown, beside(workers, loading=_PROGRAM) as pool:
-        finished = import_module(_PROGRAM).write_report(
+    with activity("report", "reading") as shown, beside(workers, loading=_load) as pool:
+        finished = deferred.program.write_report(
             with_tolerance(told, tolerance=tolerance, models=models),
             out,
             level=level,
@@ -76,6 +74,11 @@ def report(
     console.print(f"took {since_start():.0f} s", style="dim", highlight=False)
     print(finished.page)
     return DONE if finished.sound else NOT_SOUND
+
+
+def _load() -> bool:
+    """Called in a worker: what a report needs is then there."""
+    return callable(deferred.program.write_report)
 
 
 def plot(scene: Path, *, out: Path = Path("out")) -> int:
@@ -93,7 +96,7 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
         OSError: the folder cannot be written.
     """
     told = liquid_ring_scene(load_scene(scene))
-    console, process = messages_console(), import_module(_DRAWING)
+    console, process = messages_console(), deferred.drawing
     with staged(out, folders=process.FOLDERS) as stage, activity("plot", "pressure fields") as shown:
         fields = process.write_fields(scene=told, folder=stage)
         drawing = process.start_drawing(scene=told, fields=fields, folder=stage)

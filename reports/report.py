@@ -33,6 +33,7 @@ from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.processes import Workers, beside, seldom_collected
 from ringbalance.verification.evidence import Level
+from ringbalance.verification.runner import paper_scene
 
 FILES: Final = ("evidence.json", *DOCUMENTS)
 """Of a report, the page last: where it is, all else is."""
@@ -136,7 +137,7 @@ def write_report(
     with (
         seldom_collected(),
         staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage,
-        beside(workers, loading=__name__) as pool,
+        beside(workers, loading=paper_scene) as pool,
     ):
         views = _Views(pool=pool)
         if isinstance(scene, EccentricScene):

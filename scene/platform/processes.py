@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from importlib import import_module
 from multiprocessing import get_context, parent_process
 from threading import Thread
 from types import TracebackType
@@ -95,24 +94,22 @@ def checked_workers(workers: int) -> int:
 
 
 @contextmanager
-def beside(workers: int | Workers | None, *, loading: str | None = None) -> Iterator[Workers | None]:
+def beside(
+    workers: int | Workers | None, *, loading: Callable[[], object] | None = None
+) -> Iterator[Workers | None]:
     """The other ones of so many processes, this one included; None where there are none.
 
-    Args: `workers`: those that are at work already stay so afterwards. `loading`: a module that new ones load
-    at once, while this process goes on.
+    Args: `workers`: those that are at work already stay so afterwards. `loading`: called by new ones at
+    once, while this process goes on.
     """
     if workers is None or workers == 1 or isinstance(workers, Workers):
         yield None if isinstance(workers, int) else workers
         return
     with Workers(workers - 1) as crew:
-        for _ in range(workers - 1 if loading else 0):
-            crew.submit(_load, loading or "")
+        if loading is not None:
+            for _ in range(workers - 1):
+                crew.submit(loading)
         yield crew
-
-
-def _load(module: str) -> None:
-    """A worker's: a module cannot be sent back."""
-    import_module(module)
 
 
 @contextmanager

@@ -200,13 +200,26 @@ def line_warning(answers: tuple[LineAnswer, ...]) -> str:
     above = [answer for answer in answers if answer.above_limit]
     if not above:
         return _standing_warning(answers[0])
-    which = "" if above[0].end == "given" else " over its default range" if len(above) > 1 else " if slow"
+    which = (
+        ""
+        if above[0].end == "given"
+        else " over its default range"
+        if len(above) > 1
+        else f" if {above[0].end}"
+    )
     shown = "" if above[0].end == "given" else ", and runs of a scene without a line do not show it"
     return (
         f"the smallest correction that the gas line can deliver{which}, {_sizes(above)} um, is "
         f"above {1e6 * above[0].largest_correction:.2g} um: no run is sure to reach the limit of "
-        f"{1e6 * above[0].limit:.2g} um{shown}; take a faster valve, less dead volume or a higher limit"
+        f"{1e6 * above[0].limit:.2g} um{shown}; take a {_better(answers)} valve, less dead volume "
+        "or a higher limit"
     )
+
+
+def _better(answers: Sequence[LineAnswer]) -> str:
+    """Which end of a range corrects by less: a fast line may move more in the shortest time it can do."""
+    sizes = {answer.end: answer.smallest_correction or 0.0 for answer in answers}
+    return "slower" if sizes.get("fast", 0.0) > sizes.get("slow", math.inf) else "faster"
 
 
 def _standing_warning(answer: LineAnswer) -> str:

@@ -82,9 +82,12 @@ class Requirement:
 
     @property
     def verdict(self) -> str:
-        """Whether it is with 95 % of what the inputs may be: met, not met, cannot be told."""
+        """Whether it is with 95 % of what the inputs may be: met, not met, cannot be told.
+
+        It is not where none of the drawn runs comes to it, though the run as the scene says may.
+        """
         least, most = self.excess_interval or (self.excess, self.excess)
-        if most < 0:
+        if most < 0 or self.reached == 0.0:
             return "not met"
         always = self.reached == 1.0 and not self.lost
         return "met" if least >= 0 and always else "cannot be told"

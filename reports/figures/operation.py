@@ -28,8 +28,8 @@ _SHADES: Final = {
 }
 _CLEARANCE: Final = 2.2
 """Cells between a regime's name and the edge of its area, at the least."""
-_LINE: Final = 0.05
-"""MPa on either side of the working range that its regimes' names keep clear of."""
+_LINE: Final = 0.035
+"""Of the map's height on either side of the working range, which its regimes' names keep clear of."""
 _MICROMETRE: Final = 1e6
 _BARS: Final = 5
 """Inputs that a panel of the tornado shows."""
@@ -59,8 +59,9 @@ def operating_map(found: Record) -> Drawing:
                 continue
             axes.contourf(fill, pressure, there, levels=[0.5, 1.5], colors=[colour], alpha=strength)
             axes.contour(fill, pressure, there, levels=[0.5], colors=[style.MUTED], linewidths=0.7)
+        clear = _LINE * (pressure[-1] - pressure[0])
         _name_areas(
-            axes, fill, pressure, np.where(np.abs(pressure - gas)[:, None] < _LINE, -1, regime), names
+            axes, fill, pressure, np.where(np.abs(pressure - gas)[:, None] < clear, -1, regime), names
         )
         axes.plot(
             working, [gas, gas], "|-", color=style.INK, linewidth=2, markersize=9, label="working range"

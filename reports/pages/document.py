@@ -101,6 +101,7 @@ def _facts(evidence: Record) -> tuple[tuple[str, str], ...]:
     made, scene = evidence.get("provenance") or {}, evidence["scene"]
     commit = made.get("commit") or "not made from a checkout"
     versions = evidence["versions"]
+    fields = "" if evidence.get("balancer", "liquid_ring") != "liquid_ring" else ", fields/"
     return (
         ("Status and revision", f"draft; ringbalance {versions['ringbalance']}"),
         ("Commit", commit + (", with local changes" if made.get("dirty") else "")),
@@ -112,7 +113,7 @@ def _facts(evidence: Record) -> tuple[tuple[str, str], ...]:
         ("evidence.json", f"SHA-256 {hashlib.sha256(evidence_text(evidence).encode()).hexdigest()}"),
         ("Kept evidence", _kept(evidence)),
         ("Seeds", ", ".join(f"{name} {value}" for name, value in evidence["seeds"].items())),
-        ("Beside this file", "annex.html, evidence.json, figures/, fields/ and tables/"),
+        ("Beside this file", f"annex.html, evidence.json, figures/{fields} and tables/"),
     )
 
 

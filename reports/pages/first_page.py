@@ -280,10 +280,15 @@ def _crest(evidence: Record) -> str:
             "and with one the flow needs more gas pressure to start."
         )
     crest = (evidence.get("summary") or {}).get("crest")
-    most = shown(crest["priming_pressure_Pa"][-1], "Pa", digits=2) if crest else ""
+    width = evidence["operating_point"]["priming_uncertainty"] or 0.0
+    most = shown(crest["priming_pressure_Pa"][-1] + width, "Pa", digits=2) if crest else ""
+    elsewhere = (
+        f"; {most} would start it wherever the crest may lie, but leaves less usable moment and asks to tune "
+        "again"
+    )
     return (
         "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow"
-        f"{f'; {most} would do wherever it may lie' if most else ''}."
+        f"{elsewhere if most else ''}."
     )
 
 
@@ -307,7 +312,7 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
             f"tried do; with the recommended ones {share} settle{lowest}.",
         ]
     change = _change(evidence)
-    if verdicts.get("Loop factor") == MISSED or change:
+    if verdicts.get("Loop factor") in {MISSED, OPEN} or change:
         later = " for a valve that acts at once, and tune again for the valve chosen"
         beside = f", and {change}" if change else ""
         told.append(f"Set the proportional gain to {gain}{'' if line['given'] else later}{beside}.")

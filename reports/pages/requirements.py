@@ -173,12 +173,15 @@ def _gas_pressure(evidence: Record) -> Requirement | None:
     anywhere = f"; {' to '.join(ends)} wherever the crest may lie" if crest else ""
     verdicts = {above(gas, bound, both) for bound in (least, most)}
     return Requirement(
-        name="Gas pressure " + ("that lifts the liquid over the siphon crest" if starts else "above stall"),
+        name="Gas pressure "
+        + ("that lifts the liquid of any fill over the siphon crest" if starts else "above stall"),
         wanted=f"at least {read(evidence, f'operating_point.{key}', 'Pa', width=width)}{anywhere}"
         f"{_at_most(evidence, summary)}",
         result=read(evidence, "operating_point.gas_pressure_Pa", "Pa", width=own),
         verdict=verdicts.pop() if len(verdicts) == 1 else OPEN,
-        rests=resting(evidence, "tube.hump_radius", "tube.port_radius", "tube.hump_gas"),
+        rests=resting(evidence, "tube.hump_radius", "tube.port_radius", "tube.hump_gas")
+        if starts
+        else "a tube without siphon crest: the scene names none",
         required=point[key],
         reached=gas,
         uncertainty=both,
@@ -199,18 +202,25 @@ def _scene_gain(evidence: Record) -> Requirement | None:
     run = evidence["closed_loop"].get("calibrated")
     if run is None or run.get("loop_factor") is None:
         return None
-    limit = _staying(run, "closed_loop.calibrated")
+    limit, share = _staying(run, "closed_loop.calibrated"), _gain_share(evidence)
+    width = run["loop_factor"] * share
     bound = traced(number(run["loop_factor_limit"], digits=3), "closed_loop.calibrated.loop_factor_limit")
     return Requirement(
         name="Loop factor with the scene’s gain",
         wanted=f"at most {limit} for noise to stay within the limit; unstable from {bound}",
-        result=read(evidence, "closed_loop.calibrated.loop_factor", "1"),
-        verdict=MET if run["loop_factor"] <= _staying_value(run) else MISSED,
+        result=read(evidence, "closed_loop.calibrated.loop_factor", "1", width=width),
+        verdict=below((run["loop_factor"] - width, run["loop_factor"] + width), _staying_value(run)),
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "sensor.amplitude_noise"),
         required=_staying_value(run),
         reached=run["loop_factor"],
+        uncertainty=width,
         at_least=False,
     )
+
+
+def _gain_share(evidence: Record) -> float:
+    """Relative uncertainty of what a second of gas does, which every loop factor has."""
+    return float((tuning_of(evidence).get("margins") or {}).get("gain_uncertainty", 0.0))
 
 
 def _staying_value(run: Record) -> float:
@@ -226,7 +236,7 @@ def _recommended_gain(evidence: Record) -> Requirement | None:
     tuning, run = tuning_of(evidence), evidence["closed_loop"].get("calibrated")
     if tuning.get("gain") is None or run is None or tuning.get("loop_factor") is None:
         return None
-    width = tuning["loop_factor"] * (tuning.get("margins") or {}).get("gain_uncertainty", 0.0)
+    width = tuning["loop_factor"] * _gain_share(evidence)
     gain = read(evidence, "summary.tuning.gain", "s/m", digits=2)
     bound = run["loop_factor_limit"]
     return Requirement(
@@ -332,7 +342,8 @@ def _of_line(evidence: Record, key: str, name: str, *, bound: str = "limit_m") -
         read(evidence, f"calibration.gas_line.ends.{i}.{key}", "m", digits=2) for i in (ends[0], ends[-1])
     )
     least, most = (line["ends"][i][key] for i in (ends[0], ends[-1]))
-    reached = low if len(ends) == 1 else f"{low} (fast valve) to {high} (slow valve)"
+    names = [line["ends"][i].get("end") for i in (ends[0], ends[-1])]
+    reached = low if len(ends) == 1 else f"{low} ({names[0]} valve) to {high} ({names[1]} valve)"
     return Requirement(
         name=name,
         wanted=f"at most {given(line[bound], 'm', digits=2)}",

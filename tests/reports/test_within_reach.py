@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from ringbalance.reports.pages.requirements import smallest_row
+from ringbalance.reports.pages.requirements import requirements, smallest_row
+from ringbalance.reports.prose import untraced
 from ringbalance.reports.summary import line_verdict, what_enlarges
 
 
@@ -32,3 +33,29 @@ def test_runs_with_the_scenes_own_valve_decide_before_its_smallest_correction(
     if given and runs:
         tuning |= {"fraction_settled": 0.4, "fraction_settled_95": [0.3, 0.5]}
         assert line_verdict(evidence) == "not met"
+
+
+def test_each_end_of_the_default_range_keeps_its_name_whichever_corrects_by_less() -> None:
+    ends = [{"end": "slow", "smallest_correction_m": 1e-7}, {"end": "fast", "smallest_correction_m": 2e-7}]
+    line = {"given": False, "limit_m": 5e-8, "largest_correction_m": 7e-8, "ends": ends}
+    row = smallest_row({"calibration": {"gas_line": line}, "summary": {"tuning": {}}})
+    assert row is not None
+    told = untraced(row.result)
+    assert told.index("0.10") < told.index("slow valve") < told.index("0.20") < told.index("fast valve")
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.0, "met"), (1.3, "cannot be told"), (1.8, "not met")])
+def test_the_scenes_gain_is_judged_with_the_uncertainty_of_the_loop_factor(
+    factor: float, verdict: str
+) -> None:
+    run = {"loop_factor": factor, "largest_staying_loop_factor": 1.37, "loop_factor_limit": 2.0}
+    evidence = {
+        "calibration": {},
+        "closed_loop": {"calibrated": run},
+        "operating_point": {"stall_pressure_Pa": 1e5, "stall_uncertainty": 1e3, "gas_pressure_Pa": 7e5},
+        "scene": {"origins": {}},
+        "summary": {"tuning": {"margins": {"gain_uncertainty": 0.15}}},
+    }
+    row = next(row for row in requirements(evidence) if row.name.startswith("Loop factor with the scene"))
+    assert row.verdict == verdict
+    assert row.uncertainty == pytest.approx(0.15 * factor)

@@ -160,7 +160,10 @@ def loop_sentences(evidence: Record) -> list[str]:
         return ["The closed loop was not run."]
     line = evidence["calibration"].get("gas_line") or {"given": True}
     ideal = "" if line["given"] else ", with a valve that acts at once,"
-    told = [f"Under the calibrated law{ideal} the loop {_ending(run)}{_factor(run)}."]
+    told = [
+        f"Under the calibrated law{ideal} the loop {_ending(run)}{_factor(run)}.",
+        *_others(evidence, run),
+    ]
     tuned = _retuned(evidence)
     if tuned is not None:
         gain, own = (_gain_of(evidence, name) for name in (RETUNED, "calibrated"))
@@ -173,6 +176,19 @@ def loop_sentences(evidence: Record) -> list[str]:
     if paper is not None:
         told.append(f"Under the paper’s law, with the scene’s gain, it {_ending(paper)}.")
     return told
+
+
+def _others(evidence: Record, run: Record) -> list[str]:
+    """What the drawn runs do with the scene's gain where the run of the scene's own values does not stand for
+    them."""
+    ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
+    if len(ensembles) < 3:
+        return []
+    settle = 1 - ensembles[1]["probability"]["not_settled"]["value"]
+    if settle >= LIKELY if run["settled"] else settle <= 1 - LIKELY:
+        return []
+    members = ensembles[1]["members"]
+    return [f"Of {members} runs over the uncertain inputs {percent(settle)} settle with this gain."]
 
 
 def _change(evidence: Record) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pages.requirements import requirements, smallest_row
 from ringbalance.reports.prose import untraced
 from ringbalance.reports.summary import line_verdict, what_enlarges
@@ -59,3 +60,21 @@ def test_the_scenes_gain_is_judged_with_the_uncertainty_of_the_loop_factor(
     row = next(row for row in requirements(evidence) if row.name.startswith("Loop factor with the scene"))
     assert row.verdict == verdict
     assert row.uncertainty == pytest.approx(0.15 * factor)
+
+
+@pytest.mark.parametrize(
+    ("settled", "share", "told"),
+    [(True, 0.99, False), (True, 0.7, True), (False, 0.0, False), (False, 0.9, True)],
+)
+def test_the_drawn_runs_are_told_where_the_scenes_own_run_does_not_stand_for_them(
+    settled: bool, share: float, told: bool
+) -> None:
+    ensemble = {"members": 500, "probability": {"not_settled": {"value": 1 - share}}}
+    run = {"settled": settled, "settling_time_s": 2.0}
+    evidence = {
+        "calibration": {},
+        "closed_loop": {"calibrated": run},
+        "consequences": {"ensembles": [ensemble] * 3},
+    }
+    sentences = " ".join(loop_sentences(evidence))
+    assert ("Of 500 runs over the uncertain inputs" in sentences) == told

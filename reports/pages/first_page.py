@@ -179,8 +179,7 @@ def loop_sentences(evidence: Record) -> list[str]:
 
 
 def _others(evidence: Record, run: Record) -> list[str]:
-    """What the drawn runs do with the scene's gain where the run of the scene's own values does not stand for
-    them."""
+    """What the drawn runs do with the scene's gain, where the scene's own run does not stand for them."""
     ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
     if len(ensembles) < 3:
         return []
@@ -298,13 +297,10 @@ def _crest(evidence: Record) -> str:
     crest = (evidence.get("summary") or {}).get("crest")
     width = evidence["operating_point"]["priming_uncertainty"] or 0.0
     most = shown(crest["priming_pressure_Pa"][-1] + width, "Pa", digits=2) if crest else ""
-    elsewhere = (
-        f"; {most} would start it wherever the crest may lie, but leaves less usable moment and asks to tune "
-        "again"
-    )
+    cost = "would start it wherever the crest may lie, but leaves less usable moment and asks to tune again"
     return (
         "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow"
-        f"{elsewhere if most else ''}."
+        f"{f'; {most} {cost}' if most else ''}."
     )
 
 

@@ -117,18 +117,23 @@ def budget_standing(cases: Sequence[Mapping[str, Any]], quantity: str) -> str:
 
     Such as "friction: 1,005 points; rotation, fittings, crest: no data".
     """
+    names = [name for name, subject in SUBJECTS.items() if quantity in subject.budgets]
     counts = {
-        name: sum(
-            case["numbers"].get("points", 0.0)
-            for case in cases
-            if name in case.get("about", ()) and case["kind"] == "validation"
-        )
-        for name, subject in SUBJECTS.items()
-        if quantity in subject.budgets
+        name: (_points(cases, name, "points"), _points(cases, name, "laminar_points")) for name in names
     }
-    parts = [f"{name}: {count:,.0f} points" for name, count in counts.items() if count]
-    without = [name for name, count in counts.items() if not count]
+    parts = [
+        f"{name}: {count:,.0f} points{', all laminar' if laminar == count else ''}"
+        for name, (count, laminar) in counts.items()
+        if count
+    ]
+    without = [name for name in names if not counts[name][0]]
     return "; ".join([*parts, f"{', '.join(without)}: {NO_DATA}"] if without else parts)
+
+
+def _points(cases: Sequence[Mapping[str, Any]], name: str, key: str) -> float:
+    """Measured points about a subject, all of them or those of a kind."""
+    about = (case for case in cases if name in case.get("about", ()) and case["kind"] == "validation")
+    return sum(float(case["numbers"].get(key, 0.0)) for case in about)
 
 
 def _row(subject: _Subject, cases: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:

@@ -44,6 +44,7 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
         "final_amplitude_m": run.final_amplitude,
         "worst_amplitude_m": run.worst_amplitude,
         "energy_J": run.electrical_energy,
+        "peak_voltage_V": float(np.abs(run.voltage).max()),
         "stages": [{"name": s.name, "start_s": s.start, "end_s": s.end} for s in run.stages],
         "targets": None if run.targets is None else _targets(run),
         "time_s": run.time[kept].tolist(),

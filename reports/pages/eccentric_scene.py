@@ -78,9 +78,10 @@ def _summary(_own: Record, evidence: Record) -> Record:
         ("lead", summary.decided([(row["quantity"], row["verdict"]) for row in rows])),
         (
             "text",
-            f"As the scene stands: {run['status'].rstrip('.')}. The largest amplitude of the run is "
-            f"{worst[0]}; with the masses locked where they start it is {worst[1]}. At the end {ratio} of "
-            "the vibration without balancing is left.",
+            f"As the scene stands: {run['status'].rstrip('.')}.{_drawn_settle(rows)} "
+            f"The largest amplitude of the run is {worst[0]}; with the masses locked where they start it is "
+            f"{worst[1]}. At the end {ratio} of the vibration without balancing is left. The drives take at "
+            f"most {_peak(run)}.",
         ),
         *(("alert", f"{text[0].upper()}{text[1:].rstrip('.')}.") for text in run["warnings"]),
         ("table", _requirements(rows, evidence)),
@@ -89,6 +90,20 @@ def _summary(_own: Record, evidence: Record) -> Record:
         ("figure", requirement_bars(map(_bar, rows))),
         ("items", [_MODEL, _STATED if stated else _UNSTATED, _origins(evidence["scene"]["table"])]),
     )
+
+
+def _drawn_settle(rows: list[Record]) -> str:
+    """How many of the runs with drawn inputs settle, where not all of them do; else empty."""
+    for place, row in enumerate(rows):
+        if row["quantity"] == "settling time" and row["reached"] < 1.0:
+            share = traced(percent(row["reached"]), f"requirements.{place}.reached")
+            return f" Of the runs with inputs drawn from their uncertainty {share} settle."
+    return ""
+
+
+def _peak(run: Record) -> str:
+    """Largest voltage of a drive in the run."""
+    return traced(shown(run["peak_voltage_V"], "V", digits=3), "closed_loop.balanced.peak_voltage_V")
 
 
 def _actions(rows: list[Record]) -> list[str]:

@@ -318,10 +318,11 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
         reached = tuning.get("reachable_limit_m")
         lowest = f"; a limit of {shown(reached, 'm', digits=2)} is reached" if reached else ""
         share = percent(tuning["fraction_settled"])
+        why = f" {_sentence(tuning['status'])}" if tuning.get("status") else ""
         return [
             *told,
             f"Do not expect settings to make this loop settle in {percent(LIKELY)} of runs: none that were "
-            f"tried do; with the recommended ones {share} settle{lowest}.",
+            f"tried do; with the recommended ones {share} settle{lowest}.{why}",
         ]
     change = _change(evidence)
     if verdicts.get("Loop factor") in {MISSED, OPEN} or change:

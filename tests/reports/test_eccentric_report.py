@@ -114,6 +114,7 @@ def test_a_result_that_not_all_drawn_runs_come_to_reads_as_one_sentence(evidence
     assert "2.32\u202fs with the scene’s values" in page
     assert "none: of the runs with drawn inputs 38\u202f% get there, the others never do" in page
     assert "none: with an input at the end of its own interval the run never gets there" in page
+    assert "Of the runs with inputs drawn from their uncertainty 38\u202f% settle." in page
 
 
 @pytest.mark.usefixtures("unwritten")

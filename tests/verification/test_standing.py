@@ -39,6 +39,10 @@ def test_a_budget_says_which_of_its_models_have_no_data() -> None:
     assert (
         budget_standing([_case()], "velocity") == "friction: 1,536 points; rotation, fittings, crest: no data"
     )
+    fittings = _case(about=["fittings"], numbers={"points": 42.0, "laminar_points": 42.0})
+    assert budget_standing([_case(), fittings], "velocity").startswith(
+        "friction: 1,536 points; fittings: 42 points, all laminar;"
+    )
     assert budget_standing([], "usable_moment") == "residual: no data"
     assert budget_standing([_case(kind="code_verification")], "drag_coefficient").endswith("no data")
 

@@ -27,6 +27,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     short = compare(data.where(usable & ~developed)).statistics
     uncut = compare(data.where(usable & np.char.startswith(data.series, "tube")))
     more = {
+        "laminar_points": found.numbers["points"],
         "short_points": float(short.points),
         "short_bias": short.bias,
         "short_within": short.share_within,

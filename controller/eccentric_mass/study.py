@@ -66,6 +66,8 @@ class Requirement:
     """None: as `achieved_interval`."""
     reached: float = 1.0
     """Fraction of the drawn runs that come to it at all."""
+    held: float = 1.0
+    """Fraction of the drawn runs that meet the requirement."""
 
     @property
     def excess(self) -> float:
@@ -84,10 +86,10 @@ class Requirement:
     def verdict(self) -> str:
         """Whether it is with 95 % of what the inputs may be: met, not met, cannot be told.
 
-        It is not where none of the drawn runs comes to it, though the run as the scene says may.
+        It is not where none of the drawn runs meets it, though the run as the scene says may.
         """
         least, most = self.excess_interval or (self.excess, self.excess)
-        if most < 0 or self.reached == 0.0:
+        if most < 0 or self.held == 0.0:
             return "not met"
         always = self.reached == 1.0 and not self.lost
         return "met" if least >= 0 and always else "cannot be told"
@@ -196,6 +198,7 @@ def _with_intervals(
 ) -> Requirement:
     if not drawn or row.achieved is None:
         return row
+    excess = [run[f"{row.quantity}.excess"] for run in drawn]
     return replace(
         row,
         required_interval=_interval(row.required, drawn, f"{row.quantity}.required"),
@@ -204,6 +207,7 @@ def _with_intervals(
         effects=_effects(row.excess, moved, f"{row.quantity}.excess"),
         lost=_lost(moved, f"{row.quantity}.achieved"),
         reached=sum(run[f"{row.quantity}.achieved"] is not None for run in drawn) / len(drawn),
+        held=sum(more is not None and more >= 0.0 for more in excess) / len(drawn),
     )
 
 

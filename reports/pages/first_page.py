@@ -294,13 +294,9 @@ def _crest(evidence: Record) -> str:
             "Find out whether the tube passes over a siphon crest, and at which radius: this scene has none, "
             "and with one the flow needs more gas pressure to start."
         )
-    crest = (evidence.get("summary") or {}).get("crest")
-    width = evidence["operating_point"]["priming_uncertainty"] or 0.0
-    most = shown(crest["priming_pressure_Pa"][-1] + width, "Pa", digits=2) if crest else ""
-    cost = "would start it wherever the crest may lie, but leaves less usable moment and asks to tune again"
     return (
-        "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow"
-        f"{f'; {most} {cost}' if most else ''}."
+        "Measure the radius of the siphon crest: it sets the gas pressure that starts the flow. More "
+        "pressure starts it too, but leaves less usable moment and other gains: change it in the scene first."
     )
 
 
@@ -326,9 +322,9 @@ def _valve_and_gain(evidence: Record, verdicts: Mapping[str, str]) -> list[str]:
         ]
     change = _change(evidence)
     if verdicts.get("Loop factor") in {MISSED, OPEN} or change:
-        later = " for a valve that acts at once, and tune again for the valve chosen"
         beside = f", and {change}" if change else ""
-        told.append(f"Set the proportional gain to {gain}{'' if line['given'] else later}{beside}.")
+        later = " These hold for a valve that acts at once: tune again with the valve chosen in the scene."
+        told.append(f"Set the proportional gain to {gain}{beside}.{'' if line['given'] else later}")
     return told
 
 

@@ -142,7 +142,11 @@ def _capacity(evidence: Record) -> Requirement | None:
         wanted=f"at least {read(evidence, path, 'kg m', width=width)}",
         result=read(evidence, usable, "kg m", width=total),
         verdict=above(rest["usable_pair_moment_kg_m"], needed, both),
-        rests=resting(evidence, "rotor.influence_coefficient", "disc.plate_thickness", "tube.bore"),
+        rests=resting(
+            evidence,
+            *(() if stated else ("rotor.initial_amplitude",)),
+            *("rotor.influence_coefficient", "disc.plate_thickness", "tube.bore"),
+        ),
         required=needed,
         reached=rest["usable_pair_moment_kg_m"],
         uncertainty=both,

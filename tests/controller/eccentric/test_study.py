@@ -149,4 +149,4 @@ def test_an_input_that_loses_a_result_leaves_it_open(study: _EccentricStudy) -> 
     assert reach["settling time"].verdict == "cannot be told"
     assert reach["balancing moment"].verdict == "cannot be told"
     # The run as the scene says settles; none of those that may be the machine does.
-    assert replace(reach["settling time"], reached=0.0, excess_interval=None).verdict == "not met"
+    assert replace(reach["settling time"], held=0.0, excess_interval=None).verdict == "not met"

@@ -85,7 +85,10 @@ def _gain(scene: Scene, laws: Sequence[FlowLaw], *, raised: int = 1, full: bool 
     gas, light = scene.gas.pressure, scene.liquid.density
     own = _reach(laws[0], gas)
     if own <= scene.disc.max_fill_ratio / 2:
-        raise NotRunError("the gas pressure of this scene does not start the flow from equal fills")
+        raise NotRunError(
+            "the gas pressure of this scene does not start the flow from equal fills at every radius that "
+            "the siphon crest may have"
+        )
     dense = _reach(laws[1], raised * gas, full=full)
     return _ability(scene, 2 * light, dense) / _ability(scene, light, own)
 

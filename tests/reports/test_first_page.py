@@ -271,9 +271,7 @@ def test_a_gain_is_recommended_for_the_valve_that_it_was_found_with(evidence: Re
     valve, gain, *_ = view(tuned(evidence, change=change))["actions"]
     assert valve.startswith("Find a valve and gas line")
     assert "any valve of the default range" in valve
-    assert gain.startswith(
-        f"Set the proportional gain to 0.024\u202fs/µm, and {change}. These hold for a valve"
-    )
+    assert gain.startswith(f"Set the proportional gain to 0.024\u202fs/µm, and {change}. These hold for a")
     line["given"] = True
     gain, *_ = view(tuned(evidence))["actions"]
     assert gain == "Set the proportional gain to 0.024\u202fs/µm."

@@ -200,14 +200,10 @@ def line_warning(answers: tuple[LineAnswer, ...]) -> str:
     above = [answer for answer in answers if answer.above_limit]
     if not above:
         return _standing_warning(answers[0])
-    which = (
-        ""
-        if above[0].end == "given"
-        else " over its default range"
-        if len(above) > 1
-        else f" if {above[0].end}"
-    )
-    shown = "" if above[0].end == "given" else ", and runs of a scene without a line do not show it"
+    which = shown = ""
+    if above[0].end != "given":
+        which = " over its default range" if len(above) > 1 else f" if {above[0].end}"
+        shown = ", and runs of a scene without a line do not show it"
     return (
         f"the smallest correction that the gas line can deliver{which}, {_sizes(above)} um, is "
         f"above {1e6 * above[0].largest_correction:.2g} um: no run is sure to reach the limit of "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping
+from functools import cache
 from importlib.resources import files
 from typing import Final
 
@@ -39,8 +40,9 @@ def render_pages(content: PageContent) -> dict[str, str]:
     return {file: _page(content, file) for file in DOCUMENTS}
 
 
-def _page(content: PageContent, file: str) -> str:
-    document = DOCUMENTS[file]
+@cache
+def _environment() -> jinja2.Environment:
+    """Keeps the templates, each compiled once."""
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(_template),
         autoescape=True,
@@ -50,13 +52,23 @@ def _page(content: PageContent, file: str) -> str:
     )
     environment.filters |= {"tone": summary.tone, "verbatim": escape}
     environment.tests |= {"verdict": summary.is_verdict}
-    environment.globals |= {"numbered": _Numbers(PREFIXES[document["place"]]), "annex_file": ANNEX}
-    page = environment.get_template("report.html").render(
-        content.context,
-        document=document,
-        sections=[s for s in content.context["sections"] if s["place"] == document["place"]],
-        style=Markup(_style(content.context["running_head"])),
-        glyphs=Markup(GLYPHS),
+    return environment
+
+
+def _page(content: PageContent, file: str) -> str:
+    document = DOCUMENTS[file]
+    page = (
+        _environment()
+        .get_template("report.html")
+        .render(
+            content.context,
+            document=document,
+            numbered=_Numbers(PREFIXES[document["place"]]),
+            annex_file=ANNEX,
+            sections=[s for s in content.context["sections"] if s["place"] == document["place"]],
+            style=Markup(_style(content.context["running_head"])),
+            glyphs=Markup(GLYPHS),
+        )
     )
     return _share_styles(share_glyphs(page)) + "\n"
 

@@ -206,14 +206,13 @@ def _scene_gain(evidence: Record) -> Requirement | None:
     run = evidence["closed_loop"].get("calibrated")
     if run is None or run.get("loop_factor") is None:
         return None
-    limit, share = _staying(run, "closed_loop.calibrated"), _gain_share(evidence)
-    width = run["loop_factor"] * share
+    limit, width = _staying(run, "closed_loop.calibrated"), run["loop_factor"] * _gain_share(evidence)
     bound = traced(number(run["loop_factor_limit"], digits=3), "closed_loop.calibrated.loop_factor_limit")
     return Requirement(
         name="Loop factor with the scene’s gain",
         wanted=f"at most {limit} for noise to stay within the limit; unstable from {bound}",
         result=read(evidence, "closed_loop.calibrated.loop_factor", "1", width=width),
-        verdict=below((run["loop_factor"] - width, run["loop_factor"] + width), _staying_value(run)),
+        verdict=above(_staying_value(run), run["loop_factor"], width),
         rests=resting(evidence, "tube.bore", "rotor.influence_coefficient", "sensor.amplitude_noise"),
         required=_staying_value(run),
         reached=run["loop_factor"],

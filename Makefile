@@ -39,7 +39,7 @@ test-faults: env ## kills, damaged caches, odd environments: a few minutes, part
 test-short: lint ## lint, types and a short selection of the tests
 	$(PYTHON_IN_VENV) -m pytest -n $(WORKERS) $(SHORT_TESTS)
 
-test-versions: env ## `make test-short` under every further supported Python of this machine, each in .venv-3.X
+test-versions: env ## the tests under every further supported Python of this machine, each in .venv-3.X
 	$(PYTHON_IN_VENV) tools/other_pythons.py
 
 test-heavy: env ## the tests that take long

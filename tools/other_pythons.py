@@ -1,10 +1,11 @@
-"""Runs `make test-short` under every further supported Python of this machine.
+"""Runs the tests under every further supported Python of this machine: the oldest and the newest whole.
 
     .venv/bin/python tools/other_pythons.py
 
 Supported is what pyproject.toml's requires-python says.  Python is looked for as `python3.X` on the search
 path and among the versions of pyenv; one that does not start, or has no venv, does not count.  The Python
-that runs this is left out, since `make test` has used it.  Each gets an environment of its own, `.venv-3.X`.
+that runs this is left out, since `make test` has used it.  Of the others, the oldest and the newest that
+this machine has run `make test`, those between `make test-short`.  Each has an environment, `.venv-3.X`.
 """
 
 from __future__ import annotations
@@ -63,9 +64,11 @@ def main() -> int:
     others = interpreters([version for version in versions if version != running])
     for version, python in others.items():
         print(f"Python {version}: {python or 'not on this machine, not tested'}", flush=True)
+    here = [version for version in versions if version == running or others[version]]
     for version, python in others.items():
         if python is not None:
-            command = ["make", "test-short", f"VENV=.venv-{version}", f"PYTHON={python}"]
+            target = "test" if version in (here[0], here[-1]) else "test-short"
+            command = ["make", target, f"VENV=.venv-{version}", f"PYTHON={python}"]
             code = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
             if code != 0:
                 print(f"The tests fail under Python {version} ({python}).", file=sys.stderr)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
 from types import TracebackType
 from typing import Final, ParamSpec, TypeVar
@@ -29,6 +29,7 @@ _WORKER_ENDED: Final = (
     "ringbalance: a worker process was ended by the system, probably for lack of memory; its work is done "
     "again in this process. Should that be ended too, close other programs and run again"
 )
+_ALONE: Final = "ringbalance: no further process can be used here (%s); one process does all the work"
 
 
 class Workers(ProcessPoolExecutor):
@@ -48,9 +49,9 @@ class Workers(ProcessPoolExecutor):
         with _quiet_start():
             try:
                 return super().submit(fn, *args, **kwargs)
-            except BrokenProcessPool as error:
+            except (BrokenProcessPool, OSError) as error:
                 lost: Future[_R] = Future()
-                lost.set_exception(error)
+                lost.set_exception(BrokenProcessPool(str(error)))
                 return lost
 
     def result(self, future: Future[_R], again: Callable[[], _R]) -> _R:
@@ -77,8 +78,10 @@ class Workers(ProcessPoolExecutor):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the workers: nobody wants what is still under way."""
-        # From Python 3.14 on this is `kill_workers`.
-        for process in list((self._processes or {}).values()):
+        # From Python 3.14 on this is `kill_workers`. An interrupt may come between the start of a process and
+        # its entry in the pool's list: then those that multiprocessing knows are ended, too.
+        started = set((self._processes or {}).values())
+        for process in started if error is None else started.union(active_children()):
             process.kill()
         self.shutdown(cancel_futures=True)
 
@@ -99,13 +102,21 @@ def beside(
 ) -> Iterator[Workers | None]:
     """The other ones of so many processes, this one included; None where there are none.
 
+    A system without semaphores for processes (no writable /dev/shm, as in some containers) has none either,
+    which is said on standard error.
     Args: `workers`: those that are at work already stay so afterwards. `loading`: called by new ones at
     once, while this process goes on.
     """
     if workers is None or workers == 1 or isinstance(workers, Workers):
         yield None if isinstance(workers, int) else workers
         return
-    with Workers(workers - 1) as crew:
+    try:
+        pool = Workers(workers - 1)
+    except (OSError, ImportError, NotImplementedError) as error:
+        _LOG.warning(_ALONE, error)
+        yield None
+        return
+    with pool as crew:
         if loading is not None:
             for _ in range(workers - 1):
                 crew.submit(loading)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import signal
@@ -11,7 +12,7 @@ import time
 
 import pytest
 
-from ringbalance.scene.platform.processes import Workers, seldom_collected
+from ringbalance.scene.platform.processes import Workers, beside, seldom_collected
 
 
 def test_the_work_of_an_ended_worker_is_done_again(caplog: pytest.LogCaptureFixture) -> None:
@@ -25,6 +26,29 @@ def test_the_work_of_an_ended_worker_is_done_again(caplog: pytest.LogCaptureFixt
     (told,) = caplog.messages
     assert "lack of memory" in told
     assert "run again" in told
+
+
+def test_without_semaphores_one_process_does_the_work(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """As without a writable /dev/shm: the pool cannot be made."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", refused)
+    with beside(3) as pool:
+        assert pool is None
+    assert "Permission denied" in caplog.messages[0]
+
+
+def test_a_process_that_cannot_be_started_is_a_lost_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    with Workers(1) as pool:
+        monkeypatch.setattr("multiprocessing.context.SpawnProcess.start", refused)
+        assert pool.result(pool.submit(os.getpid), lambda: -1) == -1
 
 
 def test_leaving_waits_for_nobody() -> None:

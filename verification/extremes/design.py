@@ -19,7 +19,7 @@ from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import write_whole
-from ringbalance.scene.platform.processes import Workers
+from ringbalance.scene.platform.processes import beside
 from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.verification.extremes.axes import AXES, fitted, varied
 from ringbalance.verification.extremes.point import (
@@ -122,10 +122,11 @@ def _chunks(
     base: Base, rest: Sequence[Sequence[Point]], workers: int
 ) -> Generator[list[Judgement], None, None]:
     work = partial(_judge_all, base)
-    if workers == 1 or len(rest) < 2:
-        yield from map(work, rest)
-        return
-    with Workers(workers) as pool:
+    # This process only waits, so that judgements are kept as soon as they come.
+    with beside(workers + 1 if workers > 1 and len(rest) > 1 else 1) as pool:
+        if pool is None:
+            yield from map(work, rest)
+            return
         started = [pool.submit(work, points) for points in rest]
         for points, future in zip(rest, started, strict=True):
             yield pool.result(future, partial(work, points))

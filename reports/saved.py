@@ -17,7 +17,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from ringbalance.controller.compilation.cache import OTHER, checked_content, discard, write_checked
+from ringbalance.controller.compilation.cache import (
+    OTHER,
+    checked_content,
+    discard,
+    trusted,
+    write_checked,
+)
 from ringbalance.controller.compilation.compiled import code_folder
 from ringbalance.reports.provenance import versions
 from ringbalance.scene.faults import toml_text
@@ -96,11 +102,18 @@ def _problem(document: Any) -> str:
         return '"times" is no object with a date'
     if not isinstance(cases, list) or not all(isinstance(case, dict) for case in cases):
         return '"verification" is no list of cases'
-    for place, case in enumerate(cases):
-        kinds = _KINDS if case.get("cost") == "heavy" else {}
-        for key, kind in kinds.items():
-            if not isinstance(case.get(key), kind):
-                return f'"{key}" of verification[{place}] is {_shown(case.get(key))}, not {_NAMES[kind]}'
+    heavy = [(place, case) for place, case in enumerate(cases) if case.get("cost") == "heavy"]
+    problems = (_case_problem(case, f"verification[{place}]") for place, case in heavy)
+    return next(filter(None, problems), "")
+
+
+def _case_problem(case: Any, place: str) -> str:
+    """What a report could not work with in a case's record; empty when there is nothing."""
+    if not isinstance(case, dict):
+        return f"{place} is no object"
+    for key, kind in _KINDS.items():
+        if not isinstance(case.get(key), kind):
+            return f'"{key}" of {place} is {_shown(case.get(key))}, not {_NAMES[kind]}'
     return ""
 
 
@@ -124,19 +137,37 @@ def looks_at_no_scene(case: Mapping[str, Any]) -> bool:
 def kept_cases() -> dict[str, Record]:
     """By its id, each light case that looks at no scene: its record and the date on which it was run."""
     path = _kept_file()
+    if not trusted(path.parent):
+        return {}
     try:
         found: dict[str, Record] = json.loads(checked_content(path))
+        _check_kept(found)
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         discard(path)
         return {}
     return found
 
 
+def _check_kept(kept: object) -> None:
+    """Raises: ValueError: a report could not work with what was kept."""
+    json.dumps(kept, allow_nan=False)
+    if not isinstance(kept, dict):
+        raise ValueError("it holds no object")
+    for name, entry in kept.items():
+        if not isinstance(entry, dict) or not isinstance(entry.get("date"), str):
+            raise ValueError(f'"{name}" has no date')
+        problem = _case_problem(entry.get("record"), name)
+        if problem:
+            raise ValueError(problem)
+
+
 def keep_cases(kept: Mapping[str, Record]) -> None:
     """Keep what `kept_cases` gives, in place of what another version of the program has kept."""
     path = _kept_file()
+    if not trusted(path.parent):
+        return
     for other in path.parent.glob(f"{_PREFIX}*{OTHER}"):
         discard(other)
     # Without them the next report runs the cases again.

@@ -1,10 +1,14 @@
-"""`python -m ringbalance`: the same as the command `ringbalance`."""
+"""`python -m ringbalance`, and the command `ringbalance`: an interrupt ends both in silence from here on."""
 
 from __future__ import annotations
 
 import sys
 
-from ringbalance.cli import main
+try:
+    from ringbalance.cli import main
+except KeyboardInterrupt:
+    # As `ringbalance.cli.INTERRUPTED`, which is not there yet.
+    sys.exit(130)
 
 # Worker processes import this module again under another name.
 if __name__ == "__main__":

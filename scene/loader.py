@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields
 from importlib import resources
@@ -23,6 +22,7 @@ from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import ShownOrigin
 from ringbalance.scene.rules import shape, working
 from ringbalance.scene.rules.check import failed_checks
+from ringbalance.scene.toml_reading import read_toml
 
 _LARGEST_FILE = 2**20
 _DECIDE_NOTHING = ("requirement.", "measured.", "rotor.mass", "liquid.source")
@@ -224,7 +224,7 @@ def _content(name: str, file: str) -> bytes:
 
 def _document(content: bytes, file: str) -> Mapping[str, Any]:
     try:
-        return tomllib.loads(content.decode("utf-8-sig"))
+        return read_toml(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         problem = f"line {line} is not UTF-8 text; save the file with UTF-8 encoding"

@@ -277,3 +277,19 @@ def test_characters_that_an_encoding_lacks_are_replaced(text: str, encoding: str
 
 def test_version_is_reported() -> None:
     assert run("--version").stdout.strip() == "0.1.0"
+
+
+def test_an_interrupt_while_the_command_is_loaded_ends_it_in_silence() -> None:
+    code = """
+import runpy, sys
+
+class Interrupted:
+    def find_spec(self, name, *_):
+        if name == "ringbalance.cli":
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Interrupted())
+runpy.run_module("ringbalance", run_name="__main__")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")

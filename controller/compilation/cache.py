@@ -3,11 +3,12 @@
 The layout is numba's, an index for each function and a data file for each signature.  Different from numba's
 own, each file begins with a checksum of the rest, is written whole and brought to the disk, and a data file's
 name follows from its content, so that no index can lead to another function's code.  A file that cannot be
-written costs time in later runs and is no error.
+written costs time in later runs and is no error.  What another user may have written is not read.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import inspect
 import os
@@ -22,7 +23,7 @@ from typing import Any, ClassVar, Final
 
 from numba.core import caching, serialize
 
-from ringbalance.controller.compilation.folders import mark_used, remove_old
+from ringbalance.controller.compilation.folders import foreign, make_private, mark_used, remove_old
 from ringbalance.scene.platform.files import write_whole
 
 INDEX: Final = ".nbi"
@@ -41,6 +42,8 @@ def checked_content(path: Path) -> bytes:
     """Content of a kept file without the checksum; OSError or ValueError when it cannot be used."""
     if path.exists() and not path.is_file():
         raise OSError(f"{path} is not a file")
+    if foreign([path]) is not None:
+        raise PermissionError(f"{path} may have been written by another user")
     data = path.read_bytes()
     if hashlib.sha256(data[_SIZE:]).digest() != data[:_SIZE]:
         raise ValueError(f"{path} is damaged")
@@ -90,9 +93,9 @@ class _Place:
         """Make the folder; a file in its place is discarded."""
         path = Path(self.get_cache_path())
         for place in (path.parent, path):
-            if place.exists() and not place.is_dir():
+            if place.is_symlink() or (place.exists() and not place.is_dir()):
                 discard(place)
-        path.mkdir(parents=True, exist_ok=True)
+        make_private(path)
 
 
 class _Files:
@@ -107,12 +110,12 @@ class _Files:
         name = self._index().get(key)
         if not isinstance(name, str) or not name.startswith(self._name) or os.sep in name:
             return None
-        return self._unpickled(self._folder / name)
+        return self._unpickled(self._folder / name, named=True)
 
     def save(self, key: object, data: object) -> None:
         """Keep an entry; OSError when that cannot be done."""
         content = _dumps(data)
-        name = f"{self._name}.{hashlib.sha256(content).hexdigest()[:16]}{DATA}"
+        name = self._data_name(content)
         write_checked(self._folder / name, content)
         write_checked(self._index_path, _dumps((self._stamp, {**self._index(), key: name})))
 
@@ -126,9 +129,19 @@ class _Files:
             return {}
         return found[1] if found[0] == self._stamp else {}
 
-    def _unpickled(self, path: Path) -> object:
+    def _data_name(self, content: bytes) -> str:
+        return f"{self._name}.{hashlib.sha256(content).hexdigest()[:16]}{DATA}"
+
+    def _unpickled(self, path: Path, *, named: bool = False) -> object:
+        """What a file holds; None, and the file is discarded, where that is damaged or not what it is named.
+
+        Args: `named`: whether the file's name follows from its content.
+        """
         try:
-            return pickle.loads(checked_content(path))
+            content = checked_content(path)
+            if named and path.name != self._data_name(content):
+                raise ValueError(f"{path} holds what belongs to another name")
+            return pickle.loads(content)
         except FileNotFoundError:
             return None
         except Exception:
@@ -141,7 +154,8 @@ def write_checked(path: Path, content: bytes) -> None:
     """Keep a file that `checked_content` reads; OSError when that cannot be done."""
     if path.is_dir():
         discard(path)
-    write_whole(path, hashlib.sha256(content).digest() + content)
+    make_private(path.parent)
+    write_whole(path, hashlib.sha256(content).digest() + content, private=True)
 
 
 class KeptCode(_NumbaCache):  # type: ignore[misc]
@@ -172,6 +186,8 @@ class KeptCode(_NumbaCache):  # type: ignore[misc]
 
     def load_overload(self, sig: object, target_context: object) -> object:
         """The compiled code of a signature, or None: it is then compiled."""
+        if not trusted(self._folder):
+            return None
         try:
             found = super().load_overload(sig, target_context)
         except Exception:
@@ -184,11 +200,32 @@ class KeptCode(_NumbaCache):  # type: ignore[misc]
 
     def save_overload(self, sig: object, data: object) -> None:
         """Keep the compiled code of a signature, where that can be done."""
+        if not trusted(self._folder):
+            return
         try:
             super().save_overload(sig, data)
             remove_old(self._folder)
         except OSError as error:
             _note_unwritable(self._folder, error.strerror or str(error))
+
+
+@cache
+def trusted(folder: Path) -> bool:
+    """Whether what a version's folder holds may be used: nobody else can have written it.
+
+    A folder of this user's that others may write is made private first. Otherwise that is said once.
+    """
+    with contextlib.suppress(OSError):
+        if folder.parent.exists():
+            make_private(folder.parent)
+    other = foreign([folder.parent, folder])
+    if other is not None and sys.stderr is not None:
+        print(
+            f"ringbalance: {other} belongs to another user, or others may write to it; what it holds is not "
+            "used, and every run compiles again, see `ringbalance cache`",
+            file=sys.stderr,
+        )
+    return other is None
 
 
 @cache

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ringbalance.controller.compilation.cache import is_damaged, kept_files
 from ringbalance.controller.compilation.compiled import code_folder, code_root
-from ringbalance.controller.compilation.folders import code_folders, last_used
+from ringbalance.controller.compilation.folders import code_folders, foreign, last_used
 
 DONE = 0
 DAY = 86400.0
@@ -53,6 +53,7 @@ def _document(removed: int) -> dict[str, Any]:
         "folder": str(root),
         "size_bytes": sum(version["size_bytes"] for version in versions),
         "writable": _writable(root),
+        "trusted": foreign([root, code_folder()]) is None,
         "usable": _writable(root) or any(v["current"] and v["files"] > v["damaged"] for v in versions),
         "versions": versions,
         "removed": removed,
@@ -96,7 +97,13 @@ def _show(told: dict[str, Any], console: Console) -> None:
     if not told["writable"]:
         console.print(
             "it cannot be written: what is not kept yet is compiled in every run; set XDG_CACHE_HOME or "
-            "NUMBA_CACHE_DIR to a folder that can",
+            "NUMBA_CACHE_DIR to a folder that can, and that nobody else can write to",
+            highlight=False,
+        )
+    if not told["trusted"]:
+        console.print(
+            "it belongs to another user, or others may write to it: nothing in it is used, because kept code "
+            "is executed; remove it, or set XDG_CACHE_HOME or NUMBA_CACHE_DIR to a folder of your own",
             highlight=False,
         )
     if not told["versions"]:

@@ -11,7 +11,9 @@ import hashlib
 import os
 import re
 import shutil
+import stat
 import time
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -30,6 +32,38 @@ def folder_name(*, checkout: Path, digest: str) -> str:
     """Eight digits for the checkout, a hyphen, and the digest of the sources."""
     place = hashlib.sha256(os.fsencode(checkout.resolve())).hexdigest()[:8]
     return f"{place}-{digest}"
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder, and those above it that are missing, for this user alone; one of this user's own that
+    others may write becomes private.
+
+    Raises: OSError: it cannot be made.
+    """
+    if not folder.parent.exists():
+        make_private(folder.parent)
+    folder.mkdir(mode=0o700, exist_ok=True)
+    if _may_be_changed_by_others(folder) and folder.stat().st_uid == os.geteuid():
+        folder.chmod(0o700)
+
+
+def foreign(paths: Iterable[Path]) -> Path | None:
+    """The first of some files and folders whose content another user may have written; None: there is none.
+
+    Kept code is executed, so it is taken from this user or the superuser alone, and from places that nobody
+    else can write to. One that is missing is nobody's. Without owners of files (Windows) there is none.
+    """
+    return next((path for path in paths if _may_be_changed_by_others(path)), None)
+
+
+def _may_be_changed_by_others(path: Path) -> bool:
+    if not hasattr(os, "geteuid"):
+        return False
+    try:
+        found = path.stat()
+    except OSError:
+        return False
+    return found.st_uid not in {os.geteuid(), 0} or bool(found.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
 
 
 def code_folders(root: Path) -> list[Path]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import re
-import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, StringArray
 from ringbalance.scene.faults import Fault, did_you_mean, toml_text
+from ringbalance.scene.toml_reading import read_toml
 from ringbalance.scene.units import DIMENSIONS, FieldError, parse_number, parse_quantity
 
 LARGEST_FILE: Final = 8 * 2**20
@@ -186,7 +186,7 @@ def parse_table(text: str, *, file: str) -> tuple[Table | None, tuple[Fault, ...
     try:
         heads = _without_empty_end(_cells(data[0][1], separator))
     except csv.Error as error:
-        return None, (*faults, _quotation_fault(head_at, error, file))
+        return None, (*faults, _cell_fault(head_at, error, file))
     rows, bad_rows = _rows(data[1:], len(heads), separator, file)
     table = Table(
         file=file,
@@ -210,7 +210,7 @@ def _header(
 ) -> tuple[Mapping[str, object] | None, tuple[Fault, ...]]:
     """The TOML of the first lines; the mark becomes a space, so that its errors have the file's places."""
     try:
-        return tomllib.loads("\n".join(_unmarked(line) for _, line in lines)), ()
+        return read_toml("\n".join(_unmarked(line) for _, line in lines)), ()
     except (ValueError, csv.Error, RecursionError) as error:
         reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
         problem = f"the first lines, marked #, are not TOML: {' '.join(reason.split())}"
@@ -242,8 +242,10 @@ def _cells(line: str, separator: str) -> tuple[str, ...]:
     return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True)))
 
 
-def _quotation_fault(line: int, error: csv.Error, file: str) -> Fault:
-    return data_fault(file, f"line {line}", f"the quotation marks are wrong ({error})")
+def _cell_fault(line: int, error: csv.Error, file: str) -> Fault:
+    large = "field limit" in str(error)
+    problem = "a cell is longer than any number or name" if large else f"the quotation marks are wrong ({error})"
+    return data_fault(file, f"line {line}", problem)
 
 
 def _without_empty_end(row: tuple[str, ...]) -> tuple[str, ...]:
@@ -262,7 +264,7 @@ def _rows(
         try:
             cells = _cells(line, separator)
         except csv.Error as error:
-            faults.append(_quotation_fault(at, error, file))
+            faults.append(_cell_fault(at, error, file))
             continue
         if len(cells) < length or any(cells[length:]):
             problem = f"{len(cells)} values, and the columns are {length}"

@@ -35,23 +35,23 @@ _LONGEST_WORK: Final = 86400.0
 """s after which a draft counts as abandoned where files cannot be locked."""
 
 
-def write_whole(path: Path, data: str | bytes) -> Path:
+def write_whole(path: Path, data: str | bytes, *, private: bool = False) -> Path:
     """Write a file so that a reader never sees half of it, making its folder when there is none.
 
     After a power cut the old content or the new one is there, never an empty file: the content reaches the
     disk before the name does.
     Args: `path`: of the file; a link is followed, a device or a pipe is written to directly. `data`: its
-        content; text is written as UTF-8.
+        content; text is written as UTF-8. `private`: only this user may read or write it.
     Raises: OSError: the folder cannot be made or written; nothing is left behind.
     """
     content = data.encode() if isinstance(data, str) else data
     if _is_special(path):
         path.write_bytes(content)
         return path
-    target = _through_links(path)
+    target = _target(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     _remove_abandoned(target.parent)
-    _replace_whole(target, content)
+    _replace_whole(target, content, mode=0o600 if private else 0o666)
     return path
 
 
@@ -64,7 +64,7 @@ def check_file(path: Path) -> None:
         if path.is_dir():
             raise IsADirectoryError(f"{path} is a folder, not a file; name a file")
         if not _is_special(path):
-            with draft_folder(_nearest(_through_links(path).parent)):
+            with draft_folder(_nearest(_target(path).parent)):
                 pass
 
 
@@ -100,6 +100,17 @@ def staged(folder: Path, *, files: Sequence[str] = (), folders: Sequence[str] = 
 def _is_special(path: Path) -> bool:
     """True for a device, a pipe or a socket: nothing that a rename should replace."""
     return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def _target(path: Path) -> Path:
+    """The file behind the links, in a folder that a link does not make up."""
+    target = _through_links(path)
+    if path.is_symlink() and not target.parent.is_dir():
+        raise FileNotFoundError(
+            f"{path} is a link to {os.readlink(path)}, whose folder does not exist; make that folder or "
+            "choose another file"
+        )
+    return target
 
 
 def _through_links(path: Path) -> Path:
@@ -176,7 +187,9 @@ def _move(source: Path, target: Path) -> None:
 
 def cache_folder() -> Path:
     """The user's folder for what ringbalance can make again, after the XDG base directory specification."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ringbalance"
+    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    # A relative one is to be ignored, says the specification.
+    return (given if given.is_absolute() else Path.home() / ".cache") / "ringbalance"
 
 
 def _draft_path(folder: Path) -> Path:
@@ -202,11 +215,11 @@ def draft_folder(folder: Path) -> Iterator[Path]:
         shutil.rmtree(path, ignore_errors=True)
 
 
-def _replace_whole(target: Path, content: bytes) -> None:
+def _replace_whole(target: Path, content: bytes, *, mode: int = 0o666) -> None:
     """Write a file through a draft beside it. Raises: OSError: it cannot be; nothing is left behind."""
     draft = _draft_path(target.parent)
     try:
-        with open(draft, "xb") as stream:
+        with open(draft, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as stream:
             _lock(stream, without_locks=True)
             stream.write(content)
             stream.flush()
@@ -217,8 +230,10 @@ def _replace_whole(target: Path, content: bytes) -> None:
                 os.replace(draft, target)
         if fcntl is None:
             os.replace(draft, target)
-    except BaseException:
+    except BaseException as error:
         draft.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (None, str(draft)):
+            error.filename = str(target)
         raise
     _sync_folder(target.parent)
 

@@ -48,6 +48,9 @@ while True:
 )
 
 
+FUNCTIONS = ("doubled", "paired")
+
+
 def _kept(path: Path) -> list[Path]:
     return sorted(p for p in path.rglob("*") if p.suffix in {".nbi", ".nbc"})
 
@@ -128,6 +131,46 @@ def test_whatever_is_damaged_is_compiled_again_once(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
+
+
+def _exchange(one: Path, other: Path) -> None:
+    first, second = one.read_bytes(), other.read_bytes()
+    one.write_bytes(second)
+    other.write_bytes(first)
+
+
+def test_code_under_another_function_s_name_is_not_run(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    _misses(tmp_path, cache)
+    doubled, paired = (next(p for p in _kept(cache) if p.match(f"*.{name}-*.nbc")) for name in FUNCTIONS)
+    _exchange(doubled, paired)
+    assert _misses(tmp_path, cache) == 2
+    assert _misses(tmp_path, cache) == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners here")
+def test_what_others_may_have_written_is_not_run(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    _misses(tmp_path, cache)
+    assert not any(path.stat().st_mode & 0o077 for path in (cache / "ringbalance").rglob("*"))
+    for path in _kept(cache):
+        path.chmod(0o666)
+    assert _misses(tmp_path, cache) == 3
+    assert _misses(tmp_path, cache) == 0
+    # A folder of one's own that others may write becomes private.
+    (cache / "ringbalance").chmod(0o777)
+    assert _misses(tmp_path, cache) == 0
+    assert (cache / "ringbalance").stat().st_mode & 0o077 == 0
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only the superuser gives files away")
+def test_a_folder_of_another_user_is_not_used(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    _misses(tmp_path, cache)
+    os.chown(cache / "ringbalance", 12345, 12345)
+    before = {path: path.read_bytes() for path in _kept(cache)}
+    assert _misses(tmp_path, cache) == 3
+    assert {path: path.read_bytes() for path in _kept(cache)} == before
 
 
 def test_two_programs_share_a_damaged_cache(tmp_path: Path) -> None:

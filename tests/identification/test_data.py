@@ -158,6 +158,7 @@ def test_both_characters_for_micro_and_the_degree_sign_are_known(
         ("flow", "20,4.1,a", "20,1e308,a", ["line 11", "1e308", "size"]),
         ("flow", "20,4.1,a", "50,6.9,a", ["line 12", "same as line 11", "note"]),
         ("flow", "20,4.1,a", '20,4.1,"a', ["line 11", "quotation marks"]),
+        ("flow", "20,4.1,a", "20,4.1," + "a" * 200_000, ["line 11", "a cell is longer"]),
         ("flow", "[ml/s]", "[g/s]", ["line 10", "flow_rate [g/s]", "ml/s"]),
         ("flow", "[ml/s]", "[bar]", ["line 10", "unit of pressure", "volume flow"]),
         ("flow", "flow_rate [ml/s],s", "flow_rate,s", ["line 10", "unit is missing"]),

@@ -14,6 +14,7 @@ import pytest
 from check_traces import apart, traces, untrue
 from keep_evidence import kept_document
 
+from ringbalance.controller.compilation.cache import write_checked
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
@@ -162,11 +163,11 @@ def test_what_looks_at_no_scene_is_run_once(first: Report, second: Report) -> No
 
 @pytest.mark.parametrize("damage", [b"", b"{}", b"\xff" * 99], ids=["empty", "no checksum", "garbage"])
 def test_damaged_results_are_not_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes
+    first: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes
 ) -> None:
     monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
     assert kept_cases() == {}
-    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
+    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": _record(first)}})
     assert list(kept_cases()) == ["claim_01_volume"]
     (damaged,) = tmp_path.iterdir()
     content = bytearray(damaged.read_bytes())
@@ -175,6 +176,37 @@ def test_damaged_results_are_not_taken(
         damaged.write_bytes(wrong)
         assert kept_cases() == {}
         assert not damaged.exists()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"[]",
+        b"null",
+        b"5",
+        b"[" * 100_000,
+        b'{"c": {}}',
+        b'{"c": {"date": "", "record": "text"}}',
+        b'{"c": NaN}',
+    ],
+    ids=["list", "null", "number", "deep", "empty case", "text", "not a number"],
+)
+def test_results_of_another_form_are_not_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes
+) -> None:
+    """Whole, with a checksum that holds, but nothing that a report could show."""
+    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
+    keep_cases({})
+    (path,) = tmp_path.iterdir()
+    write_checked(path, content)
+    assert kept_cases() == {}
+    assert not path.exists()
+
+
+def _record(report: Report) -> Record:
+    """Of a case, as a report has it."""
+    record: Record = report.evidence["verification"][0]
+    return record
 
 
 def test_results_of_another_program_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

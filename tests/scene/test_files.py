@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -73,6 +75,28 @@ def test_links_are_written_through(tmp_path: Path) -> None:
     write_whole(tmp_path / "law", "{}")
     assert names(real) == {"figures/one", "law.json"}
     assert (tmp_path / "law").is_symlink()
+
+
+def test_a_link_into_a_folder_that_is_missing_is_refused(tmp_path: Path) -> None:
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "missing" / "file")
+    for write in (check_file, partial(write_whole, data="1")):
+        with pytest.raises(FileNotFoundError, match="folder does not exist"):
+            write(link)
+    assert [path.name for path in tmp_path.iterdir()] == ["link"]
+
+
+def test_a_file_that_the_system_cuts_off_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "large"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(OSError, match="large") as refused:
+            write_whole(path, b"x" * 100_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert refused.value.filename == str(path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_pipe_is_written_to(tmp_path: Path) -> None:

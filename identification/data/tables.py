@@ -243,9 +243,9 @@ def _cells(line: str, separator: str) -> tuple[str, ...]:
 
 
 def _cell_fault(line: int, error: csv.Error, file: str) -> Fault:
-    large = "field limit" in str(error)
-    problem = "a cell is longer than any number or name" if large else f"the quotation marks are wrong ({error})"
-    return data_fault(file, f"line {line}", problem)
+    too_long = "field limit" in str(error)
+    marks = f"the quotation marks are wrong ({error})"
+    return data_fault(file, f"line {line}", "a cell is longer than any number or name" if too_long else marks)
 
 
 def _without_empty_end(row: tuple[str, ...]) -> tuple[str, ...]:

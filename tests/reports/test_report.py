@@ -14,7 +14,6 @@ import pytest
 from check_traces import apart, traces, untrue
 from keep_evidence import kept_document
 
-from ringbalance.controller.compilation.cache import write_checked
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
@@ -25,7 +24,7 @@ from ringbalance.reports.pages.document import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.render import render
 from ringbalance.reports.report import Report, write_report
-from ringbalance.reports.saved import heavy_cases, keep_cases, kept_cases, saved_cases
+from ringbalance.reports.saved import heavy_cases, saved_cases
 from ringbalance.reports.sections import section_views
 from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.scene import Scene, SceneError, bundled_scene
@@ -159,84 +158,6 @@ def test_what_looks_at_no_scene_is_run_once(first: Report, second: Report) -> No
     assert second.evidence["times"]["kept_cases"] == {"claim_01_volume": today}
     page = (second.page.parent / "report.html").read_text()
     assert f"1 that look at no scene, run by the same program on {today}" in page
-
-
-@pytest.mark.parametrize("damage", [b"", b"{}", b"\xff" * 99], ids=["empty", "no checksum", "garbage"])
-def test_damaged_results_are_not_taken(
-    first: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes
-) -> None:
-    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
-    assert kept_cases() == {}
-    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": _record(first)}})
-    assert list(kept_cases()) == ["claim_01_volume"]
-    (damaged,) = tmp_path.iterdir()
-    content = bytearray(damaged.read_bytes())
-    content[len(content) // 2] ^= 1
-    for wrong in (damage, bytes(content)):
-        damaged.write_bytes(wrong)
-        assert kept_cases() == {}
-        assert not damaged.exists()
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"[]",
-        b"null",
-        b"5",
-        b"[" * 100_000,
-        b'{"c": {}}',
-        b'{"c": {"date": "", "record": "text"}}',
-        b'{"c": NaN}',
-    ],
-    ids=["list", "null", "number", "deep", "empty case", "text", "not a number"],
-)
-def test_results_of_another_form_are_not_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes
-) -> None:
-    """Whole, with a checksum that holds, but nothing that a report could show."""
-    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
-    keep_cases({})
-    (path,) = tmp_path.iterdir()
-    write_checked(path, content)
-    assert kept_cases() == {}
-    assert not path.exists()
-
-
-def _record(report: Report) -> Record:
-    """Of a case, as a report has it."""
-    record: Record = report.evidence["verification"][0]
-    return record
-
-
-def test_results_of_another_program_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
-    monkeypatch.setattr(saved_module, "_program", lambda: "old")
-    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
-    monkeypatch.setattr(saved_module, "_program", lambda: "new")
-    assert kept_cases() == {}
-    keep_cases({})
-    assert [path.name for path in tmp_path.iterdir()] == ["cases-new.kept"]
-
-
-def test_another_file_of_the_program_or_package_counts_as_another_program(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(saved_module, "files", lambda _: tmp_path)
-    found = set()
-    for content in ("one", "other"):
-        (tmp_path / "module.py").write_text(content)
-        found.add(saved_module._program.__wrapped__())
-    monkeypatch.setattr(saved_module, "versions", lambda: {"numpy": "9.9"})
-    found.add(saved_module._program.__wrapped__())
-    assert len(found) == 3
-
-
-def test_results_that_cannot_be_kept_cost_time_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "file").write_text("in the way")
-    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path / "file")
-    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
-    assert kept_cases() == {}
 
 
 def test_a_real_document_has_the_shape_of_the_sample(first: Report, whole: Record) -> None:

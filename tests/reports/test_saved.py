@@ -1,0 +1,83 @@
+"""Results of cases that are kept between reports: taken only whole, of the right form and of this program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import ringbalance.reports.saved as saved_module
+from ringbalance.controller.compilation.cache import write_checked
+from ringbalance.reports.saved import keep_cases, kept_cases, saved_cases
+
+
+@pytest.mark.parametrize("damage", [b"", b"{}", b"\xff" * 99], ids=["empty", "no checksum", "garbage"])
+def test_damaged_results_are_not_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes
+) -> None:
+    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
+    assert kept_cases() == {}
+    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": saved_cases()[0]}})
+    assert list(kept_cases()) == ["claim_01_volume"]
+    (damaged,) = tmp_path.iterdir()
+    content = bytearray(damaged.read_bytes())
+    content[len(content) // 2] ^= 1
+    for wrong in (damage, bytes(content)):
+        damaged.write_bytes(wrong)
+        assert kept_cases() == {}
+        assert not damaged.exists()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"[]",
+        b"null",
+        b"5",
+        b"[" * 100_000,
+        b'{"c": {}}',
+        b'{"c": {"date": "", "record": "text"}}',
+        b'{"c": NaN}',
+    ],
+    ids=["list", "null", "number", "deep", "empty case", "text", "not a number"],
+)
+def test_results_of_another_form_are_not_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes
+) -> None:
+    """Whole, with a checksum that holds, but nothing that a report could show."""
+    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
+    keep_cases({})
+    (path,) = tmp_path.iterdir()
+    write_checked(path, content)
+    assert kept_cases() == {}
+    assert not path.exists()
+
+
+def test_results_of_another_program_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
+    monkeypatch.setattr(saved_module, "_program", lambda: "old")
+    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
+    monkeypatch.setattr(saved_module, "_program", lambda: "new")
+    assert kept_cases() == {}
+    keep_cases({})
+    assert [path.name for path in tmp_path.iterdir()] == ["cases-new.kept"]
+
+
+def test_another_file_of_the_program_or_package_counts_as_another_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(saved_module, "files", lambda _: tmp_path)
+    found = set()
+    for content in ("one", "other"):
+        (tmp_path / "module.py").write_text(content)
+        found.add(saved_module._program.__wrapped__())
+    monkeypatch.setattr(saved_module, "versions", lambda: {"numpy": "9.9"})
+    found.add(saved_module._program.__wrapped__())
+    assert len(found) == 3
+
+
+def test_results_that_cannot_be_kept_cost_time_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path / "file")
+    keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
+    assert kept_cases() == {}

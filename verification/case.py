@@ -73,8 +73,8 @@ _UNITS = {
 _PLACEHOLDER = re.compile(r"\{([a-z][a-z0-9_]*)(?::([^:{}]*))?(?::([^{}]*))?\}")
 
 
-class CaseError(ValueError):
-    """A case.toml that is not what a case must be."""
+class CaseError(Exception):
+    """A case.toml, or its code, that is not what a case must be; each line names the file and one error."""
 
 
 class _Record(BaseModel):
@@ -167,11 +167,11 @@ class CaseDefinition(_Record):
     protects: Text
     assumes: tuple[Text, ...]
     does_not_cover: tuple[Text, ...]
-    explanation: Text
+    explanation: str = ""
     """What was found and why, with placeholders for its numbers."""
-    consequence: Mapping[str, Text]
+    consequence: Mapping[str, Text] = Field(default_factory=dict)
     """One sentence for a designer, by verdict, or "default"."""
-    equations: tuple[Text, ...]
+    equations: tuple[Text, ...] = ()
     reference: _ReferenceText
     study: _Study | None = None
     """What computes it where the folder has no `case.py`."""
@@ -216,13 +216,11 @@ class CaseDefinition(_Record):
     def _hold_together(self) -> Self:
         if (self.number is None) == (self.kind == "claim"):
             raise ValueError("a claim has a number, and nothing else has one")
-        if (self.order is None) != (self.kind == "claim"):
-            raise ValueError(
-                "a case that is no claim has an order, its position in the report; a claim has none"
-            )
+        if self.order is not None and self.kind == "claim":
+            raise ValueError("a claim has no order: its place in the report follows from its number")
         strange = [subject for subject in self.about if subject not in SUBJECTS]
-        if strange or (self.kind == "claim") == bool(self.about):
-            raise ValueError(f"about: a case that is no claim names one or more of {', '.join(SUBJECTS)}")
+        if strange or (self.kind == "claim" and self.about):
+            raise ValueError(f"about: a case that is no claim may name some of {', '.join(SUBJECTS)}")
         _unique("quantity", [quantity.name for quantity in self.quantity])
         _unique("rests_on", [one.path for one in self.rests_on])
         _unique("must_fail", [mutation.id for mutation in self.must_fail])
@@ -266,7 +264,7 @@ class CaseDefinition(_Record):
         if strange:
             raise ValueError(f'consequence: "{strange[0]}" is no verdict of a {self.kind} case')
         missing = [word for word in known if word != "not run" and word not in self.consequence]
-        if missing and "default" not in self.consequence:
+        if self.consequence and missing and "default" not in self.consequence:
             raise ValueError(f'consequence: nothing for "{missing[0]}", and no default')
 
 

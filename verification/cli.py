@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from json import dumps
 from pathlib import Path
 from typing import Final
@@ -14,13 +15,15 @@ from rich.table import Table
 from rich.text import Text
 
 from ringbalance.identification.data.measurements import MeasurementsError
-from ringbalance.scene import load_scene
+from ringbalance.scene import AnyScene, liquid_ring_scene, load_scene
 from ringbalance.scene.platform.processes import checked_workers
 from ringbalance.scene.platform.terminal import Activity, activity, messages_console, results_console
-from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.catalogue import UnknownCaseError, load_case, load_cases
+from ringbalance.verification.case import CaseDefinition, CaseError
+from ringbalance.verification.catalogue import UnknownCaseError, load_case, place, unknown_case
+from ringbalance.verification.catalogue import case_ids as case_ids_of_program
 from ringbalance.verification.document import definition_document, results_document
 from ringbalance.verification.evidence import Level
+from ringbalance.verification.own_cases import OwnCase, own_cases
 from ringbalance.verification.result import CaseResult, QuantityResult
 from ringbalance.verification.runner import paper_scene, run_cases
 from ringbalance.verification.validation.comparison import data_document
@@ -41,7 +44,8 @@ _STYLES: Final = {
 
 
 def verify(
-    *cases: str,
+    *case_ids: str,
+    cases: Path | None = None,
     scene: Path | None = None,
     list_: bool = False,
     mutations: bool = False,
@@ -53,7 +57,8 @@ def verify(
     """Run verification cases and judge the paper's claims.
 
     Args:
-        cases: ids of the cases; none for all.
+        case_ids: ids of the cases; none for all.
+        cases: a folder with cases of your own (docs/verification-cases.md), which join the program's.
         scene: scene file; default the liquid-ring paper's disc.
         list_: name the cases and run none.
         mutations: also build in each case's mutations, which must change its verdict.
@@ -64,45 +69,99 @@ def verify(
 
     Returns:
         Exit code: 0; 1 when a code-verification case failed, or a mutation was not caught; 2 for an unknown
-        case or a file of measurements that cannot be used.
+        case, a case that is not whole (the others are run), or measurements that cannot be used.
 
     Raises:
         SceneError: the scene file is not a scene.
     """
-    progress = messages_console()
     if data is not None:
         return _judge_data(data, json=json)
+    own, errors = own_cases(cases) if cases is not None else ([], [])
     try:
-        definitions = [load_case(case) for case in cases] if cases else list(load_cases())
+        chosen, more = _chosen(case_ids, {case.definition.id: case for case in own})
     except UnknownCaseError as error:
-        progress.print(f"ringbalance: {error}", markup=False, highlight=False, soft_wrap=True)
+        _say(error)
         return BAD_INPUT
+    errors += more
     if list_:
-        _print_list(definitions, json=json)
-        return DONE
-    given = paper_scene() if scene is None else load_scene(scene)
-    ids = [definition.id for definition in definitions]
-    with activity("verify", f"0 of {len(ids)} cases") as shown:
-        results = run_cases(
-            ids,
-            scene=given,
-            level=level,
-            mutations=mutations,
-            workers=checked_workers(workers),
-            progress=lambda result: _show_done(shown, ids, result.definition.id),
-        )
-    if json:
-        print(dumps(results_document(results), allow_nan=False))
+        _print_list([case.definition for case in chosen], json=json)
     else:
-        _print_results(results)
-    return exit_code(results)
+        given = paper_scene() if scene is None else load_scene(scene)
+        results, broken = _run(
+            chosen, scene=given, level=level, mutations=mutations, workers=checked_workers(workers)
+        )
+        errors += broken
+        if json:
+            print(dumps(results_document(results), allow_nan=False))
+        else:
+            _print_results(results)
+    for wrong in errors:
+        _say(wrong)
+    if errors:
+        return BAD_INPUT
+    return DONE if list_ else exit_code(results)
+
+
+def _say(error: Exception) -> None:
+    messages_console().print(f"ringbalance: {error}", markup=False, highlight=False, soft_wrap=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Packaged:
+    """A case of the program's, by its text."""
+
+    definition: CaseDefinition
+
+
+def _chosen(
+    ids: Sequence[str], own: Mapping[str, OwnCase]
+) -> tuple[list[_Packaged | OwnCase], list[CaseError]]:
+    """Cases by their ids, or all, the program's first; and what is wrong with some of them."""
+    known = (*case_ids_of_program(), *own)
+    unknown = [name for name in ids if name not in known]
+    if unknown:
+        raise unknown_case(unknown[0], known)
+    chosen: list[_Packaged | OwnCase] = []
+    errors = []
+    for name in ids or known:
+        try:
+            chosen.append(own[name] if name in own else _Packaged(definition=load_case(name)))
+        except CaseError as error:
+            errors.append(error)
+    if not ids:
+        chosen.sort(key=lambda case: (isinstance(case, OwnCase), place(case.definition)))
+    return chosen, errors
+
+
+def _run(
+    chosen: Sequence[_Packaged | OwnCase], *, scene: AnyScene, level: Level, mutations: bool, workers: int
+) -> tuple[list[CaseResult], list[CaseError]]:
+    """The results in the order of the cases, and what is wrong with the code of own ones."""
+    ids = [case.definition.id for case in chosen]
+    packaged = [case.definition.id for case in chosen if isinstance(case, _Packaged)]
+    results: dict[str, CaseResult] = {}
+    errors: list[CaseError] = []
+    with activity("verify", f"0 of {len(ids)} cases") as shown:
+
+        def done(result: CaseResult) -> None:
+            results[result.definition.id] = result
+            _show_done(shown, len(ids), len(results), result.definition.id)
+
+        if packaged:
+            run_cases(packaged, scene=scene, level=level, mutations=mutations, workers=workers, progress=done)
+        for case in (case for case in chosen if isinstance(case, OwnCase)):
+            try:
+                done(case.run(liquid_ring_scene(scene), level=level, mutations=mutations))
+            except CaseError as error:
+                errors.append(error)
+    return [results[name] for name in ids if name in results], errors
 
 
 def _judge_data(path: Path, *, json: bool) -> int:
     try:
         document = data_document(path)
     except MeasurementsError as error:
-        messages_console().print(f"ringbalance: {error}", markup=False, highlight=False, soft_wrap=True)
+        _say(error)
         return BAD_INPUT
     if json:
         print(dumps(document, allow_nan=False))
@@ -131,9 +190,8 @@ def exit_code(results: Sequence[CaseResult]) -> int:
     return FAILED if failed else DONE
 
 
-def _show_done(shown: Activity, ids: Sequence[str], last: str) -> None:
-    done = ids.index(last) + 1
-    shown.show(f"{done} of {len(ids)} cases, {last} done", done=done, total=len(ids))
+def _show_done(shown: Activity, total: int, done: int, last: str) -> None:
+    shown.show(f"{done} of {total} cases, {last} done", done=done, total=total)
 
 
 def _print_list(definitions: Sequence[CaseDefinition], *, json: bool) -> None:

@@ -54,7 +54,7 @@ def run_case(case_id: str, *, scene: Scene, level: Level = "light", mutations: b
     Raises: KeyError: an unknown case.
     """
     definition, code = load_case(case_id), case_code(case_id)
-    own = _scene_of(definition, scene)
+    own = scene_of(definition, scene)
     result = run_definition(definition, code, scene=own, level=level)
     if not mutations or result.verdict is Verdict.NOT_RUN:
         return result
@@ -154,7 +154,8 @@ def _imported(scene: Any) -> bool:
     return isinstance(scene, Scene) and scene.disc.geometry is not None
 
 
-def _scene_of(definition: CaseDefinition, scene: Scene) -> Any:
+def scene_of(definition: CaseDefinition, scene: Scene) -> Any:
+    """What a case is run on: the scene at hand, the paper's own disc or its rotor with eccentric masses."""
     if definition.paper == DRIVEN:
         return driven_scene()
     return paper_scene() if definition.judged_on == "paper" else scene

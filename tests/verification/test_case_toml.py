@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ringbalance.verification.case import CaseDefinition, CaseError
+from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.verdicts import Verdict
 
 
@@ -69,3 +70,11 @@ def test_a_verification_must_fail_with_a_defect(claim_text: str) -> None:
     )
     with pytest.raises(CaseError, match=r"metric|come out"):
         CaseDefinition.parse(text, source="made_up/case.toml")
+
+
+def test_the_program_s_cases_say_all_that_a_report_shows() -> None:
+    """An own case may leave out its place and its texts for the report."""
+    for case in load_cases():
+        assert case.explanation, case.id
+        assert case.consequence, case.id
+        assert case.kind == "claim" or (case.order is not None and case.about), case.id

@@ -81,6 +81,23 @@ def flow_law_of(scene: Scene) -> CalibratedLaw:
     return chamber_and_law(scene)[1]
 
 
+def runs_with(scene: Scene, *, amplitudes: Sequence[float] = (LARGEST,), **settings: Any) -> list[Simulation]:
+    """Runs of the target-vector algorithm at each of `PERIODS` from each amplitude, m.
+
+    Args: `settings`: of the controller, SI.
+    """
+    return [
+        run_loop(loop_scene(scene, kind="target_vector", amplitude=amplitude, period=period, **settings))
+        for period in PERIODS
+        for amplitude in amplitudes
+    ]
+
+
+def overshooting(runs: Sequence[Simulation]) -> float:
+    """Fraction of some runs that overshoot."""
+    return sum(run.overshoots > 0 for run in runs) / len(runs)
+
+
 def settling(run: Simulation) -> float:
     """Settling time, s, infinite where the run did not settle."""
     return math.inf if run.settling_time is None else run.settling_time

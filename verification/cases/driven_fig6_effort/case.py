@@ -19,7 +19,7 @@ from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_scenes import changed
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 
-_STEP = {"light": 4e-4, "heavy": 1e-4}
+STEP = {"light": 4e-4, "heavy": 1e-4}
 """s, of the integration, which is of first order; the effort hangs on it by a thousandth."""
 _DURATION = 3.0
 """Of the move, s."""
@@ -37,7 +37,7 @@ _SHARES = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
 
 def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Growth of the effort with the speed."""
-    found = efforts(scene, step=_STEP[level])
+    found = efforts(scene, step=STEP[level])
     grown = {name: growth(effort) for name, effort in found.items()}
     return Evidence(
         found=as_found(exact=grown["exact" if defect is None else "without"].min()),
@@ -101,7 +101,7 @@ def _positioning_effort(
             else:
                 extra = friction_torque(law, believed_arm, 0.0, speed, rate[i], -angle[i])
             net = asked[i] + extra - law.track.damping * rate[i]
-            rate[i] = _later_rate(law, arm, speed, rate[i], net, step)
+            rate[i] = later_rate(law, arm, speed, rate[i], net, step)
             angle[i] += step * rate[i]
         total += step * math.hypot(asked[0], asked[1])
     return total
@@ -118,7 +118,7 @@ def printed_compensation(law: DriveLaw, arm: float, speed: float, angle: float, 
 
 
 @compiled
-def _later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float, step: float) -> float:
+def later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float, step: float) -> float:
     """Rate one step later under dry friction; a mass that would turn round within the step rests first."""
     most = arm * law.track.moment * (speed + rate) ** 2
     if rate == 0:

@@ -93,6 +93,7 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
             "row_status": [str(status) for status in chamber_status(calibration)],
         }
         | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
+        | _curve(chamber.hydrostatic_pressure, at, "hydrostatic_pressure", "Pa")
         | _curve(chamber.moment, at, "moment", "kg_m")
         | {name: _listed(values) for name, values in paper_columns(calibration, fills).items()}
         | {"moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills)))}
@@ -110,8 +111,9 @@ def _check(check: ElementCheck) -> dict[str, Any]:
         "finite_element_solves": check.solves,
         "agrees": check.status.ok,
         "excess": check.excess,
+        "excess_by_quantity": dict(check.excesses),
     }
-    for name, unit in zip(CHECKED, ("Pa", "kg_m", "kg_m2"), strict=True):
+    for name, unit in zip(CHECKED, ("Pa", "kg_m", "kg_m2", "Pa"), strict=True):
         if name not in check.difference:
             continue
         estimate = getattr(check.elements, name)

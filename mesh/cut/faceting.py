@@ -58,6 +58,8 @@ class DrawingError:
     """Mean of x over the free surface, m."""
     wall_square: FloatArray
     """Mean of r^2 - a^2 over the outer wall, m^2."""
+    level: FloatArray
+    """a^2 of the free surface, m^2."""
 
 
 @lru_cache(maxsize=8)
@@ -144,4 +146,5 @@ def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> Drawi
         moment=turned + TOLERANCE * table.columns[1, 0],
         centroid=aside.max(axis=0) + (missed.sum() / table.volume + SLOPE_TOLERANCE) * centroid,
         wall_square=wetness * (moved + SAFETY * walls.wall),
+        level=moved,
     )

@@ -25,6 +25,7 @@ from ringbalance.reduced_model.documents import (
     paper_columns,
     velocity_status,
 )
+from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
@@ -181,6 +182,8 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         yield "note", UNSTATED[0].lower() + UNSTATED[1:].rstrip(".")
     if not chamber.status.ok:
         yield "note", chamber.status.text
+    for finding in mesh_findings(calibration.scene):
+        yield "warning", finding.change
     if calibration.instability is not None and calibration.instability.warning:
         yield "warning", calibration.instability.warning
 

@@ -217,7 +217,7 @@ def _flow_parts(scene: Scene, calibration: _Calibrated) -> dict[str, _Parts]:
 
 
 def _level_parts(calibration: _Calibrated) -> dict[str, _Parts]:
-    """The same of the gas pressures that hydrostatics alone give, for which the pressures of two chambers count."""
+    """The same of the gas pressures that hydrostatics alone give, for which two chambers count."""
     point, chamber = calibration.operating_point, calibration.chamber
     level = chamber.hydrostatic_pressure
     _, numerical, model = _curve_parts(level, chamber.reported[-1])

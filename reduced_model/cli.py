@@ -17,6 +17,7 @@ from rich.text import Text
 from ringbalance.reduced_model.budget import UNSTATED, believed, measured, rounded
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
+from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
 from ringbalance.reduced_model.documents import (
     PRESSURE_FACTORS,
     REMEDIES,
@@ -25,7 +26,6 @@ from ringbalance.reduced_model.documents import (
     paper_columns,
     velocity_status,
 )
-from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid

@@ -1,4 +1,4 @@
-"""How the outer wall of an imported chamber lies about the shaft: its own axis, and parts that face inward."""
+"""How the outer wall of an imported chamber lies about the shaft: its axis, and parts that face inward."""
 
 from __future__ import annotations
 

@@ -82,8 +82,8 @@ def chamber_closed_forms(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Wall pressure, moment and lambda of a chamber without gravity.
 
-    P = rho omega^2 <r^2 - a^2>/2 over the outer wall where it is wet, U = rho B int x dA, lambda = 2 <x> over the free
-    surface: in a sector P = rho omega^2 (R2^2 - a^2)/2 and lambda = 2 a sin(alpha)/alpha.
+    P = rho omega^2 <max(r^2 - a^2, 0)>/2 over the outer wall, U = rho B int x dA, lambda = 2 <x> over the
+    free surface: in a sector P = rho omega^2 (R2^2 - a^2)/2 and lambda = 2 a sin(alpha)/alpha.
     Returns: P, Pa, U, kg m, and lambda, m, the shape of `fill_ratio`.
     Source: hydrostatics with the chamber's exact geometry, that of its mesh where it is imported.
     """

@@ -61,8 +61,8 @@ def _inward(geometry: ChamberGeometry) -> _Found:
     if share <= _NEXT_TO_NOTHING:
         return
     text = (
-        f"{100 * share:.2g} % of the boundary outer_wall face the shaft, and count in the mean wall pressure: "
-        "give that name to walls that hold the liquid outward"
+        f"{100 * share:.2g} % of the boundary outer_wall face the shaft, and count in the mean wall "
+        "pressure: give that name to walls that hold the liquid outward"
     )
     yield "outer_wall_faces_inward", {"area_share": share}, text
 
@@ -73,8 +73,8 @@ def _coarse(scene: Scene, geometry: ChamberGeometry) -> _Found:
     if bend <= SMOOTH and share <= scene.tolerance:
         return
     text = (
-        f"facets that meet at up to {np.degrees(bend):.2g} deg may draw curves, and then the volume is off by "
-        f"up to {100 * share:.2g} %: take smaller cells there, or cells of second order, which show what is "
-        "an edge"
+        f"facets that meet at up to {np.degrees(bend):.2g} deg may draw curves, and then the volume is off "
+        f"by up to {100 * share:.2g} %: take smaller cells there, or cells of second order, which show what "
+        "is an edge"
     )
     yield "coarse_curves", {"angle_rad": bend, "volume_share": share}, text

@@ -1,4 +1,4 @@
-"""What a chamber's liquid presses with at the outer radius R2 as a table over the fill, for walls of any shape.
+"""What a chamber's liquid presses with at the outer radius R2, as a table over the fill.
 
 Where liquid begins to cover a wall, R2^2 - a^2 goes with a root of the fill: in an edge, with x^(1/2).  Then
 the nodes of a calibration are too few, and errors between more of them count where they are.
@@ -32,9 +32,7 @@ def even_table(nodes: FloatArray, value: FloatArray) -> tuple[HermiteTable, Floa
     return table, np.full(nodes.shape, missed / 2)
 
 
-def pressure_table(
-    scene: Scene, nodes: FloatArray, value: FloatArray
-) -> tuple[HermiteTable, FloatArray]:
+def pressure_table(scene: Scene, nodes: FloatArray, value: FloatArray) -> tuple[HermiteTable, FloatArray]:
     """The same for the pressure at R2, Pa; of an imported chamber with the closed form at more fills.
 
     Args: `nodes`: equally spaced from zero. `value`: with gravity, where that is modelled.

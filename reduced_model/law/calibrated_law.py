@@ -50,8 +50,8 @@ class CalibratedLaw:
     at rest, and when a chamber's liquid leaves the port open.
 
     `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
-    (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `hydrostatic_pressure` (Pa), and, of shape (1,),
-    `density`, `port_pressure`, `hump_pressure` (only with a crest), `vapour_pressure` (gauge, Pa), and
+    (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `hydrostatic_pressure` (Pa), and, of shape
+    (1,), `density`, `port_pressure`, `hump_pressure` (only with a crest), `vapour_pressure` (gauge, Pa), and
     `released` and `froude_velocity` (m/s) of `SiphonCrest`.
     """
 
@@ -177,7 +177,10 @@ class CalibratedLaw:
         return (
             {"log_velocity": self.heads.head.nodes}
             | {name: table.value.copy() for name, table in heads.items() if table is not None}
-            | {"fill_ratio": self.hydrostatic_pressure.nodes, "hydrostatic_pressure": self.hydrostatic_pressure.value.copy()}
+            | {
+                "fill_ratio": self.hydrostatic_pressure.nodes,
+                "hydrostatic_pressure": self.hydrostatic_pressure.value.copy(),
+            }
             | {name: np.array([value]) for name, value in scalars.items() if value is not None}
         )
 

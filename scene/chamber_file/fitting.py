@@ -148,7 +148,9 @@ def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[F
         problem += f"to {written(highest, 'mm')}: names exchanged, or the shaft is not mesh_axis"
         yield Finding(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
     elif _facing(points, boundaries[OUTER_WALL]) < _LEAST_FACING:
-        problem = f'"{OUTER_WALL}" lies along the radius, no part of it holds liquid outward: a plate or an end'
+        problem = (
+            f'"{OUTER_WALL}" lies along the radius, no part of it holds liquid outward: a plate or an end'
+        )
         yield Finding(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
 
 

@@ -168,7 +168,9 @@ def test_levels_that_leave_the_port(inner_port: CalibratedLaw) -> None:
     law = inner_port
     covered = float(
         np.interp(
-            law.path.port_pressure, law.hydrostatic_pressure(np.linspace(0, 0.5, 5001)), np.linspace(0, 0.5, 5001)
+            law.path.port_pressure,
+            law.hydrostatic_pressure(np.linspace(0, 0.5, 5001)),
+            np.linspace(0, 0.5, 5001),
         )
     )
     blown = law.evaluate(fill_ratio=[covered * 0.99, covered * 1.01], gas_pressure=1e6, primed=True)

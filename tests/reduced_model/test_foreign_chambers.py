@@ -1,4 +1,4 @@
-"""Chambers of foreign shape against arcs and Gauss points of their own: volume, moment, lambda, head, stall."""
+"""Chambers of foreign shape against quadratures of their own: volume, moment, lambda, head and stall."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OUTER, INNER, WIDTH, HALF = 44.5, 20.5, 62.0, float(np.radians(34.0))
 PILLARS: Final = ((34.0, float(np.radians(17.0)), 3.0), (34.0, float(np.radians(-17.0)), 3.0))
 """Radius and angle of the middle, and radius of each, mm and rad."""
 _FEW, _MANY = 3, 500
-"""Panels of four Gauss points along the angle and the shaft; many where the surface may leave the outer wall."""
+"""Panels of four Gauss points; many where the surface may leave the outer wall."""
 _STEP: Final = 0.05
 """Of the surface's radius, mm, for the derivative dU/dV: a relative error of (step/radius)^2."""
 _CLOSE: Final = 1e-4
@@ -48,13 +48,16 @@ def even(radius: float) -> Radius:
     return lambda angle, z: np.full(np.broadcast(angle, z).shape, radius)
 
 
+_OUTSIDE, _INSIDE = even(OUTER), even(INNER)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Shape:
     """R_in <= r <= R_out within an angle about a middle that may turn along the shaft, less pillars; mm."""
 
-    outer: Radius = even(OUTER)
+    outer: Radius = _OUTSIDE
     """R_out of the angle from the middle and of z."""
-    inner: Radius = even(INNER)
+    inner: Radius = _INSIDE
     twist: float = 0.0
     """Of the middle over the width, rad."""
     pillars: tuple[tuple[float, float, float], ...] = ()
@@ -154,7 +157,9 @@ def _round(pillar: tuple[float, float, float], cube: FloatArray) -> FloatArray:
     radius, angle, size = pillar
     side, along = np.divmod(4 * cube[..., 1] % 4, 1)
     low, high = (0.0, HALF) if angle > 0 else (-HALF, 0.0)
-    r = np.choose(side.astype(int), [OUTER, OUTER - along * (OUTER - INNER), INNER, INNER + along * (OUTER - INNER)])
+    r = np.choose(
+        side.astype(int), [OUTER, OUTER - along * (OUTER - INNER), INNER, INNER + along * (OUTER - INNER)]
+    )
     phi = np.choose(side.astype(int), [low + along * (high - low), high, high - along * (high - low), low])
     rim = np.stack([r * np.cos(phi), r * np.sin(phi)], axis=-1)
     middle = radius * np.array([np.cos(angle), np.sin(angle)])

@@ -116,7 +116,9 @@ def test_blocked_legs_stand_at_the_chambers_levels(point_scene: Scene, law: Cali
     found = HumpProfile.of(scene=point_scene, law=law, fill_ratio=0.25, gas_pressure=0.0)
     assert found.regime is Regime.BLOCKED
     first, second = np.flatnonzero(np.diff(found.full))
-    surface = np.sqrt(44.5e-3**2 - 2 * float(law.hydrostatic_pressure(0.25)) / DENSITY / point_scene.rotor.speed**2)
+    surface = np.sqrt(
+        44.5e-3**2 - 2 * float(law.hydrostatic_pressure(0.25)) / DENSITY / point_scene.rotor.speed**2
+    )
     np.testing.assert_allclose(found.radius[[first, second]], surface, rtol=1e-9)
     np.testing.assert_allclose(found.pressure[~found.full], 0.0)
     assert found.hump_pressure == 0.0

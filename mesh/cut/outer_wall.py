@@ -45,7 +45,7 @@ def axis_beside_shaft(geometry: ChamberGeometry) -> FloatArray | None:
 def _fitted(terms: FloatArray, square: FloatArray) -> tuple[FloatArray, float]:
     """Coefficients, and the largest departure over the mean."""
     found = np.linalg.lstsq(terms, square, rcond=None)[0]
-    return found, float(np.abs(terms @ found - square).max() / square.mean())
+    return np.asarray(found, dtype=np.float64), float(np.abs(terms @ found - square).max() / square.mean())
 
 
 def inward_share(geometry: ChamberGeometry) -> float:

@@ -162,7 +162,7 @@ def _under_gravity(
         disc=scene.disc, density=scene.liquid.density, gravity=gravity, fill_ratio=fills
     )
     displaced = np.append(displaced, displaced[:1], axis=0)
-    displaced[np.ix_([0, 1, 3], ~wet)] = 0.0
+    displaced[np.ix_(np.array([0, 1, 3]), ~wet)] = 0.0
     certain = closed & wet
     return np.where(closed, found, plain), closed, np.where(certain, quadrature, displaced)
 

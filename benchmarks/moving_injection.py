@@ -98,7 +98,7 @@ class Rival:
         if not primed:
             margin = gas_margin + (self.cleared(y) * (full_margin - gas_margin) if gas_margin > 0 else 0.0)
         rho, log_u = self.law.density, math.log(max(speed, 1e-12))
-        own, other = (float(self.law.wall_pressure(x)) for x in (y[0], 0.5 - y[0]))
+        own, other = (float(self.law.hydrostatic_pressure(x)) for x in (y[0], 0.5 - y[0]))
         whole = rho * math.exp(float(self.law.heads.head(log_u)))
         upper = rho * math.exp(float(self.hump_head(log_u)))
         full = (y[2] - y[3] + own - other - whole) / (rho * self.scene.tube.length)

@@ -7,7 +7,6 @@ mean over the axial width B, and alpha(r) the half-angle of the sector whose fre
 
 from __future__ import annotations
 
-import math
 from functools import partial
 
 import numpy as np
@@ -98,14 +97,16 @@ def wall_square(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
     """Mean over the outer wall of r^2 - a^2 where it is wet, m^2: times rho omega^2/2 the wall pressure."""
     if (table := imported_table(disc)) is not None:
         return table.at_radius(surface_radius, 3)
+    return head_square(disc=disc, surface_radius=surface_radius)
+
+
+def head_square(*, disc: Disc, surface_radius: npt.ArrayLike) -> FloatArray:
+    """R2^2 - a^2, m^2: times rho omega^2/2 the pressure of the liquid at the radius R2, whatever the walls.
+
+    Of an imported chamber R2 is the radius of its outermost place.
+    """
     a = np.asarray(surface_radius, dtype=np.float64)
-    return np.asarray((disc.outer_radius - a) * (disc.outer_radius + a), dtype=np.float64)
-
-
-def wall_radius(*, disc: Disc) -> float:
-    """Radius of the cylinder with the same mean pressure as the outer wall while that is wet, m."""
-    table = imported_table(disc)
-    return disc.outer_radius if table is None else math.sqrt(table.wall_square)
+    return np.maximum((disc.outer_radius - a) * (disc.outer_radius + a), 0.0)
 
 
 def chamber_volume(*, disc: Disc) -> float:

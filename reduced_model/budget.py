@@ -196,7 +196,7 @@ def _flow_parts(scene: Scene, calibration: _Calibrated) -> dict[str, _Parts]:
     found = levels | {
         "usable_moment": (
             rest.usable_pair_moment,
-            calibration.chamber.moment.interpolation,
+            float(np.max(calibration.chamber.moment.interpolation)),
             rest.usable_moment_uncertainty(scene, law=law),
         ),
         "velocity": (point.velocity, error * abs(point.velocity), float(flow.uncertainty)),
@@ -217,15 +217,16 @@ def _flow_parts(scene: Scene, calibration: _Calibrated) -> dict[str, _Parts]:
 
 
 def _level_parts(calibration: _Calibrated) -> dict[str, _Parts]:
-    """The same of the gas pressures that hydrostatics alone give, for which two wall pressures count."""
+    """The same of the gas pressures that hydrostatics alone give, for which two chambers count."""
     point, chamber = calibration.operating_point, calibration.chamber
-    _, numerical, model = _curve_parts(chamber.wall_pressure, chamber.reported[-1])
+    level = chamber.hydrostatic_pressure
+    _, numerical, model = _curve_parts(level, chamber.reported[-1])
     values = {
         "stall_pressure": point.stall,
         "priming_pressure_vented": point.priming_vented,
         "priming_pressure_trapped": point.priming_trapped,
     }
-    width = math.sqrt(2) * math.hypot(numerical, chamber.wall_pressure.interpolation)
+    width = math.sqrt(2) * math.hypot(numerical, float(level.interpolation[-1]))
     return {name: (value, width, math.sqrt(2) * model) for name, value in values.items() if value is not None}
 
 
@@ -249,7 +250,7 @@ def _law_without_inputs(scene: Scene, calibration: _Calibrated) -> CalibratedLaw
         law,
         heads=law.heads.without_inputs(scene=scene, velocity=point.loss_velocity or 1.0),
         inputs=DriveUncertainty(),
-        wall_pressure_uncertainty=chamber.wall_pressure.uncertainty_table(
+        hydrostatic_pressure_uncertainty=chamber.hydrostatic_pressure.uncertainty_table(
             inputs=np.zeros_like(chamber.fill_ratio)
         ),
     )

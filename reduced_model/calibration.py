@@ -143,8 +143,9 @@ def calibrate(scene: AnyScene) -> Calibration:
             "relative_residual": chamber.statistics.relative_residual,
             "tube_table_nodes": float(heads.head.value.size),
             "tube_table_error": heads.interpolation_error,
-            "wall_pressure_table_error_Pa": chamber.wall_pressure.interpolation,
-            "moment_table_error_kg_m": chamber.moment.interpolation,
+            "wall_pressure_table_error_Pa": float(np.max(chamber.wall_pressure.interpolation)),
+            "hydrostatic_pressure_table_error_Pa": float(np.max(chamber.hydrostatic_pressure.interpolation)),
+            "moment_table_error_kg_m": float(np.max(chamber.moment.interpolation)),
         },
     )
 

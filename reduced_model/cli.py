@@ -17,6 +17,7 @@ from rich.text import Text
 from ringbalance.reduced_model.budget import UNSTATED, believed, measured, rounded
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
+from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
 from ringbalance.reduced_model.documents import (
     PRESSURE_FACTORS,
     REMEDIES,
@@ -181,6 +182,8 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
         yield "note", UNSTATED[0].lower() + UNSTATED[1:].rstrip(".")
     if not chamber.status.ok:
         yield "note", chamber.status.text
+    for finding in mesh_findings(calibration.scene):
+        yield "warning", finding.change
     if calibration.instability is not None and calibration.instability.warning:
         yield "warning", calibration.instability.warning
 

@@ -13,7 +13,7 @@ from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.ends import draw_down_depth
 from ringbalance.physics.tube.uncertainty import TUBE_INPUTS
-from ringbalance.reduced_model.chamber.inputs import measured_closed_forms
+from ringbalance.reduced_model.chamber.inputs import chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.tube.heads import log_heads
 from ringbalance.reduced_model.tube.regime import ColumnFlow, TubeEnds, TubePath, column_flow
@@ -47,12 +47,12 @@ class Device:
         """The quantities of an uncertainty budget, SI; those of a flow only where there is one."""
         disc = self.scene.disc
         fills = np.array([0.0, disc.max_fill_ratio / 2, disc.max_fill_ratio])
-        pressure, moment, ratio = measured_closed_forms(scene=self.scene, fill_ratio=fills)
-        empty, half, full = (float(p) for p in pressure)
+        wall, moment, ratio = measured_closed_forms(scene=self.scene, fill_ratio=fills)
+        empty, half, full = (float(p) for p in chamber_pressure(scene=self.scene, fill_ratio=fills))
         equal, uneven = self._ends(half, half), self._ends(empty, full)
         found = {
             "chamber_volume": chamber_volume(disc=disc),
-            "wall_pressure": full,
+            "wall_pressure": float(wall[2]),
             "moment": float(moment[2]),
             "lambda": float(ratio[1]),
             "usable_moment": self._usable_moment(),
@@ -115,7 +115,7 @@ class Device:
         acceleration = self.scene.rotor.speed**2 * self.scene.tube.port_radius
         x = self.near_fill
         for _ in range(_ROUNDS):
-            pressure, _, _ = measured_closed_forms(scene=self.scene, fill_ratio=np.array([x, top - x]))
+            pressure = chamber_pressure(scene=self.scene, fill_ratio=np.array([x, top - x]))
             u = self._flow(self._ends(float(pressure[0]), float(pressure[1])), primed=True).velocity
             depth = float(draw_down_depth(flow_rate=self.scene.tube.area * u, acceleration=acceleration))
             level = min(max(self.scene.tube.port_radius - depth, disc.inner_radius), disc.outer_radius)

@@ -18,6 +18,7 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
 from ringbalance.reduced_model.chamber.gravity import closed_ring
+from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
 from ringbalance.reduced_model.chamber.values import paper_closed_forms, share_across
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -58,6 +59,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "tolerance": scene.tolerance,
         "gas_line": line_document(calibration.gas_line),
         "models_used": [asdict(term) for term in calibration.models_used],
+        "findings": [asdict(each) for each in mesh_findings(scene)],
         "status": {"code": str(calibration.chamber.status.code), "text": calibration.chamber.status.text},
         "statistics": dict(calibration.statistics),
     }
@@ -93,6 +95,7 @@ def _chamber(calibration: Calibration) -> dict[str, Any]:
             "row_status": [str(status) for status in chamber_status(calibration)],
         }
         | _curve(chamber.wall_pressure, at, "wall_pressure", "Pa")
+        | _curve(chamber.hydrostatic_pressure, at, "hydrostatic_pressure", "Pa")
         | _curve(chamber.moment, at, "moment", "kg_m")
         | {name: _listed(values) for name, values in paper_columns(calibration, fills).items()}
         | {"moment_angle_rad": _listed(np.arctan(share_across(scene.disc, fills)))}
@@ -110,8 +113,9 @@ def _check(check: ElementCheck) -> dict[str, Any]:
         "finite_element_solves": check.solves,
         "agrees": check.status.ok,
         "excess": check.excess,
+        "excess_by_quantity": dict(check.excesses),
     }
-    for name, unit in zip(CHECKED, ("Pa", "kg_m", "kg_m2"), strict=True):
+    for name, unit in zip(CHECKED, ("Pa", "kg_m", "kg_m2", "Pa"), strict=True):
         if name not in check.difference:
             continue
         estimate = getattr(check.elements, name)

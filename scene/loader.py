@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from importlib import resources
 from os import PathLike
 from pathlib import Path, PurePath
@@ -45,17 +45,22 @@ def read_scene(path: str | PathLike[str]) -> tuple[AnyScene, str]:
     name = str(path)
     file = name if name.isprintable() else toml_text(name)
     content = _content(name, file)
-    return scene_from(content=content, file=file), content.decode("utf-8-sig")
+    scene = scene_from(content=content, file=file, folder=Path(name).parent)
+    return scene, content.decode("utf-8-sig")
 
 
-def scene_from(*, content: bytes, file: str) -> AnyScene:
+def scene_from(*, content: bytes, file: str, folder: Path | None = None) -> AnyScene:
     """The scene of a scene file's bytes, in SI; `file` is its name, for messages and the scene's `source`.
 
+    Args: `folder`: from which files that it names are looked for; that of `file` by default.
     Raises: SceneError: anything in it is wrong; all of it is said at once.
     """
     document = _document(content, file)
-    read = _read_liquid_ring if _kind(document) == "liquid_ring" else _read_eccentric_mass
-    reading, found = read(document, file=file)
+    if _kind(document) == "liquid_ring":
+        folder = Path(file).parent if folder is None else folder
+        reading, found = _read_liquid_ring(document, file=file, folder=folder)
+    else:
+        reading, found = _read_eccentric_mass(document, file=file)
     found = (*found, *_origin_faults(reading, found))
     if found:
         raise SceneError(_sorted(found, reading.schema))
@@ -159,8 +164,11 @@ def _origin_faults(reading: Reading, found: Iterable[Fault]) -> Iterator[Fault]:
                 )
 
 
-def _read_liquid_ring(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
+def _read_liquid_ring(
+    document: Mapping[str, Any], *, file: str, folder: Path
+) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file, schema=LIQUID_RING)
+    reading = replace(reading, folder=folder)
     if any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
         reading, mesh_faults = deferred.with_chamber(reading)
         faults = (*faults, *mesh_faults)

@@ -16,7 +16,7 @@ from ringbalance.scene.chamber_file.elements import (
     GMSH_ORDER,
     dimension,
 )
-from ringbalance.scene.chamber_file.record import CellKind
+from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.verification.reference.block_chambers import sector_chamber
 
 GMSH_NUMBERS = {name: number for number, name in GMSH_KINDS.items()}
@@ -61,17 +61,22 @@ def drawn(kind: str = "tetra") -> Drawing:
     """A sector of 80 deg about the x axis, radii 20 mm and 40 mm, 30 mm long, of cells of a kind."""
     radii, angle = (20.0, 40.0), float(np.radians(80))
     chamber = sector_chamber(DIVISIONS, radii=radii, angle=angle, width=30.0, kind=cast(CellKind, kind))
+    return drawing_of(chamber)
+
+
+def drawing_of(chamber: ChamberGeometry) -> Drawing:
+    """The mesh of a chamber with its named boundaries, in the unit of its points."""
     used = np.unique(chamber.cells).tolist()
     numbers = {node: count + 1 for count, node in enumerate(used)}
     x, y, z = chamber.points[used].T.tolist()
     points = dict(zip(numbers.values(), zip(x, y, z, strict=True), strict=True))
     drawing = Drawing(points=points, elements={}, names={(3, CHAMBER): "chamber"})
-    for group, name in enumerate(NAMES, start=1):
+    for group, (name, facets) in enumerate(chamber.boundaries.items(), start=1):
         drawing.names[2, group] = name
-        for facet in chamber.boundaries[name].tolist():
+        for facet in facets.tolist():
             _add(drawing, FACET_KINDS[len(facet)], [numbers[node] for node in facet], group)
     for cell in chamber.cells.tolist():
-        _add(drawing, kind, [numbers[node] for node in cell], CHAMBER)
+        _add(drawing, chamber.kind, [numbers[node] for node in cell], CHAMBER)
     return drawing
 
 

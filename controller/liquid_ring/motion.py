@@ -89,7 +89,7 @@ def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:
         density=law.density,
         length=tube.length,
         crest_ends=(crest_span(tube)[1], 1 - crest_span(tube)[0]),
-        tables=(law.wall_pressure, law.heads.head, *to_crest),
+        tables=(law.hydrostatic_pressure, law.heads.head, *to_crest),
         port_pressure=law.path.port_pressure,
         crest=law.path.crest if to_crest else None,
         one_way=False,

@@ -22,6 +22,8 @@ from ringbalance.scene.chamber_file.record import ChamberGeometry
 
 SMOOTH: Final = np.pi / 6
 """Angle between two facets above which their edge is taken for one of the chamber."""
+COARSE: Final = np.radians(65)
+"""The same of a mesh without any curved edge, which may draw a round pillar as a hexagon."""
 SAFETY: Final = 1.5
 """On the estimate: an arc drawn by few facets has one edge less than facets."""
 _FLAT: Final = 1 / 12
@@ -44,6 +46,8 @@ class _Faceting:
     """x of the edge, m."""
     wall: float
     """Error of the mean of r^2 over the outer wall, m^2."""
+    steepest: float
+    """Largest angle between two facets that are taken for one smooth wall, rad."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,6 +62,8 @@ class DrawingError:
     """Mean of x over the free surface, m."""
     wall_square: FloatArray
     """Mean of r^2 - a^2 over the outer wall, m^2."""
+    level: FloatArray
+    """a^2 of the free surface, m^2."""
 
 
 @lru_cache(maxsize=8)
@@ -67,13 +73,14 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
     patches, outer = wall_patches(geometry)
     first, second, ends = _shared_edges(facets[:, :corners])
     areas = _areas(patches)
-    normals = _normals(patches, *np.array(_MIDDLES[corners]).T).reshape(-1, 3)
+    normals = normals_at(patches, *np.array(_MIDDLES[corners]).T).reshape(-1, 3)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     bend = np.arccos(np.clip((normals[first] * normals[second]).sum(axis=1), -1, 1))
-    bend = np.where(bend < SMOOTH, bend, 0.0)
+    shares = _share(geometry, facets, corners)
+    bend = np.where(bend < (COARSE if np.all(shares == _FLAT) else SMOOTH), bend, 0.0)
     sides = np.stack([first, second]) // corners
     # A triangle's height is twice its area over the edge; a quadrilateral has two edges across the bend.
-    share = _share(geometry, facets, corners) * (2 if corners == 3 else 0.5) * areas**2
+    share = shares * (2 if corners == 3 else 0.5) * areas**2
     places = geometry.points[ends]
     missed = bend * share[sides].sum(axis=0) / np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
     middle = places.mean(axis=1)
@@ -84,16 +91,17 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
         volume=missed,
         place=middle[:, 0],
         wall=float(2 * (radius * missed)[on_wall].sum() / areas[outer].sum()),
+        steepest=float(bend.max(initial=0.0)),
     )
 
 
 def _areas(patches: FloatArray) -> FloatArray:
     places, weights = gauss(3)
-    normals = _normals(patches, np.repeat(places, 3), np.tile(places, 3))
+    normals = normals_at(patches, np.repeat(places, 3), np.tile(places, 3))
     return np.asarray(np.linalg.norm(normals, axis=-1) @ np.outer(weights, weights).ravel())
 
 
-def _normals(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
+def normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
     """X_u x X_v at points, shape (patches, points, 3)."""
     one, zero = np.ones_like(u), np.zeros_like(u)
     at = [np.stack([one, t, t**2]) for t in (u, v)]
@@ -144,4 +152,5 @@ def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> Drawi
         moment=turned + TOLERANCE * table.columns[1, 0],
         centroid=aside.max(axis=0) + (missed.sum() / table.volume + SLOPE_TOLERANCE) * centroid,
         wall_square=wetness * (moved + SAFETY * walls.wall),
+        level=moved,
     )

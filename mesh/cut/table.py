@@ -62,11 +62,6 @@ class ChamberTable:
         """Of the whole chamber, m^3."""
         return float(self.columns[0, 0])
 
-    @cached_property
-    def wall_square(self) -> float:
-        """Mean of r^2 over the outer wall, m^2."""
-        return float(self.columns[3, 0] + self.nodes[0])
-
     def at(self, levels: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Columns and their derivatives by L, each of shape (4, ...); held beyond the ends."""
         level = np.asarray(levels, dtype=np.float64)

@@ -29,6 +29,9 @@ class TiltedLiquid:
 
     wall_square: FloatArray
     """Mean over the outer wall of |r + g/omega^2|^2 - b^2 where it is wet, m^2."""
+    surface_square: FloatArray
+    """b^2 - G^2 or, half-way along the chamber, c^2: minus 2/omega^2 times the potential of the free surface,
+    m^2."""
     moment: FloatArray
     """First moment along x, m^4."""
     centroid: FloatArray
@@ -48,13 +51,15 @@ def tilted_liquid(
     """
     fill = np.array(fills)
     if vertical or length == 0:
-        at_angles = [_at_angle(table, fill, np.zeros(2), 2 * length)]
+        at_angles, shift = [_at_angle(table, fill, np.zeros(2), 2 * length)], 0.0
     else:
         angles = 2 * np.pi * np.arange(turn) / turn
         at_angles = [_at_angle(table, fill, -length * np.array([np.cos(p), np.sin(p)]), 0.0) for p in angles]
-    columns = np.stack(at_angles, axis=-1)
+        shift = length**2
+    *columns, level = np.stack(at_angles, axis=-1)
     return TiltedLiquid(
         wall_square=columns[3] / table.wall_area,
+        surface_square=level - shift,
         moment=columns[1],
         centroid=columns[COLUMNS + 1] / columns[COLUMNS],
         closed=(columns[COLUMNS + 3] <= -(1 - _WET) * table.wall_area) | _deep(table, fill, length)[:, None],
@@ -68,7 +73,7 @@ def _deep(table: ChamberTable, fills: FloatArray, length: float) -> BoolArray:
 
 
 def _at_angle(table: ChamberTable, fills: FloatArray, centre: FloatArray, slope: float) -> FloatArray:
-    """The eight columns of `integrals`, shape (8, n), for one direction of gravity."""
+    """The eight columns of `integrals` and L, shape (9, n), for one direction of gravity."""
     walls = walls_about(*table.patches, centre=centre, slope=slope)
     wanted = fills * table.volume
     start = table.level_of(wanted)
@@ -84,4 +89,4 @@ def _at_angle(table: ChamberTable, fills: FloatArray, centre: FloatArray, slope:
             break
         level = level + np.clip(step, -reach, reach)
     columns[:COLUMNS] += step * columns[COLUMNS:]
-    return columns
+    return np.append(columns, [level + step], axis=0)

@@ -14,10 +14,11 @@ from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
 from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect
 from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
+from ringbalance.reduced_model.chamber.pressure_table import even_table, pressure_table
 from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import RingValues
-from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
+from ringbalance.reduced_model.tables import HermiteTable, level_table, table_from_samples
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -46,8 +47,9 @@ class Curve:
     """Expanded uncertainty (95 %) by the scene's uncertain inputs."""
     table: HermiteTable
     """Interpolates the values."""
-    interpolation: float
-    """Expanded uncertainty (95 %) of the table between its nodes."""
+    interpolation: FloatArray
+    """Expanded uncertainty (95 %) of the table about each of the fills that are nodes, between which a table
+    may have more."""
     status: Status
     """That of the whole range of fills."""
 
@@ -61,9 +63,11 @@ class Curve:
 
         Args: `inputs`: expanded uncertainty (95 %) by those inputs, along the fill ratio.
         """
-        squares = (self.uncertainty**2 + inputs**2 + self.interpolation**2)[: self.table.value.size]
-        nodes = self.table.nodes
-        return table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
+        count, nodes = self.interpolation.size, self.table.nodes
+        squares = (self.uncertainty**2 + inputs**2)[:count] + self.interpolation**2
+        # Errors of a finer table step where walls do.
+        made = table_from_samples if count == nodes.size else level_table
+        return made(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +87,9 @@ class ChamberCalibration:
     reported: tuple[int, ...]
     """Where these stand in `fill_ratio`."""
     wall_pressure: Curve
-    """Liquid part, mean over the outer wall, Pa."""
+    """Liquid part, mean over the outer wall, Pa: a load."""
+    hydrostatic_pressure: Curve
+    """Liquid part at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa: what drives the tube."""
     moment: Curve
     """U, kg m."""
     moment_per_mass: Estimate
@@ -135,16 +141,29 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     unmodelled = unmodelled_fractions(scene, fills)
     effects = input_effects(scene=scene, fill_ratio=fills)
     ring, effect = _as_measured(scene, ring, effect)
-    status = next((s for s in (ring.status, check.status) if not s.ok), chamber_status(scene))
+    waves = chamber_status(scene)
     scale = 0.0 if modelled else SAFETY
-    pressure, moment = (scale * np.abs(e) for e in (effect.wall_pressure, effect.moment))
-    pressures = [e.wall_pressure for e in effects.values()]
-    moments = [e.moment for e in effects.values()]
+
+    def curve(quantity: str, share: str) -> Curve:
+        value: Estimate = getattr(ring, quantity)
+        return _curve(
+            scene,
+            nodes,
+            replace(value, status=_first(ring.status, check.status_of(quantity), waves)),
+            quantity,
+            excess=check.excess_of(quantity),
+            gravity=scale * np.abs(getattr(effect, quantity)),
+            unmodelled=unmodelled[share],
+            inputs=[getattr(each, quantity) for each in effects.values()],
+        )
+
     central, numerical = _central(
         scene,
         nodes,
-        replace(ring.moment_per_volume, status=status),
-        check.excess,
+        replace(
+            ring.moment_per_volume, status=_first(ring.status, check.status_of("moment_per_volume"), waves)
+        ),
+        check.excess_of("moment_per_volume"),
         scale * effect.moment,
         unmodelled["moments"],
         ring.moment.value,
@@ -156,26 +175,23 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         check=check,
         reported_fill_ratio=reported,
         reported=tuple(int(np.argmin(np.abs(fills - x))) for x in reported),
-        wall_pressure=_curve(
-            nodes,
-            replace(ring.wall_pressure, status=status),
-            check.excess,
-            pressure,
-            unmodelled["pressures"],
-            pressures,
-        ),
-        moment=_curve(
-            nodes, replace(ring.moment, status=status), check.excess, moment, unmodelled["moments"], moments
-        ),
+        wall_pressure=curve("wall_pressure", "pressures"),
+        hydrostatic_pressure=curve("hydrostatic_pressure", "heads"),
+        moment=curve("moment", "moments"),
         moment_per_mass=central,
         moment_per_mass_numerical=numerical,
         moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
         input_effects=effects,
         gravity=effect,
         gravity_modelled=modelled,
-        status=status,
+        status=_first(ring.status, check.status, waves),
         statistics=check.elements.statistics,
     )
+
+
+def _first(*statuses: Status) -> Status:
+    """The first that is not OK."""
+    return next((each for each in statuses if not each.ok), statuses[-1])
 
 
 def _as_measured(scene: Scene, ring: RingValues, effect: GravityEffect) -> tuple[RingValues, GravityEffect]:
@@ -192,18 +208,20 @@ def _as_measured(scene: Scene, ring: RingValues, effect: GravityEffect) -> tuple
 
 
 def _curve(
+    scene: Scene,
     nodes: FloatArray,
     estimate: Estimate,
+    quantity: str,
+    *,
     excess: float,
     gravity: FloatArray,
     unmodelled: FloatArray,
     inputs: list[FloatArray],
 ) -> Curve:
     value, n = estimate.value, nodes.size
-    table = table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value[:n])
-    coarse = table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value[:n:2])
-    # Twice the step at worst triples the error; half of what the coarse table misses is on the safe side.
-    missed = float(np.max(np.abs(coarse(nodes) - value[:n])))
+    table, missed = even_table(nodes, value[:n])
+    if quantity == "hydrostatic_pressure":
+        table, missed = pressure_table(scene, nodes, value[:n])
     return Curve(
         value=value,
         numerical=estimate.uncertainty + (ROUND_OFF + excess) * np.abs(value),
@@ -211,7 +229,7 @@ def _curve(
         unmodelled=unmodelled * np.abs(value),
         inputs=np.sqrt(sum((i**2 for i in inputs), start=np.zeros_like(value))),
         table=table,
-        interpolation=missed / 2,
+        interpolation=missed,
         status=estimate.status,
     )
 

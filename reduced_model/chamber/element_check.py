@@ -10,23 +10,27 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.cut.table import TOLERANCE
+from ringbalance.mesh.cut.table import TOLERANCE, chamber_table
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics import deferred
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
-from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
+from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms, chamber_pressure
 from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
-CHECKED: Final = ("wall_pressure", "moment", "moment_per_volume")
-"""Of an imported chamber the first two."""
+CHECKED: Final = ("wall_pressure", "moment", "moment_per_volume", "hydrostatic_pressure")
+"""Of an imported chamber all but the third; of the built-in sector, whose wall has one radius, all but the
+last."""
+_STAND_IN: Final = {"moment_per_volume": "moment", "hydrostatic_pressure": "wall_pressure"}
+"""What is checked in the place of a quantity that is not."""
 _SHARE: Final = 0.1
-"""Of the tolerance, that the mesh may leave at the thinnest ring checked."""
+"""Of the tolerance, that the mesh may leave at the thinnest ring checked, of an imported chamber's drawn
+surface everywhere."""
 _RADIAL_CELLS: Final = 4
 """The pressure is quadratic in the place and so are the cells: only the arcs need more."""
 _MOST_ANGLE: Final = math.pi / 48
@@ -47,9 +51,23 @@ class ElementCheck:
     """Closed form less finite elements, by `CHECKED`, SI, shape (n,)."""
     allowed: Mapping[str, FloatArray]
     """Error of both, 95 %, by `CHECKED`, SI, shape (n,)."""
-    excess: float
-    """Largest difference beyond what is allowed, relative to the value; zero where they agree."""
+    excesses: Mapping[str, float]
+    """Largest difference beyond what is allowed, relative to the value, by `CHECKED`; zero where they
+    agree."""
     status: Status
+
+    @property
+    def excess(self) -> float:
+        """The largest of all quantities."""
+        return max(self.excesses.values())
+
+    def excess_of(self, quantity: str) -> float:
+        """That of one of `CHECKED`, or of what is checked in its place."""
+        return self.excesses[quantity if quantity in self.excesses else _STAND_IN[quantity]]
+
+    def status_of(self, quantity: str) -> Status:
+        """NOT_CONVERGED where finite elements failed, or contradict this quantity."""
+        return _status(self.elements, self.excess_of(quantity))
 
     @classmethod
     def of(cls, scene: Scene, *, values: RingValues, gravity: bool) -> ElementCheck:
@@ -73,7 +91,7 @@ class ElementCheck:
             gravity=held,
             cells=_meshes(scene, float(values.fill_ratio[at].min()), 3 if _axial(scene, held) else 2),
         )
-        closed_forms = {name: getattr(values, name) for name in CHECKED}
+        closed_forms = {name: getattr(values, name) for name in CHECKED if hasattr(elements, name)}
         here = {
             name: Estimate(value=each.value[at], uncertainty=each.uncertainty[at])
             for name, each in closed_forms.items()
@@ -88,12 +106,12 @@ class ElementCheck:
 
 def _imported(scene: Scene, geometry: ChamberGeometry, fills: FloatArray) -> ElementCheck:
     """Without gravity, on the scene's own mesh."""
-    pressure, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=fills)
+    pressure, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=np.append(fills, 1.0))
+    head = chamber_pressure(scene=scene, fill_ratio=np.append(fills, 1.0))
     # The table of the integrals is good to a share of the whole chamber.
-    share = TOLERANCE / fills
     closed_forms = {
-        "wall_pressure": Estimate(value=pressure, uncertainty=share * pressure),
-        "moment": Estimate(value=moment, uncertainty=share * moment),
+        name: Estimate(value=value[:-1], uncertainty=np.full(fills.shape, TOLERANCE * value[-1]))
+        for name, value in (("wall_pressure", pressure), ("moment", moment), ("hydrostatic_pressure", head))
     }
     return _compared(closed_forms, ImportedElements.of(scene, geometry, fill_ratio=fills), gravity=False)
 
@@ -101,20 +119,20 @@ def _imported(scene: Scene, geometry: ChamberGeometry, fills: FloatArray) -> Ele
 def _compared(
     closed_forms: Mapping[str, Estimate], elements: RingQuantities | ImportedElements, *, gravity: bool
 ) -> ElementCheck:
-    difference, allowed, beyond = {}, {}, []
+    difference, allowed, excesses = {}, {}, {}
     for name, closed_form in closed_forms.items():
         solved: Estimate = getattr(elements, name)
         difference[name] = closed_form.value - solved.value
         allowed[name] = closed_form.uncertainty + solved.uncertainty
-        beyond.append((np.abs(difference[name]) - allowed[name]) / np.abs(closed_form.value))
-    excess = max(0.0, float(np.max(beyond)))
+        beyond = (np.abs(difference[name]) - allowed[name]) / np.abs(closed_form.value)
+        excesses[name] = max(0.0, float(np.max(beyond)))
     return ElementCheck(
         elements=elements,
         gravity=gravity,
         difference=difference,
         allowed=allowed,
-        excess=excess,
-        status=_status(elements, excess),
+        excesses=excesses,
+        status=_status(elements, max(excesses.values())),
     )
 
 
@@ -192,7 +210,9 @@ class ImportedElements:
 
     fill_ratio: FloatArray
     wall_pressure: Estimate
-    """Pa, shape (n,)."""
+    """Mean over the whole outer wall, dry parts included, Pa, shape (n,)."""
+    hydrostatic_pressure: Estimate
+    """By the volume of the liquid as it is drawn, Pa, shape (n,)."""
     moment: Estimate
     """kg m, shape (n,)."""
     volume: FloatArray
@@ -215,7 +235,9 @@ class ImportedElements:
             )
             for radius in surface_radius(disc=disc, fill_ratio=fill_ratio)
         ]
-        pressure = np.array([float(ring.wall_pressure.value) for ring in rings])
+        wall = chamber_table(geometry).wall_area
+        wet = np.array([ring.loads[OUTER_WALL].area / wall for ring in rings])
+        pressure = wet * np.array([float(ring.wall_pressure.value) for ring in rings])
         moment = np.array([ring.first_moment[0] for ring in rings])
         volume = np.array([ring.volume for ring in rings])
         wanted = fill_ratio * chamber_volume(disc=disc)
@@ -225,9 +247,10 @@ class ImportedElements:
             fill_ratio=fill_ratio,
             wall_pressure=Estimate(
                 value=pressure,
-                uncertainty=np.array([float(ring.wall_pressure.uncertainty) for ring in rings])
+                uncertainty=wet * np.array([float(ring.wall_pressure.uncertainty) for ring in rings])
                 + _CUT * pressure,
             ),
+            hydrostatic_pressure=_by_volume(scene, geometry, fill_ratio, volume - wanted),
             # A free surface drawn by quadratic facets takes liquid off or adds some, all at the surface.
             moment=Estimate(value=moment, uncertainty=(_CUT + 2 * drawn) * np.abs(moment)),
             volume=volume,
@@ -235,3 +258,16 @@ class ImportedElements:
             status=status,
             statistics=rings[-1].statistics,
         )
+
+
+def _by_volume(
+    scene: Scene, geometry: ChamberGeometry, fill_ratio: FloatArray, surplus: FloatArray
+) -> Estimate:
+    """Pressure at R2 with the surface moved until the drawn liquid has lost a surplus, m^3.
+
+    da^2 = 2 dV/A on a free surface of area a A; it is drawn by facets, to a share of the tolerance.
+    """
+    value = chamber_pressure(scene=scene, fill_ratio=fill_ratio)
+    area = chamber_table(geometry).surface(surface_radius(disc=scene.disc, fill_ratio=fill_ratio))[0]
+    moved = scene.liquid.density * scene.rotor.speed**2 * surplus / area
+    return Estimate(value=value - moved, uncertainty=_SHARE * scene.tolerance * value)

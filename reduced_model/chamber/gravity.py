@@ -25,18 +25,21 @@ class GravityEffect:
 
     wall_pressure: FloatArray
     """Pa."""
+    hydrostatic_pressure: FloatArray
+    """Pa."""
     moment: FloatArray
     """kg m."""
 
     @classmethod
     def of(cls, scene: Scene, *, fill_ratio: FloatArray) -> GravityEffect:
         """Change of the means over a turn, a dry part of the outer wall included; zero where empty."""
-        pressure, moment = np.zeros_like(fill_ratio), np.zeros_like(fill_ratio)
+        pressure, hydrostatic, moment = (np.zeros_like(fill_ratio) for _ in range(3))
         wet = fill_ratio > 0
         still = replace(scene, environment=replace(scene.environment, gravity=0.0))
         ring, level = (TiltedRing.of(each, fill_ratio[wet]) for each in (scene, still))
         pressure[wet], moment[wet] = ring.wall_pressure - level.wall_pressure, ring.moment - level.moment
-        return cls(wall_pressure=pressure, moment=moment)
+        hydrostatic[wet] = ring.hydrostatic_pressure - level.hydrostatic_pressure
+        return cls(wall_pressure=pressure, hydrostatic_pressure=hydrostatic, moment=moment)
 
 
 def check_ring(scene: Scene) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.geometry import (
+    head_square,
     liquid_first_moment,
     surface_centroid,
     surface_radius,
@@ -37,6 +38,8 @@ class InputEffect:
 
     wall_pressure: FloatArray
     """Pa."""
+    hydrostatic_pressure: FloatArray
+    """Pa."""
     moment: FloatArray
     """kg m."""
     moment_per_mass: float
@@ -57,14 +60,18 @@ def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, Input
 def _effect(scene: Scene, fill_ratio: FloatArray, quantity: str, width: float) -> InputEffect:
     fills = np.append(fill_ratio, scene.disc.max_fill_ratio / 2)
     here, *sides = (
-        measured_closed_forms(scene=s, fill_ratio=fills)
+        (
+            *measured_closed_forms(scene=s, fill_ratio=fills),
+            chamber_pressure(scene=s, fill_ratio=fills),
+        )
         for s in (scene, *(shifted(scene=scene, quantity=quantity, change=c) for c in (-width, width)))
     )
-    pressure, moment, ratio = (
+    pressure, moment, ratio, hydrostatic = (
         np.maximum(np.abs(low - at), np.abs(high - at)) for at, low, high in zip(here, *sides, strict=True)
     )
     return InputEffect(
         wall_pressure=pressure[:-1],
+        hydrostatic_pressure=hydrostatic[:-1],
         moment=moment[:-1],
         moment_per_mass=float(ratio[-1]),
     )
@@ -75,8 +82,8 @@ def chamber_closed_forms(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Wall pressure, moment and lambda of a chamber without gravity.
 
-    P = rho omega^2 <r^2 - a^2>/2 over the wet outer wall, U = rho B int x dA, lambda = 2 <x> over the free
-    surface: in a sector P = rho omega^2 (R2^2 - a^2)/2 and lambda = 2 a sin(alpha)/alpha.
+    P = rho omega^2 <max(r^2 - a^2, 0)>/2 over the outer wall, U = rho B int x dA, lambda = 2 <x> over the
+    free surface: in a sector P = rho omega^2 (R2^2 - a^2)/2 and lambda = 2 a sin(alpha)/alpha.
     Returns: P, Pa, U, kg m, and lambda, m, the shape of `fill_ratio`.
     Source: hydrostatics with the chamber's exact geometry, that of its mesh where it is imported.
     """
@@ -87,6 +94,18 @@ def chamber_closed_forms(
         rho * disc.axial_width * liquid_first_moment(disc=disc, surface_radius=a),
         2 * surface_centroid(disc=disc, radius=a),
     )
+
+
+def chamber_pressure(*, scene: Scene, fill_ratio: npt.ArrayLike) -> FloatArray:
+    """What a chamber's liquid presses with at the outer radius R2, rho omega^2 (R2^2 - a^2)/2; no gravity.
+
+    The head of a chamber of any shape is this over rho, from R2; a mean over its walls is a load.
+    Returns: Pa, the shape of `fill_ratio`.
+    Source: Eq. 11 of the liquid-ring paper from the free surface outward.
+    """
+    a = surface_radius(disc=scene.disc, fill_ratio=fill_ratio)
+    scale = scene.liquid.density * scene.rotor.speed**2 / 2
+    return np.asarray(scale * head_square(disc=scene.disc, surface_radius=a))
 
 
 def measured_closed_forms(

@@ -52,7 +52,7 @@ def surface_tension(scene: Scene) -> float:
 
 
 def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
-    """Share of the wall pressure that surface tension can make, sigma (2/B + 1/(a alpha) + 1/a)/P.
+    """Share of the liquid's pressure at R2 that surface tension can make, sigma (2/B + 1/(a alpha) + 1/a)/P.
 
     The moment hardly feels it: the same share of a surface's shape, taken as a whole.
     Returns: Shares by "pressures" and "moments", along the fills, which are above zero.
@@ -86,17 +86,23 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
 
     An imported chamber has besides what its facets leave of smooth walls, and by how much its moment exceeds
     that along its middle, for which moments and lambda are given.
-    Returns: Relative, of "pressures" and "moments", shape (n,) each; zero without liquid.
+    Returns: Relative, of "pressures" (the wall's), "heads" and "moments", shape (n,) each; zero without
+        liquid.
     Source: sum of the estimates, errors of one sign at worst.
     """
     found, wet = {}, fills > 0
     common = wall_layers(scene, fills[wet])[0] + _wave_mean(scene, fills[wet])
     drawn = drawing_shares(scene.disc, fills[wet])
     aside = np.hypot(1.0, share_across(scene.disc, fills[wet])) - 1
-    own = {"pressures": drawn.wall_pressure, "moments": drawn.moment + aside}
-    for part, share in capillary_share(scene, fills[wet]).items():
+    tension = capillary_share(scene, fills[wet])
+    shares = {
+        "pressures": tension["pressures"] + common + drawn.wall_pressure,
+        "heads": tension["pressures"] + common + drawn.hydrostatic_pressure,
+        "moments": tension["moments"] + common + (drawn.moment + aside),
+    }
+    for part, share in shares.items():
         found[part] = np.zeros(fills.shape)
-        found[part][wet] = share + common + own[part]
+        found[part][wet] = share
     return found
 
 

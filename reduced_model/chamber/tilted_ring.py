@@ -54,6 +54,8 @@ class TiltedRing:
 
     wall_pressure: FloatArray
     """Mean over the outer wall and over a turn, Pa."""
+    hydrostatic_pressure: FloatArray
+    """Mean over a turn at the outer radius R2, half-way along the chamber, whatever the walls, Pa."""
     moment: FloatArray
     """U, mean over a turn, kg m."""
     moment_per_volume: FloatArray
@@ -70,7 +72,10 @@ class TiltedRing:
         """Wall pressure, moment and dU/dV' of a chamber under gravity, exactly for liquid at rest.
 
         p = rho omega^2 (|r + g/omega^2|^2 - b^2)/2; dU/dV' = rho int x w / int w on the surface,
-        w = 1/|grad p|.  On a horizontal shaft gravity turns across the chamber.
+        w = 1/|grad p|.  On a horizontal shaft gravity turns across the chamber.  At a place that turns with
+        the disc the mean of that over a turn is rho omega^2 (r^2 - a^2)/2, with a^2 the mean of
+        b^2 - (g/omega^2)^2, which both chambers of a pair share.  The tube is driven by that mean; what the
+        swing about it, of a share e of the driving pressure, takes off the mean velocity is e^2/16.
         Args: `fill_ratio`: x, shape (n,), above zero.
         Range: a surface that stays outside the plates' inner edge; the inner radius is not looked at.
         Source: Eqs. 9 to 11 of the liquid-ring paper with gravity and exact plates; hydrostatics.
@@ -90,11 +95,12 @@ class TiltedRing:
         is_open = ~np.all(found.closed, axis=1)
         if np.any(is_open) and table is None:
             parts = turned(fill_ratio[is_open], cut=True)
-            for name in ("wall_pressure", "moment", "moment_per_volume"):
+            for name in ("wall_pressure", "surface_square", "moment", "moment_per_volume"):
                 getattr(found, name)[is_open] = getattr(parts, name)
         scale = density * square / 2
         return cls(
             wall_pressure=scale * found.wall_pressure.mean(axis=1),
+            hydrostatic_pressure=scale * (disc.outer_radius**2 - found.surface_square.mean(axis=1)),
             moment=density * disc.axial_width * found.moment.mean(axis=1),
             moment_per_volume=density * found.moment_per_volume.mean(axis=1),
             wall_pressure_ripple=scale * _first_harmonic(found.wall_pressure),
@@ -108,6 +114,8 @@ class _Turned:
     """One quantity at every angle of gravity, shape (n, turn)."""
 
     wall_pressure: FloatArray
+    surface_square: FloatArray
+    """b^2 - G^2 or c^2, m^2."""
     moment: FloatArray
     moment_per_volume: FloatArray
     closed: BoolArray
@@ -129,6 +137,7 @@ def _imported(disc: Disc, table: ChamberTable, length: float, fills: FloatArray,
     )
     return _Turned(
         wall_pressure=found.wall_square.copy(),
+        surface_square=found.surface_square.copy(),
         moment=found.moment / disc.axial_width,
         moment_per_volume=found.centroid.copy(),
         closed=found.closed,
@@ -190,6 +199,7 @@ def _along(disc: Disc, length: float, fills: FloatArray, cut: bool) -> _Turned:
     moment = np.sum(weight * liquid_first_moment(disc=disc, surface_radius=radius), axis=1)
     return _Turned(
         wall_pressure=np.sum(weight * np.maximum(outer**2 - level, 0.0), axis=1)[:, None],
+        surface_square=search.value[:, None].copy(),
         moment=moment[:, None],
         moment_per_volume=(np.sum(weight * radius * np.sin(alpha), axis=1) / np.sum(weight * alpha, axis=1))[
             :, None
@@ -227,6 +237,7 @@ def _across(disc: Disc, length: float, fills: FloatArray, turn: int, cut: bool) 
     depth = wall - search.value[..., None]
     return _Turned(
         wall_pressure=np.sum(weight * np.maximum(depth, 0.0), axis=2),
+        surface_square=search.value - length**2,
         moment=np.sum(weight * _moment_on_rays(disc, radius, eta), axis=2),
         moment_per_volume=_mean(radius * np.cos(eta * half), share),
         closed=np.all(depth > 0, axis=2),

@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from ringbalance.mesh.cut.faceting import drawing_error
 from ringbalance.mesh.cut.table import chamber_table
-from ringbalance.mesh.geometry import half_angle, surface_radius
+from ringbalance.mesh.geometry import half_angle, head_square, surface_radius
 from ringbalance.physics.pressure.hydrostatics import displaced_by_gravity
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
+from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms, chamber_pressure
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, turn_samples
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Disc, Scene
@@ -102,7 +102,9 @@ class RingValues:
     surface_radius: FloatArray
     """Radius of the concentric free surface that holds the same volume, m."""
     wall_pressure: Estimate
-    """Mean over the outer wall, of the liquid alone, Pa."""
+    """Mean over the outer wall, of the liquid alone, Pa: a load."""
+    hydrostatic_pressure: Estimate
+    """At the outer radius R2, of the liquid alone, Pa: what drives the tube."""
     moment: Estimate
     """U, kg m."""
     moment_per_volume: Estimate
@@ -122,7 +124,8 @@ class RingValues:
         """
         disc, surface = scene.disc, surface_radius(disc=scene.disc, fill_ratio=fill_ratio)
         pressure, moment, ratio = chamber_closed_forms(scene=scene, fill_ratio=fill_ratio)
-        values = np.array([pressure, moment, scene.liquid.density * ratio / 2])
+        hydrostatic = chamber_pressure(scene=scene, fill_ratio=fill_ratio)
+        values = np.array([pressure, moment, scene.liquid.density * ratio / 2, hydrostatic])
         closed, extra = np.ones(fill_ratio.shape, dtype=np.bool_), np.zeros_like(values)
         if gravity:
             values, closed, extra = _under_gravity(scene, fill_ratio, values)
@@ -137,6 +140,7 @@ class RingValues:
             wall_pressure=parts[0],
             moment=parts[1],
             moment_per_volume=parts[2],
+            hydrostatic_pressure=parts[3],
             closed=closed,
             status=status,
         )
@@ -149,7 +153,7 @@ def _under_gravity(
     gravity, wet = scene.environment.gravity, fills > 0
     ring = TiltedRing.of(scene, fills[wet])
     found = plain.copy()
-    found[:, wet] = [ring.wall_pressure, ring.moment, ring.moment_per_volume]
+    found[:, wet] = [ring.wall_pressure, ring.moment, ring.moment_per_volume, ring.hydrostatic_pressure]
     closed = ~_spilling_ring(scene, fills) | ~wet
     closed[wet] &= ring.closed
     tilt = gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
@@ -157,7 +161,8 @@ def _under_gravity(
     displaced = displaced_by_gravity(
         disc=scene.disc, density=scene.liquid.density, gravity=gravity, fill_ratio=fills
     )
-    displaced[:2, ~wet] = 0.0
+    displaced = np.append(displaced, displaced[:1], axis=0)
+    displaced[np.ix_(np.array([0, 1, 3]), ~wet)] = 0.0
     certain = closed & wet
     return np.where(closed, found, plain), closed, np.where(certain, quadrature, displaced)
 
@@ -199,6 +204,7 @@ class _DrawingShares:
 
     volume: float
     wall_pressure: FloatArray
+    hydrostatic_pressure: FloatArray
     moment: FloatArray
     """Of the moment or of lambda, whichever is larger."""
 
@@ -206,12 +212,14 @@ class _DrawingShares:
 def drawing_shares(disc: Disc, fills: FloatArray) -> _DrawingShares:
     """Shares at fill ratios above zero; zeros for the sector of the keys."""
     if disc.geometry is None:
-        return _DrawingShares(volume=0.0, wall_pressure=np.zeros(fills.shape), moment=np.zeros(fills.shape))
+        none = np.zeros(fills.shape)
+        return _DrawingShares(volume=0.0, wall_pressure=none, hydrostatic_pressure=none, moment=none)
     table, error = chamber_table(disc.geometry), drawing_error(disc.geometry, fill_ratio=fills)
     a = np.sqrt(table.level_of(fills * table.volume))
     return _DrawingShares(
         volume=error.volume / table.volume,
         wall_pressure=error.wall_square / table.at_radius(a, 3),
+        hydrostatic_pressure=error.level / head_square(disc=disc, surface_radius=a),
         moment=np.maximum(error.moment / table.at_radius(a, 1), error.centroid / table.surface(a)[1]),
     )
 

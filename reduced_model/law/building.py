@@ -7,10 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius, wall_radius
+from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
 from ringbalance.physics.gas import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
+from ringbalance.reduced_model.chamber.pressure_table import pressure_table
 from ringbalance.reduced_model.chamber.values import RingValues, share_across
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
@@ -22,7 +23,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.uncertain import NORMAL_95, half_widths
 
-# Density and speed act on both wall pressures and on the tube at once, so the law handles them separately.
+# Density and speed act on both chambers and on the tube at once, so the law handles them separately.
 _SHARED: Final = ("density", "speed")
 _NEXT_TO_NOTHING: Final = 0.01
 """Of the tolerance: no mesh of a symmetric chamber is quite symmetric."""
@@ -31,16 +32,16 @@ _NEXT_TO_NOTHING: Final = 0.01
 def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads) -> CalibratedLaw:
     """Put the flow law together.
 
-    Source: Eqs. 13 to 18 of the liquid-ring paper, with finite-element wall pressures and k(u).
+    Source: Eqs. 13 to 18 of the liquid-ring paper, with exact chambers and k(u).
     """
-    own = [e.wall_pressure for name, e in chamber.input_effects.items() if name not in _SHARED]
+    own = [e.hydrostatic_pressure for name, e in chamber.input_effects.items() if name not in _SHARED]
     inputs = np.sqrt(sum((e**2 for e in own), start=np.zeros_like(chamber.fill_ratio)))
     no_inputs = np.zeros_like(chamber.fill_ratio)
     return _put_together(
         scene,
         heads=heads,
-        wall_pressure=chamber.wall_pressure.table,
-        wall_pressure_uncertainty=chamber.wall_pressure.uncertainty_table(inputs=inputs),
+        hydrostatic_pressure=chamber.hydrostatic_pressure.table,
+        hydrostatic_pressure_uncertainty=chamber.hydrostatic_pressure.uncertainty_table(inputs=inputs),
         inputs=_drive_uncertainty(scene),
         moment=CalibratedMoment(
             chamber_moment=chamber.moment.table,
@@ -66,8 +67,8 @@ def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
     return _put_together(
         scene,
         heads=TubeHeads.nominal(scene),
-        wall_pressure=table_from_samples(value=ring.wall_pressure.value, **ends),
-        wall_pressure_uncertainty=exact,
+        hydrostatic_pressure=pressure_table(scene, fills, ring.hydrostatic_pressure.value)[0],
+        hydrostatic_pressure_uncertainty=exact,
         inputs=DriveUncertainty(),
         moment=CalibratedMoment(
             chamber_moment=table_from_samples(value=scene.disc.moment_factor * ring.moment.value, **ends),
@@ -81,8 +82,8 @@ def _put_together(
     scene: Scene,
     *,
     heads: TubeHeads,
-    wall_pressure: HermiteTable,
-    wall_pressure_uncertainty: HermiteTable,
+    hydrostatic_pressure: HermiteTable,
+    hydrostatic_pressure_uncertainty: HermiteTable,
     inputs: DriveUncertainty,
     moment: CalibratedMoment,
 ) -> CalibratedLaw:
@@ -92,8 +93,8 @@ def _put_together(
         ambient_pressure=scene.gas.ambient_pressure,
         chamber_volume=chamber_volume(disc=scene.disc),
         tube_area=scene.tube.area,
-        wall_pressure=wall_pressure,
-        wall_pressure_uncertainty=wall_pressure_uncertainty,
+        hydrostatic_pressure=hydrostatic_pressure,
+        hydrostatic_pressure_uncertainty=hydrostatic_pressure_uncertainty,
         path=tube_path(scene),
         heads=heads,
         inputs=inputs,
@@ -103,7 +104,7 @@ def _put_together(
 
 
 def tube_path(scene: Scene) -> TubePath:
-    """Radii of the tube as pressures of a column that reaches from there to the outer wall.
+    """Radii of the tube as pressures of a column that reaches from there to the outer radius R2.
 
     Source: p(r) = rho omega^2 r^2/2 of liquid at rest in the rotating frame.
     """
@@ -123,7 +124,7 @@ def tube_path(scene: Scene) -> TubePath:
 
 
 def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
-    """Pressure of a liquid column from a radius to the outer wall.
+    """Pressure of a liquid column from a radius to the outer radius R2.
 
     Returns: Pa, the shape of `radius`.
     Source: Eq. 11 of the liquid-ring paper, integrated.
@@ -132,7 +133,7 @@ def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
         density=scene.liquid.density,
         angular_velocity=scene.rotor.speed,
         inner=radius,
-        outer=wall_radius(disc=scene.disc),
+        outer=scene.disc.outer_radius,
     )
 
 

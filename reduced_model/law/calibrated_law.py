@@ -1,4 +1,4 @@
-"""The flow law distilled from finite-element wall pressures and the tube's loss, with all its regimes.
+"""The flow law distilled from a chamber's free surface and the tube's loss, with all its regimes.
 
 Beside it the moment of a pair of chambers, from the same chamber.
 """
@@ -50,8 +50,8 @@ class CalibratedLaw:
     at rest, and when a chamber's liquid leaves the port open.
 
     `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
-    (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `wall_pressure` (Pa), and, of shape (1,),
-    `density`, `port_pressure`, `hump_pressure` (only with a crest), `vapour_pressure` (gauge, Pa), and
+    (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `hydrostatic_pressure` (Pa), and, of shape
+    (1,), `density`, `port_pressure`, `hump_pressure` (only with a crest), `vapour_pressure` (gauge, Pa), and
     `released` and `froude_velocity` (m/s) of `SiphonCrest`.
     """
 
@@ -65,9 +65,9 @@ class CalibratedLaw:
     """V, m^3."""
     tube_area: float
     """S, m^2."""
-    wall_pressure: HermiteTable
-    """Level of a chamber, Pa, over its fill ratio."""
-    wall_pressure_uncertainty: HermiteTable
+    hydrostatic_pressure: HermiteTable
+    """Of a chamber's liquid at the outer radius R2, rho omega^2 (R2^2 - a^2)/2, Pa, over its fill ratio."""
+    hydrostatic_pressure_uncertainty: HermiteTable
     """Its expanded uncertainty (95 %), Pa, over the fill ratio."""
     path: TubePath
     """Radii of the tube, as pressures."""
@@ -118,8 +118,8 @@ class CalibratedLaw:
         y = self.max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
         gas, own, other = np.broadcast_arrays(
             self.gas_factor * np.asarray(gas_pressure, dtype=np.float64),
-            np.maximum(self.wall_pressure(x), 0.0),
-            np.maximum(self.wall_pressure(y), 0.0),
+            np.maximum(self.hydrostatic_pressure(x), 0.0),
+            np.maximum(self.hydrostatic_pressure(y), 0.0),
         )
         return TubeEnds(
             upstream_gas=gas,
@@ -138,8 +138,8 @@ class CalibratedLaw:
             allowed = (asked.gas_pressure > 0) & (asked.primed | (not reverse))
         return Drive(
             ends=ends.reversed() if reverse else ends,
-            upstream_uncertainty=self.wall_pressure_uncertainty(other if reverse else own),
-            downstream_uncertainty=self.wall_pressure_uncertainty(own if reverse else other),
+            upstream_uncertainty=self.hydrostatic_pressure_uncertainty(other if reverse else own),
+            downstream_uncertainty=self.hydrostatic_pressure_uncertainty(own if reverse else other),
             primed=asked.primed,
             allowed=allowed,
         )
@@ -177,7 +177,10 @@ class CalibratedLaw:
         return (
             {"log_velocity": self.heads.head.nodes}
             | {name: table.value.copy() for name, table in heads.items() if table is not None}
-            | {"fill_ratio": self.wall_pressure.nodes, "wall_pressure": self.wall_pressure.value.copy()}
+            | {
+                "fill_ratio": self.hydrostatic_pressure.nodes,
+                "hydrostatic_pressure": self.hydrostatic_pressure.value.copy(),
+            }
             | {name: np.array([value]) for name, value in scalars.items() if value is not None}
         )
 

@@ -140,7 +140,7 @@ def _within(fill_ratio: npt.ArrayLike, largest: float, name: str) -> FloatArray:
 
 
 FORMAT: Final = "ringbalance law"
-VERSION: Final = 2
+VERSION: Final = 3
 
 
 def save_record(*, path: Path, record: object) -> Path:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.mesh.geometry import wall_radius
 from ringbalance.physics.gas import vented_pressure
 from ringbalance.physics.pressure.hydrostatics import column_radius
 from ringbalance.physics.roots import bracketed_root
@@ -284,7 +283,7 @@ def _rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pr
         `crest_pressure`: D_m, column from the crest to the outer wall, Pa.
     Source: hydrostatics in the rotating frame; Boyle's law.
     """
-    outer, covered = wall_radius(disc=scene.disc), ends.upstream_covered()
+    outer, covered = scene.disc.outer_radius, ends.upstream_covered()
     near, far = ends.upstream_pressure(), ends.downstream_pressure()
 
     def leg(pressure: float, *, far_leg: bool) -> float:

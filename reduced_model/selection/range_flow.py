@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.chamber.values import by_closed_form
+from ringbalance.reduced_model.chamber.inputs import chamber_pressure
 from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.tube.heads import crest_head
@@ -215,7 +215,7 @@ def range_velocities(scene: Scene) -> FloatArray:
 
 def range_ends(scene: Scene) -> TubeEnds[FloatArray]:
     """Pressures at the tube's ends at the points, by the closed form."""
-    own = np.array([by_closed_form(scene, scene.disc.max_fill_ratio * x).wall_pressure for x in SHARES])
+    own = chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio * np.array(SHARES))
     return TubeEnds(
         upstream_gas=np.full_like(own, pressure_factor(scene) * scene.gas.pressure),
         downstream_gas=np.zeros_like(own),

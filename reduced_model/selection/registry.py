@@ -14,9 +14,9 @@ from typing import Final, Literal
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.gas import HEAT_CAPACITY_RATIO
 from ringbalance.reduced_model import paper
+from ringbalance.reduced_model.chamber.inputs import chamber_pressure
 from ringbalance.reduced_model.chamber.range import mean_gravity
 from ringbalance.reduced_model.chamber.terms import MEAN, PLATES
-from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.contribution import Contribution, percent
 from ringbalance.reduced_model.selection.estimates import (
     FILLING,
@@ -209,7 +209,7 @@ def _sloshing(term: Term, scene: Scene, estimate: Contribution) -> Selection:
 def _crest(term: Term, scene: Scene, _: Contribution) -> Selection:
     if scene.tube.hump_radius is None:
         return term.models[0], "Eq. 18 as it stands"
-    moved = by_closed_form(scene, scene.disc.max_fill_ratio / 2).wall_pressure / 1e6
+    moved = float(chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2)) / 1e6
     threshold = f"vented or trapped moves the threshold by up to {moved:.3g} MPa"
     gas = "vapour" if scene.liquid.dissolved_gas == "none" else "vapour or released gas"
     return (

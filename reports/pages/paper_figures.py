@@ -85,7 +85,7 @@ def _constants(scene: Scene, model: BalancerModel) -> Record:
 def _velocities(scene: Scene, calibration: Calibration) -> list[Record]:
     """Eq. 19, the same k with the finite elements' levels, and the calibrated law, at both pressures."""
     law, fill = calibration.flow_law, np.linspace(0.0, scene.disc.max_fill_ratio, _FILLS)
-    rise = law.wall_pressure(fill) - law.wall_pressure(scene.disc.max_fill_ratio - fill)
+    rise = law.hydrostatic_pressure(fill) - law.hydrostatic_pressure(scene.disc.max_fill_ratio - fill)
     found = []
     printed = (paper_numbers.DEPARTURE_LOW, paper_numbers.DEPARTURE_HIGH)
     pressures = (paper_numbers.LOW_PRESSURE, paper_numbers.HIGH_PRESSURE)

@@ -146,7 +146,7 @@ def _drive(law: CalibratedLaw, batch: LiquidBatch) -> _Drive:
     inputs, ratio = law.inputs, batch.density / law.density
     ends, crest = _ends(law, batch, ratio), _crest(law, batch, ratio)
     gas, hydrostatic = ends.upstream_gas, ends.upstream_hydrostatic
-    uncertainty_95 = ratio * np.sqrt(2) * float(law.wall_pressure_uncertainty(law.max_fill_ratio / 2))
+    uncertainty_95 = ratio * np.sqrt(2) * float(law.hydrostatic_pressure_uncertainty(law.max_fill_ratio / 2))
     gas_uncertainty = np.hypot(batch.relative_density, inputs.relative_gas_pressure) * gas
     full = _Drive(
         siphon=gas / batch.density,
@@ -178,7 +178,7 @@ def _drive(law: CalibratedLaw, batch: LiquidBatch) -> _Drive:
 def _ends(law: CalibratedLaw, batch: LiquidBatch, ratio: FloatArray) -> TubeEnds[FloatArray]:
     gas, hydrostatic = (
         law.gas_factor * batch.gas_pressure,
-        ratio * float(law.wall_pressure(law.max_fill_ratio / 2)),
+        ratio * float(law.hydrostatic_pressure(law.max_fill_ratio / 2)),
     )
     return TubeEnds(
         upstream_gas=gas,

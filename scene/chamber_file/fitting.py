@@ -28,6 +28,8 @@ from ringbalance.scene.units import DIMENSIONS
 DRAWING_ROUNDING: Final = 1e-5
 _DIGITS: Final = 7
 """Of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
+_LEAST_FACING: Final = 0.01
+"""Radial part of the outer wall's normals, on average, below which the wall is none."""
 _SHARES: Final = tuple(step / 32 for step in range(33))
 """Of an edge of second order, between which it is as good as straight: a share 1e-3 of its bulge."""
 
@@ -145,6 +147,20 @@ def _walls(points: FloatArray, boundaries: Mapping[str, IntArray]) -> Iterator[F
         problem = f'"{OUTER_WALL}" reaches to a radius of {written(float(wall.max()), "mm")}, but "{name}" '
         problem += f"to {written(highest, 'mm')}: names exchanged, or the shaft is not mesh_axis"
         yield Finding(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
+    elif _facing(points, boundaries[OUTER_WALL]) < _LEAST_FACING:
+        problem = (
+            f'"{OUTER_WALL}" lies along the radius, no part of it holds liquid outward: a plate or an end'
+        )
+        yield Finding(problem=problem, allowed=f'"{OUTER_WALL}" at the outside of the chamber')
+
+
+def _facing(points: FloatArray, facets: IntArray) -> float:
+    """Mean size of the radial part of a boundary's normals, by its corners."""
+    corner = points[facets[:, :3]]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    middle = corner.mean(axis=1)[:, :2]
+    radial = np.abs((normal[:, :2] * middle).sum(axis=1)) / np.linalg.norm(middle, axis=1)
+    return float(radial.sum() / np.linalg.norm(normal, axis=1).sum())
 
 
 def port_radius(points: FloatArray, boundaries: Mapping[str, IntArray]) -> float | None:

@@ -108,7 +108,7 @@ def _following(reading: Reading, geometry: ChamberGeometry, found: Placed) -> Re
 def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
     """The mesh of a scene. Raises: MeshFileError: with all that is wrong with it."""
     name = reading.values["disc.mesh"]
-    path = Path(reading.file).parent / name
+    path = reading.folder / name
     content = _content_of(path)
     unit = _STEP_UNIT if _is_step(path) else reading.values["disc.mesh_unit"]
     contents = _contents_of(path, content, tolerance=reading.values["accuracy.tolerance"])

@@ -22,11 +22,15 @@ import numpy.typing as npt
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.contents import Contents, Elements, MeshFileError, numbers_in, whole
-from ringbalance.scene.chamber_file.elements import NODES, VTK_KINDS
+from ringbalance.scene.chamber_file.elements import MOST_NODES, NODES, VTK_KINDS
 from ringbalance.scene.chamber_file.names import KNOWN_NAMES
 
-_LARGEST: Final = 2**28
-"""Bytes of one unpacked array."""
+_MOST_CONNECTED: Final = 12 * MOST_NODES
+"""Numbers in the connectivity: of cells of ten nodes, which share most of them."""
+_MOST_CELLS: Final = 2 * MOST_NODES
+"""With facets among them."""
+_MEMORY: Final = 2**26
+"""Bytes that unpacking by lzma may take for itself."""
 _TYPES: Final = MappingProxyType(
     {
         **{f"Int{8 * size}": f"i{size}" for size in (1, 2, 4, 8)},
@@ -58,16 +62,20 @@ def read_vtu(content: bytes) -> Contents:
             f"it has {len(pieces)} pieces of an UnstructuredGrid", "a .vtu file with one piece"
         )
     piece = pieces[0]
-    points = _numbers(piece.findall("./Points/DataArray"), coding, "Points")
+    points = _numbers(piece.findall("./Points/DataArray"), coding, "Points", most=3 * MOST_NODES)
     cells = {each.get("Name", ""): each for each in piece.findall("./Cells/DataArray")}
     connectivity, offsets, types = (
-        whole(_numbers([cells[name]] if name in cells else [], coding, name), name)
-        for name in ("connectivity", "offsets", "types")
+        whole(_numbers([cells[name]] if name in cells else [], coding, name, most=most), name)
+        for name, most in (
+            ("connectivity", _MOST_CONNECTED),
+            ("offsets", _MOST_CELLS),
+            ("types", _MOST_CELLS),
+        )
     )
     if len(points) % 3 or len(offsets) != len(types):
         raise MeshFileError.of(f"the lengths of its arrays do not fit: {_DAMAGED}")
     data = {
-        name: _numbers([each], coding, name)
+        name: _numbers([each], coding, name, most=_MOST_CELLS)
         for each in piece.findall("./CellData/DataArray")
         if (name := each.get("Name", "")) in (*KNOWN_NAMES, "chamber")
     }
@@ -109,42 +117,44 @@ def _document(content: bytes) -> tuple[ElementTree.Element, _Coding]:
     return root, _Coding(header=header, order=order, compressor=compressor, appended=appended, raw=raw)
 
 
-def _numbers(arrays: list[ElementTree.Element], coding: _Coding, what: str) -> FloatArray:
-    """The numbers of an array, however it is stored."""
+def _numbers(arrays: list[ElementTree.Element], coding: _Coding, what: str, *, most: int) -> FloatArray:
+    """The numbers of an array, however it is stored; `most`: as many as a mesh of the largest size has."""
     kind = _TYPES.get(arrays[0].get("type", "")) if arrays else None
     if kind is None:
         raise MeshFileError.of(f"its array {what[:40]} is missing, or of no type that is known: {_DAMAGED}")
     text, form = (arrays[0].text or "").encode(), arrays[0].get("format", "ascii")
     if form == "ascii":
         return numbers_in(text, what)
-    offset = arrays[0].get("offset", "0")
+    offset, size = arrays[0].get("offset", "0"), int(kind[1:])
     if form == "appended" and (not offset.isdigit() or len(offset) > 12):
         raise MeshFileError.of(f"its array {what[:40]} has no place in the appended data: {_DAMAGED}")
     try:
         if form == "appended":
             stored = coding.appended[int(offset) :]
-            content = _unpacked(stored, coding, coded=not coding.raw)
+            content = _unpacked(stored, coding, coded=not coding.raw, most=most * size)
         else:
-            content = _unpacked(text.strip(), coding, coded=True)
+            content = _unpacked(text.strip(), coding, coded=True, most=most * size)
         return np.frombuffer(content, dtype=coding.order + kind).astype(np.float64)
     except (ValueError, IndexError, binascii.Error, zlib.error, lzma.LZMAError, EOFError) as error:
         raise MeshFileError.of(f"its array {what[:40]} cannot be unpacked: {_DAMAGED}") from error
 
 
-def _unpacked(stored: bytes, coding: _Coding, *, coded: bool) -> bytes:
+def _unpacked(stored: bytes, coding: _Coding, *, coded: bool, most: int) -> bytes:
     """Bytes of one array: its length, or the lengths of its compressed blocks, stand before it."""
     size = coding.header.itemsize
     if not coding.compressor:
         length = int(_head(stored, coding, 1, coded=coded)[0])
-        _bounded(length)
+        _bounded(length, most)
         if not coded:
             return stored[size : size + length]
         # Some writers code the length by itself, which ends with padding, and others together with the data.
         ends = _coded_length(size)
         together = not stored[:ends].endswith(b"=")
         return _plain(stored, size + length)[size:] if together else _plain(stored[ends:], length)
-    count, block, _last = _head(stored, coding, 3, coded=coded).tolist()
-    _bounded(count * max(block, 1))
+    count, block, last = _head(stored, coding, 3, coded=coded).tolist()
+    # The last block may be as good as empty.
+    _bounded(max(count - 1, 0) * max(block, 1) + last, most)
+    _bounded(max(count, block), most)
     lengths = _head(stored, coding, 3 + count, coded=coded)[3:].tolist()
     at = _coded_length((3 + count) * size) if coded else (3 + count) * size
     body = _plain(stored[at:], sum(lengths)) if coded else stored[at:]
@@ -172,12 +182,16 @@ def _plain(stored: bytes, size: int) -> bytes:
 def _expanded(packed: bytes, compressor: str, most: int) -> bytes:
     if compressor == "vtkZLibDataCompressor":
         return zlib.decompressobj().decompress(packed, max(most, 1))
-    return lzma.LZMADecompressor(memlimit=_LARGEST).decompress(packed, max(most, 1))
+    return lzma.LZMADecompressor(memlimit=_MEMORY).decompress(packed, max(most, 1))
 
 
-def _bounded(size: int) -> None:
-    if not 0 <= size <= _LARGEST:
-        raise MeshFileError.of(f"one of its arrays would have {size} bytes", f"up to {_LARGEST} bytes")
+def _bounded(size: int, most: int) -> None:
+    """Before anything is unpacked: what is small in the file may grow a thousand times."""
+    if not 0 <= size <= most:
+        raise MeshFileError.of(
+            f"one of its arrays would have {size} bytes",
+            f"up to {most} bytes, for {MOST_NODES} nodes or cells",
+        )
 
 
 def _blocks(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any, Literal
 
 from ringbalance.scene.faults import MISSING, Fault, closest, did_you_mean, toml_key, toml_text
@@ -38,7 +38,7 @@ class Reading:
     """What is known of a scene file so far; paths are "table.key", or "key" at the top level."""
 
     file: str
-    """As it was named."""
+    """As it was named, for messages."""
     document: Mapping[str, Any]
     """As TOML has it."""
     values: Mapping[str, Any]
@@ -49,6 +49,8 @@ class Reading:
     """What such a file can hold."""
     derived: frozenset[str] = frozenset()
     """Paths of values that another file gives, which this one names."""
+    folder: Path = Path()
+    """Of the file, from which others that it names are looked for."""
 
     def adding(self, values: Mapping[str, Any]) -> Reading:
         """Copy with more values, SI, by path."""

@@ -118,10 +118,10 @@ def test_the_column_separates_where_the_hump_would_cavitate(
     assert law.heads.hump_head is not None
     separated = []
     for u in np.linspace(0.5, 40.0, 24):
-        surplus = 1.5e6 + float(law.wall_pressure(0.25)) - float(law.wall_pressure(0.25))
+        surplus = 1.5e6 + float(law.hydrostatic_pressure(0.25)) - float(law.hydrostatic_pressure(0.25))
         full = (surplus / 1000 - math.exp(float(law.heads.head(math.log(float(u)))))) / 0.12
         head = math.exp(float(law.heads.hump_head(math.log(float(u)))))
-        over = 1.5e6 + float(law.wall_pressure(0.25)) - float(law.path.hump_pressure or 0.0)
+        over = 1.5e6 + float(law.hydrostatic_pressure(0.25)) - float(law.path.hump_pressure or 0.0)
         over -= 1000 * (head + 0.7203831 * 0.12 * full)
         separated.append(over < 0.5 * law.path.vapour_pressure)  # halfway to the vented chamber's 0 Pa
         whole, broken = column.accelerations((0.25, 0.25), (1.5e6, 0.0), speed=float(u))

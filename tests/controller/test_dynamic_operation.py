@@ -90,7 +90,7 @@ class Independent:
         self.model = model
 
     def level(self, x: float) -> float:
-        return float(self.law.wall_pressure(x))
+        return float(self.law.hydrostatic_pressure(x))
 
     def phi(self, up: float, down: float) -> float:
         b = self.gas.critical_ratio or 0.0

@@ -80,7 +80,7 @@ class Column:
         return low
 
     def level(self, x: float) -> float:
-        return float(self.law.wall_pressure(x))
+        return float(self.law.hydrostatic_pressure(x))
 
     def lifted(self, x: float, p: Callable[[float], float], start: float) -> tuple[float, float]:
         """Time, s, and velocity, m/s, at which the front reaches the crest's end under p(t), gauge."""

@@ -63,7 +63,7 @@ def test_siphon_obeys_the_energy_balance(law: CalibratedLaw, point_scene: Scene)
     flow = law.evaluate(fill_ratio=x, gas_pressure=p)
     assert np.all(flow.regime == Regime.SIPHON)
     loss = tube_loss(point_scene, flow.velocity)
-    surplus = p + law.wall_pressure(x) - law.wall_pressure(0.5 - x)
+    surplus = p + law.hydrostatic_pressure(x) - law.hydrostatic_pressure(0.5 - x)
     np.testing.assert_allclose((loss.k.value + 1) * 1000 * flow.velocity**2 / 2, surplus, rtol=1e-8)
 
 
@@ -75,7 +75,7 @@ def test_separated_flow_obeys_the_humps_balance_and_forgets_the_receiving_chambe
     assert np.ptp(flow.velocity) == 0.0
     loss = tube_loss(point_scene, flow.velocity)
     hump = column_pressure(scene=point_scene, radius=31.5e-3)
-    margin = 0.6e6 + AMBIENT - 2339.0 + law.wall_pressure(0.4) - hump
+    margin = 0.6e6 + AMBIENT - 2339.0 + law.hydrostatic_pressure(0.4) - hump
     head = (loss.state.kinetic_factor + loss.state.upstream_loss(0.5)) * 1000 * flow.velocity**2 / 2
     np.testing.assert_allclose(head, margin, rtol=1e-8)
 
@@ -168,7 +168,9 @@ def test_levels_that_leave_the_port(inner_port: CalibratedLaw) -> None:
     law = inner_port
     covered = float(
         np.interp(
-            law.path.port_pressure, law.wall_pressure(np.linspace(0, 0.5, 5001)), np.linspace(0, 0.5, 5001)
+            law.path.port_pressure,
+            law.hydrostatic_pressure(np.linspace(0, 0.5, 5001)),
+            np.linspace(0, 0.5, 5001),
         )
     )
     blown = law.evaluate(fill_ratio=[covered * 0.99, covered * 1.01], gas_pressure=1e6, primed=True)
@@ -271,7 +273,7 @@ def test_uncertainty_of_a_turbulent_siphon_is_half_that_of_k_plus_1(
 def test_table_inverts_to_the_law(law: CalibratedLaw) -> None:
     table = law.table()
     x, p = 0.2, 1.5e6
-    level = np.interp([x, 0.5 - x], table["fill_ratio"], table["wall_pressure"])
+    level = np.interp([x, 0.5 - x], table["fill_ratio"], table["hydrostatic_pressure"])
     head = (p + level[0] - level[1]) / table["density"][0]
     u = np.exp(np.interp(np.log(head), table["log_head"], table["log_velocity"]))
     assert u == pytest.approx(float(law.evaluate(fill_ratio=x, gas_pressure=p).velocity), rel=1e-4)

@@ -105,9 +105,9 @@ def test_random_discs_agree_within_1e_6_and_their_own_bars(table_1_scene: Scene,
     between = np.linspace(0, scene.disc.max_fill_ratio, 14)[1:-1]
     for x in between:
         level = density * omega**2 * (scene.disc.outer_radius**2 - exact.surface(float(x)) ** 2) / 2
-        assert float(found.flow_law.wall_pressure(x)) == pytest.approx(level, rel=2e-6)
-        assert abs(float(found.flow_law.wall_pressure(x)) - level) <= float(
-            found.flow_law.wall_pressure_uncertainty(x)
+        assert float(found.flow_law.hydrostatic_pressure(x)) == pytest.approx(level, rel=2e-6)
+        assert abs(float(found.flow_law.hydrostatic_pressure(x)) - level) <= float(
+            found.flow_law.hydrostatic_pressure_uncertainty(x)
         )
 
 

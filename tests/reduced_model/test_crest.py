@@ -75,7 +75,7 @@ def by_hand(scene: Scene, *, cavity: float, fill: float, gas: float, law: Calibr
             lost = float(loss.state.kinetic_factor) + terms["entrance"] + terms["bends"] / 2
             lost += spread * (taut / 2 + string) / taut
             column = DENSITY * square * (PORT**2 - radius**2) / 2
-            return gas + float(law.wall_pressure(fill)) - column - lost * DENSITY * u * u / 2
+            return gas + float(law.hydrostatic_pressure(fill)) - column - lost * DENSITY * u * u / 2
 
         found = minimize_scalar(pressure, bounds=(0.0, taut / 4), method="bounded", options={"xatol": 1e-9})
         return float(found.fun)

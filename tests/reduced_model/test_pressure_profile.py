@@ -55,12 +55,12 @@ def test_siphon_agrees_with_the_energy_balance_at_hump_and_ends(
     assert np.all(found.full)
     loss = tube_loss(point_scene, found.velocity)
     head = DENSITY * found.velocity**2 / 2
-    start = 0.9e6 + float(law.wall_pressure(0.1))
+    start = 0.9e6 + float(law.hydrostatic_pressure(0.1))
     before = float(loss.state.kinetic_factor + loss.state.upstream_loss(0.5))
     expected = start - column(point_scene, 31.5e-3, 44.5e-3) - head * before
     assert found.hump_pressure == pytest.approx(expected, rel=1e-9)
     assert found.pressure[0] == pytest.approx(start, rel=1e-12)
-    assert found.pressure[-1] == pytest.approx(float(law.wall_pressure(0.4)), rel=1e-7)
+    assert found.pressure[-1] == pytest.approx(float(law.hydrostatic_pressure(0.4)), rel=1e-7)
     assert found.hump_path == pytest.approx(0.06)
     assert found.radius[np.argmin(np.abs(found.path - 0.06))] == pytest.approx(31.5e-3)
     assert found.cavitation_margin == pytest.approx(expected + AMBIENT - VAPOUR, rel=1e-6)
@@ -108,7 +108,7 @@ def test_separated_tube_is_full_again_where_the_opposite_chamber_holds_the_colum
     along = float(loss.terms["friction"] + loss.terms["rotation"]) * (1 - share)
     lost = along + float(loss.terms["exit"]) + 1 - float(loss.state.kinetic_factor)
     radius = 31.5e-3 + (44.5e-3 - 31.5e-3) * (share - 0.5) / 0.5
-    held = float(law.wall_pressure(0.1)) - column(point_scene, radius, 44.5e-3)
+    held = float(law.hydrostatic_pressure(0.1)) - column(point_scene, radius, 44.5e-3)
     assert held + lost * DENSITY * found.velocity**2 / 2 == pytest.approx(VAPOUR - AMBIENT, abs=5.0)
 
 
@@ -116,7 +116,9 @@ def test_blocked_legs_stand_at_the_chambers_levels(point_scene: Scene, law: Cali
     found = HumpProfile.of(scene=point_scene, law=law, fill_ratio=0.25, gas_pressure=0.0)
     assert found.regime is Regime.BLOCKED
     first, second = np.flatnonzero(np.diff(found.full))
-    surface = np.sqrt(44.5e-3**2 - 2 * float(law.wall_pressure(0.25)) / DENSITY / point_scene.rotor.speed**2)
+    surface = np.sqrt(
+        44.5e-3**2 - 2 * float(law.hydrostatic_pressure(0.25)) / DENSITY / point_scene.rotor.speed**2
+    )
     np.testing.assert_allclose(found.radius[[first, second]], surface, rtol=1e-9)
     np.testing.assert_allclose(found.pressure[~found.full], 0.0)
     assert found.hump_pressure == 0.0
@@ -136,7 +138,7 @@ def test_trapped_gas_obeys_boyle_or_leaves_at_the_port(point_scene: Scene) -> No
     assert pressed.regime is Regime.BLOCKED
     assert pressed.path[~pressed.full][0] == pytest.approx(0.06)
     assert pressed.hump_pressure is not None
-    assert 0 < pressed.hump_pressure <= float(law.wall_pressure(0.25))
+    assert 0 < pressed.hump_pressure <= float(law.hydrostatic_pressure(0.25))
 
 
 def test_reverse_flow_is_the_mirror_image(point_scene: Scene) -> None:
@@ -237,7 +239,7 @@ def test_eq_18_read_off_a_separated_siphon_falls_as_the_square_of_the_velocity(
     slopes = np.diff(np.log(excess)) / np.diff(np.log(found.velocity))
     np.testing.assert_allclose(slopes, -2.0, rtol=1e-12)
     hump = column(point_scene, 31.5e-3, 44.5e-3)
-    head = (hump + VAPOUR - AMBIENT - float(law.wall_pressure(0.1))) / DENSITY
+    head = (hump + VAPOUR - AMBIENT - float(law.hydrostatic_pressure(0.1))) / DENSITY
     assert found.excess_head == pytest.approx(head, rel=1e-12)
 
 
@@ -248,7 +250,7 @@ def test_what_eq_18_reads_is_what_the_law_does(law: CalibratedLaw) -> None:
         flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=other, gas_pressure=p, primed=True)
         if flow.regime == Regime.BLOCKED:
             continue
-        surplus = p + float(law.wall_pressure(x) - law.wall_pressure(other))
+        surplus = p + float(law.hydrostatic_pressure(x) - law.hydrostatic_pressure(other))
         k = 2 * surplus / DENSITY / float(flow.velocity) ** 2 - 1
         found = ApparentDrag.of(law=law, velocity=flow.velocity, opposite_fill_ratio=other)
         assert float(found.read) == pytest.approx(k, rel=1e-7)

@@ -41,7 +41,7 @@ def test_calibrated_law_comes_back_bit_for_bit(table_1_calibration: Calibration,
 
 def test_a_law_of_the_earlier_format_is_refused(table_1_calibration: Calibration, tmp_path: Path) -> None:
     path = table_1_calibration.flow_law.save(tmp_path / "law.json")
-    path.write_text(path.read_text().replace('"version": 2', '"version": 1'))
+    path.write_text(path.read_text().replace('"version": 3', '"version": 1'))
     with pytest.raises(SceneError, match=r"version = 1: .* calibrate again; allowed: 2"):
         load_law(path)
 
@@ -72,8 +72,8 @@ def test_load_model_carries_moment_volumes_and_density(
         ("[1, 2]", "not a saved law"),
         ('{"format": "another"}', "not a saved law"),
         ('{"format": "ringbalance law", "version": 99}', "another release"),
-        ('{"format": "ringbalance law", "version": 2}', "law"),
-        ('{"format": "ringbalance law", "version": 2, "law": {"type": "TubePath"}}', "PaperLaw"),
+        ('{"format": "ringbalance law", "version": 3}', "law"),
+        ('{"format": "ringbalance law", "version": 3, "law": {"type": "TubePath"}}', "PaperLaw"),
         ("[" * 100000, "not JSON"),
     ],
 )
@@ -106,8 +106,8 @@ def _set(key: str, value: object) -> Callable[[dict[str, Any]], None]:
         ("ambient_pressure", float("nan")),
         ("path.density", 10**400),
         ("path.trapped", 1),
-        ("wall_pressure.value", [0.0, "a"]),
-        ("wall_pressure.slope", [1.0]),
+        ("hydrostatic_pressure.value", [0.0, "a"]),
+        ("hydrostatic_pressure.slope", [1.0]),
         ("heads.head", None),
         ("moment.type", "PaperMoment"),
         ("surprise", 3),

@@ -15,7 +15,7 @@ from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber.gravity import GravityEffect, closed_ring
-from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
+from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms, chamber_pressure
 from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.chamber.terms import MEAN
 from ringbalance.reduced_model.chamber.values import paper_closed_forms
@@ -117,7 +117,7 @@ class LawBook:
         law = replace(
             base,
             name="; ".join(models),
-            wall_pressure=table_from_samples(start=0.0, stop=base.max_fill_ratio, value=pressure),
+            hydrostatic_pressure=table_from_samples(start=0.0, stop=base.max_fill_ratio, value=pressure),
             moment=replace(
                 base.moment,
                 chamber_moment=table_from_samples(start=0.0, stop=base.max_fill_ratio, value=moment),
@@ -135,19 +135,20 @@ class LawBook:
         )
 
     def _levels(self, level: str) -> tuple[FloatArray, FloatArray]:
-        """Wall pressure, Pa, and moment, kg m, at even fills.
+        """Pressure at R2, Pa, and moment, kg m, at even fills.
 
         The paper's moment is lambda times half its mass: only differences of two chambers count. Below the
         thinnest closed ring gravity's change fades in proportion to the fill.
         """
         scene, fills = self.scene, np.linspace(0.0, self.base.max_fill_ratio, _LEVEL_NODES)
-        pressure, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=fills)
+        _, moment, _ = chamber_closed_forms(scene=scene, fill_ratio=fills)
+        pressure = chamber_pressure(scene=scene, fill_ratio=fills)
         if level == EQ_12:
             pressure, _ = paper_closed_forms(scene, fills)
             moment = paper_law(scene).moment.pair_moment(fill_ratio=fills, opposite_fill_ratio=0.0)
         if level == QUADRATURE:
             effect, closed = GravityEffect.of(scene, fill_ratio=fills), closed_ring(scene, fills)
-            changes = effect.wall_pressure, effect.moment
+            changes = effect.hydrostatic_pressure, effect.moment
             pressure, moment = (
                 value + np.interp(fills, fills[closed], change[closed])
                 for value, change in zip((pressure, moment), changes, strict=True)

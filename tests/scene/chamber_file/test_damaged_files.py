@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import tracemalloc
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -86,3 +89,29 @@ def test_a_pipe_a_folder_and_no_file(tmp_path: Path) -> None:
 def loaded_again(folder: Path, name: str) -> object:
     (folder / "my_disc.toml").write_text(scene_text(name, mesh_unit="mm"), encoding="utf-8")
     return load_scene(folder / "my_disc.toml")
+
+
+def _packed(kind: str, block: bytes, count: int) -> str:
+    """An array of equal blocks as compressed text, which grows a thousand times."""
+    packed = zlib.compress(block, 9)
+    head = np.array([count, len(block), 0, *[len(packed)] * count], dtype="<u4").tobytes()
+    text = (base64.b64encode(head) + base64.b64encode(packed * count)).decode()
+    return f'type="{kind}" format="binary">{text}</DataArray>'
+
+
+def test_a_small_file_that_would_unpack_to_gigabytes_is_refused_before_it_does(tmp_path: Path) -> None:
+    """256 MiB of numbers of one byte each, which take eight when they are read; a file may have 256 MiB."""
+    huge = _packed("Int8", bytes(2**20), 256)
+    cells = "".join(f'<DataArray Name="{name}" {huge}' for name in ("connectivity", "offsets", "types"))
+    content = (
+        '<VTKFile type="UnstructuredGrid" compressor="vtkZLibDataCompressor"><UnstructuredGrid><Piece>'
+        f"<Points><DataArray {huge}</Points><Cells>{cells}</Cells></Piece></UnstructuredGrid></VTKFile>"
+    ).encode()
+    assert len(content) < 2**21
+    tracemalloc.start()
+    try:
+        with pytest.raises(SceneError, match="mesh"):
+            loaded(tmp_path, content, "chamber.vtu")
+        assert tracemalloc.get_traced_memory()[1] < 2**29
+    finally:
+        tracemalloc.stop()

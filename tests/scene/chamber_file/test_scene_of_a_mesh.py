@@ -236,3 +236,10 @@ def test_a_solid_is_meshed(tmp_path: Path) -> None:
     assert np.degrees(scene.disc.central_angle) == pytest.approx(80)
     with pytest.raises(SceneError, match="Gmsh cannot mesh the solid"):
         loaded(tmp_path, content[: len(content) // 3], "chamber.step", mesh_unit="")
+
+
+@pytest.mark.parametrize("name", ["a\u3000b", "a\u00a0b", "\u00e4 b", "a\nb"])
+def test_a_mesh_is_found_in_a_folder_of_any_name(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / name
+    folder.mkdir()
+    assert scene_of(folder).disc.geometry is not None

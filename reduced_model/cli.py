@@ -27,7 +27,6 @@ from ringbalance.reduced_model.documents import (
 )
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.residual import reach_share
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, with_tolerance
@@ -208,12 +207,11 @@ def _usable_text(calibration: Calibration) -> str:
     rest, told = calibration.residual, calibration.budgets
     fill, total = told["least_fill_ratio"].total, told["usable_moment"].total
     moment = f"{_shown(calibration, 'usable_moment', 'g mm', scale=1e6)} a pair"
-    share = reach_share(calibration.scene.disc.chambers)
-    pairs = (
-        f", {_measured(calibration, rest.reach, share * total, 'g mm', scale=1e6)} all pairs in any direction"
-    )
+    reach = _measured(calibration, rest.reach, rest.reach_share * total, "g mm", scale=1e6)
     if rest.least_fill_ratio == 0:
-        return f"{moment}{pairs}; no gas enters the port before a chamber is empty"
+        return (
+            f"{moment}, {reach} all pairs in any direction; no gas enters the port before a chamber is empty"
+        )
     by_geometry = _rounded(calibration, 1e6 * rest.pair_moment, 1e6 * total)
     width = 2 * fill * calibration.chamber.volume
     volume = _measured(calibration, rest.usable_volume, width, "ml", scale=1e6)
@@ -224,7 +222,7 @@ def _usable_text(calibration: Calibration) -> str:
         else "this gas pressure moves no liquid: raise gas.pressure"
     )
     return (
-        f"{moment} ({by_geometry} by geometry){pairs}, and {volume}, fills "
+        f"{moment} ({by_geometry} by geometry), {reach} all pairs in any direction, {volume}, fills "
         f"{_measured(calibration, rest.least_fill_ratio, fill)} to "
         f"{_rounded(calibration, rest.largest_fill_ratio, fill)}: below, {why}"
     )

@@ -21,7 +21,6 @@ from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.values import paper_closed_forms, share_across
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.residual import reach_share
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
 
@@ -252,7 +251,7 @@ def _residual(calibration: Calibration) -> dict[str, Any]:
         "usable_pair_moment_kg_m": rest.usable_pair_moment,
         "usable_pair_moment_uncertainty": moment,
         "reach_kg_m": rest.reach,
-        "reach_uncertainty": reach_share(calibration.scene.disc.chambers) * moment,
+        "reach_uncertainty": rest.reach_share * moment,
     }
 
 

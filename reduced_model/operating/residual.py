@@ -117,6 +117,8 @@ class ResidualLiquid:
     """Largest moment of a pair to which injections can bring it, kg m."""
     reach: float
     """Largest unbalance that all pairs together cancel in whatever direction it lies, kg m."""
+    reach_share: float
+    """The same over the usable moment of a pair."""
 
     @property
     def limited_by(self) -> Literal["draw_down", "gas_pressure", "nothing"]:
@@ -140,7 +142,10 @@ class ResidualLiquid:
         low, high = (float(v) for v in drawing.residual(depth=np.array([1 - change, 1 + change])))
         stalled = stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure)
         least = min(max(x, stalled), top / 2)
-        usable = _pair_moment(law, top, least)
+        usable, share = (
+            _pair_moment(law, top, least),
+            reach_share(scene.disc.chambers, passes_on=x >= stalled),
+        )
         depth = float(port_depth(scene, flow_rate=rate))
         return cls(
             fill_ratio=x,
@@ -154,7 +159,8 @@ class ResidualLiquid:
             usable_volume=(top - 2 * least) * chamber_volume(disc=scene.disc),
             pair_moment=_pair_moment(law, top, 0.0),
             usable_pair_moment=usable,
-            reach=reach_share(scene.disc.chambers) * usable,
+            reach=share * usable,
+            reach_share=share,
         )
 
     def model_uncertainty(self, scene: Scene, *, law: CalibratedLaw, head: float) -> tuple[float, float]:
@@ -177,15 +183,17 @@ class ResidualLiquid:
         return float(high - low) / 2, math.hypot(by_fill, *ends)
 
 
-def reach_share(chambers: int) -> float:
+def reach_share(chambers: int, *, passes_on: bool = True) -> float:
     """Smallest radius of what n pairs cancel together, over what one does along its axis: cot(pi/(2 n)).
 
     Each of n pairs, pi/n apart, gives a moment between -U and U along its axis: together a regular polygon of
     2 n sides, U/sin(pi/(2 n)) to its corners and U cot(pi/(2 n)) to its sides: U with four chambers,
     1.73 U with six.
+    Args: `passes_on`: whether a chamber that is emptied leaves its share to other pairs, as one at its
+        residual fill does. One that the gas drives no further is asked again and again: then U, along a pair.
     Source: elementary geometry (a sum of segments is a zonotope).
     """
-    return 1 / math.tan(math.pi / chambers)
+    return 1 / math.tan(math.pi / chambers) if passes_on else 1.0
 
 
 def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:

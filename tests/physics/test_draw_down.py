@@ -1,4 +1,4 @@
-"""Depth of the liquid over a port at which gas enters it, against searches and integrations of another kind."""
+"""Depth of the liquid over a port at which gas enters it, against searches and integrations."""
 
 from __future__ import annotations
 

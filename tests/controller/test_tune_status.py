@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from scipy.optimize import brentq
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.ensemble.monte_carlo import Probability
@@ -65,6 +66,25 @@ def test_runs_that_need_more_moment_than_the_disc_has_are_counted_and_named(scen
     assert answer.settling.settled.value == pytest.approx(1 - answer.settling.beyond_capacity, abs=0.06)
     assert "need more moment than the disc can form" in answer.status
     assert tuned(replace(near, rotor=replace(near.rotor, initial_amplitude=5e-6))).succeeded
+
+
+def test_runs_draw_the_depth_at_which_gas_enters_the_port(scene: Scene) -> None:
+    known = InputUncertainty(quantity="influence_coefficient", half_width=0.0, relative=True)
+    law, whole = paper_model(scene).flow, largest_amplitude(scene)
+    near = replace(with_amplitude(scene, 0.98 * whole), uncertainty=(known,))
+
+    def left(factor: float) -> float:
+        """Of the usable fill, with that factor on the depth."""
+        deeper = replace(scene, tube=replace(scene.tube, draw_down_factor=factor))
+        return 1 - residual_fill_ratio(deeper, law=law) / 0.25
+
+    largest = brentq(lambda factor: left(factor) - 0.98 * left(1.0), 1.0, 3.0)
+    expected = 0.5 * math.erfc(math.log(largest) / (math.log(1.3) / 1.96) / math.sqrt(2))
+    answer = tuned(near)
+    assert answer.settling is not None
+    # Of 200 runs a share is known to 0.05; the speed of the flow widens it by less.
+    assert answer.settling.settled.value == pytest.approx(1 - expected, abs=0.08)
+    assert expected > 0.12
 
 
 def test_gas_that_stalls_a_chamber_is_raised(scene: Scene) -> None:

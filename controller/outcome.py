@@ -12,14 +12,9 @@ import numpy as np
 
 from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.reach import (
-    BEYOND_CAPACITY,
-    LEAST_PRESSURE,
-    NEARLY_EMPTY,
-    RUNS_BACK,
-    starting_pressure,
-)
+from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, RUNS_BACK
 from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.shortfall import liquid_not_driven, moment_missing
 from ringbalance.controller.simulation import (
     NOISE_DEVIATIONS,
     Injection,
@@ -35,7 +30,6 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 MICROMETRE: Final = 1e-6
-GRAM_MILLIMETRE: Final = 1e-6
 MANY_OVERSHOOTS: Final = 2
 NO_SAMPLE: Final = "no usable sample"
 """Reason that every algorithm gives for doing nothing on a dropped sample or a NaN."""
@@ -90,10 +84,17 @@ class Facts:
         """Times that the residual turned between samples while above the limit."""
         return overshoots(self.samples, limit=self.scene.controller.limit)
 
-    @property
+    @cached_property
     def unreachable_amplitude(self) -> float:
         """Vibration that remains with the liquid at its best, m."""
         return self.plant.unreachable_vibration(state=self.state, rotor=self.scene.rotor)
+
+    @property
+    def beyond_disc(self) -> float:
+        """The same with gas that drives a chamber down to its residual fill, m."""
+        return self.plant.unreachable_vibration(
+            state=self.state, rotor=self.scene.rotor, least_fill=self.plant.residual_fill
+        )
 
     @property
     def settling_time(self) -> float | None:
@@ -118,13 +119,15 @@ class Facts:
         limit = self.scene.controller.limit
         if self.settling_time is not None:
             return Outcome.SETTLED
-        if self.unreachable_amplitude > limit and not self.loop.unstable:
+        if self.beyond_disc > limit and not self.loop.unstable:
             return Outcome.CAPACITY_EXCEEDED
         higher = self.final_amplitude > self.initial_amplitude + self.noise_floor
         if has_grown(self.cause, higher):
             return Outcome.DRIFTING if self.drift > NOTICEABLE else Outcome.DIVERGING
         if self.loop.unstable:
             return Outcome.UNSTABLE
+        if self.unreachable_amplitude > limit:
+            return Outcome.STALLED
         if min(self.since, self.held_since) < math.inf:
             return Outcome.HOLD_INCOMPLETE if self.loop.stays else Outcome.HOVERING
         if self.refused and self.cause is Cause.IDLE:
@@ -267,32 +270,21 @@ def _time_limit(facts: Facts) -> str:
 
 
 def _stalled(facts: Facts) -> str:
-    last = _longest(facts)
-    fill, law = last.operation.fill_after, facts.plant.model.flow
-    total, pressure = facts.state.pairs[0].total, facts.scene.gas.pressure
-    lowest = max(0.0, total - law.max_fill_ratio)
-
-    def needed(at: float, *, primed: bool) -> str:
-        other = min(total - at, law.max_fill_ratio)
-        above = max(pressure, LEAST_PRESSURE)
-        found = starting_pressure(law=law, fill=at, opposite_fill=other, primed=primed, above=above)
-        return "no pressure: its liquid has left the port" if found is None else f"{found / 1e6:.4g} MPa"
-
+    last = _longest(facts) if facts.last_command else None
+    still = None if last is None or last.operation.moved else last
+    beyond = facts.unreachable_amplitude > facts.scene.controller.limit
     return (
-        f"{_not_settled(facts)}; stalled: {pressure / 1e6:.4g} MPa drives no liquid out of chamber "
-        f"{last.chamber} at fill {fill:.4g} (to start there: {needed(fill, primed=False)}; to empty it: "
-        f"{needed(lowest + NEARLY_EMPTY, primed=True)}): raise gas.pressure, or lower rotor.speed"
+        f"{_not_settled(facts)}; stalled: {liquid_not_driven(facts.plant, facts.state, still)}"
+        f"{f'; {_moments(facts)}' if beyond else ''}: raise gas.pressure, or lower rotor.speed"
     )
 
 
 def _capacity(facts: Facts) -> str:
-    needed = abs(facts.scene.rotor.initial_unbalance) / GRAM_MILLIMETRE
-    pair = abs(facts.plant.largest_pair_moment(state=facts.state)) / GRAM_MILLIMETRE
-    return (
-        f"{_not_settled(facts)}; capacity exceeded: the unbalance is {needed:.4g} g mm, one pair of chambers "
-        f"can form {pair:.4g} g mm along its axis, so at best {_um(facts.unreachable_amplitude)} remain: "
-        f"{BEYOND_CAPACITY}"
-    )
+    return f"{_not_settled(facts)}; capacity exceeded: {_moments(facts)}: {BEYOND_CAPACITY}"
+
+
+def _moments(facts: Facts) -> str:
+    return moment_missing(facts.plant, facts.state, facts.scene.rotor)
 
 
 def _empty(facts: Facts) -> str:

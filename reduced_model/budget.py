@@ -25,6 +25,7 @@ UNITS: Final = {
     "chamber_volume": "m^3",
     "wall_pressure": "Pa",
     "moment": "kg m",
+    "least_fill_ratio": "1",
     "usable_moment": "kg m",
     "lambda": "m",
     "velocity": "m/s",
@@ -193,11 +194,14 @@ def _flow_parts(scene: Scene, calibration: _Calibrated) -> dict[str, _Parts]:
     flow = law.evaluate(fill_ratio=fills[0], opposite_fill_ratio=fills[1], gas_pressure=point.gas_pressure)
     error = calibration.flow_law.heads.interpolation_error
     levels = _level_parts(calibration)
+    _, numerical, model = levels["stall_pressure"]
+    fill_width, moment_width = rest.model_uncertainty(scene, law=law, head=math.hypot(numerical, model))
     found = levels | {
+        "least_fill_ratio": (rest.least_fill_ratio, 0.0, fill_width),
         "usable_moment": (
             rest.usable_pair_moment,
             float(np.max(calibration.chamber.moment.interpolation)),
-            rest.usable_moment_uncertainty(scene, law=law),
+            moment_width,
         ),
         "velocity": (point.velocity, error * abs(point.velocity), float(flow.uncertainty)),
     }

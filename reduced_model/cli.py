@@ -207,18 +207,27 @@ def _mpa(calibration: Calibration, name: str) -> str:
 
 
 def _usable_text(calibration: Calibration) -> str:
-    rest, total = calibration.residual, calibration.budgets["usable_moment"].total
+    rest, told = calibration.residual, calibration.budgets
+    fill, total = told["least_fill_ratio"].total, told["usable_moment"].total
     moment = f"{_shown(calibration, 'usable_moment', 'g mm', scale=1e6)} a pair"
-    if rest.fill_ratio == 0:
-        return f"{moment}; no gas enters the port before a chamber is empty"
+    reach = _measured(calibration, rest.reach, rest.reach_share * total, "g mm", scale=1e6)
+    if rest.least_fill_ratio == 0:
+        return (
+            f"{moment}, {reach} all pairs in any direction; no gas enters the port before a chamber is empty"
+        )
     by_geometry = _rounded(calibration, 1e6 * rest.pair_moment, 1e6 * total)
-    volume = _measured(calibration, rest.usable_volume, rest.usable_volume_uncertainty, "ml", scale=1e6)
+    width = 2 * fill * calibration.chamber.volume
+    volume = _measured(calibration, rest.usable_volume, width, "ml", scale=1e6)
     depth = _measured(calibration, rest.depth, rest.depth_uncertainty, "mm", scale=1e3)
+    why = (
+        f"with {depth} of liquid over the port, gas passes through"
+        if rest.limited_by == "draw_down"
+        else "this gas pressure moves no liquid: raise gas.pressure"
+    )
     return (
-        f"{moment} ({by_geometry} by geometry) and {volume}, fills "
-        f"{_measured(calibration, rest.fill_ratio, rest.fill_ratio_uncertainty)} to "
-        f"{_rounded(calibration, rest.largest_fill_ratio, rest.fill_ratio_uncertainty)}: below, with "
-        f"{depth} of liquid over the port, gas passes through"
+        f"{moment} ({by_geometry} by geometry), {reach} all pairs in any direction, {volume}, fills "
+        f"{_measured(calibration, rest.least_fill_ratio, fill)} to "
+        f"{_rounded(calibration, rest.largest_fill_ratio, fill)}: below, {why}"
     )
 
 

@@ -11,13 +11,21 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.physics.tube.ends import draw_down_depth
+from ringbalance.physics.tube.draw_down import port_depth
 from ringbalance.physics.tube.uncertainty import TUBE_INPUTS
 from ringbalance.reduced_model.chamber.inputs import chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.law.building import tube_path
+from ringbalance.reduced_model.operating.residual import first_stalled
 from ringbalance.reduced_model.tube.heads import log_heads
-from ringbalance.reduced_model.tube.regime import ColumnFlow, TubeEnds, TubePath, column_flow
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.reduced_model.tube.regime import (
+    ColumnFlow,
+    Pressure,
+    TubeEnds,
+    TubePath,
+    can_flow,
+    column_flow,
+)
+from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
 
 HEAD_INPUTS: Final = frozenset({*TUBE_INPUTS, "hump_position", "hump_radius", "port_radius"})
@@ -50,12 +58,14 @@ class Device:
         wall, moment, ratio = measured_closed_forms(scene=self.scene, fill_ratio=fills)
         empty, half, full = (float(p) for p in chamber_pressure(scene=self.scene, fill_ratio=fills))
         equal, uneven = self._ends(half, half), self._ends(empty, full)
+        least, usable = self._usable()
         found = {
             "chamber_volume": chamber_volume(disc=disc),
             "wall_pressure": float(wall[2]),
             "moment": float(moment[2]),
             "lambda": float(ratio[1]),
-            "usable_moment": self._usable_moment(),
+            "least_fill_ratio": least,
+            "usable_moment": usable,
             "stall_pressure": max(uneven.stall_pressure(), 0.0) / self.gas_factor,
         }
         crest = self.path.crest
@@ -79,11 +89,12 @@ class Device:
             found["cavitation_margin"] = full - crest.cavity_pressure(ends)
         return found
 
-    def _ends(self, own: float, other: float) -> TubeEnds[float]:
-        """For hydrostatic pressures of the two chambers."""
+    def _ends(self, own: Pressure, other: Pressure, *, driven: bool = True) -> TubeEnds[Pressure]:
+        """For hydrostatic pressures of the two chambers; `driven`: with the gas on."""
+        gas = self.gas_factor * self.scene.gas.pressure if driven else 0.0
         return TubeEnds(
-            upstream_gas=self.gas_factor * self.scene.gas.pressure,
-            downstream_gas=0.0,
+            upstream_gas=0 * own + gas,
+            downstream_gas=0 * own,
             upstream_hydrostatic=own,
             downstream_hydrostatic=other,
             port_pressure=self.path.port_pressure,
@@ -108,21 +119,42 @@ class Device:
     def _head(self, which: int, velocity: float) -> float:
         return math.exp(float(np.interp(math.log(velocity), _log_velocities(self.near), self.heads[which])))
 
-    def _usable_moment(self) -> float:
-        """Largest moment of a pair that no gas passes through, kg m; as `ResidualLiquid.of`."""
+    def _usable(self) -> tuple[float, float]:
+        """Least fill and largest moment of a pair, kg m, as `ResidualLiquid`."""
+        top = self.scene.disc.max_fill_ratio
+        least = min(max(self._residual_fill(), self._stalled_fill()), top / 2)
+        _, moment, _ = measured_closed_forms(scene=self.scene, fill_ratio=np.array([top - least, least]))
+        return least, float(moment[0] - moment[1])
+
+    def _residual_fill(self) -> float:
         disc, top = self.scene.disc, self.scene.disc.max_fill_ratio
         area = float(liquid_area(disc=disc, surface_radius=disc.inner_radius))
-        acceleration = self.scene.rotor.speed**2 * self.scene.tube.port_radius
         x = self.near_fill
         for _ in range(_ROUNDS):
             pressure = chamber_pressure(scene=self.scene, fill_ratio=np.array([x, top - x]))
             u = self._flow(self._ends(float(pressure[0]), float(pressure[1])), primed=True).velocity
-            depth = float(draw_down_depth(flow_rate=self.scene.tube.area * u, acceleration=acceleration))
+            depth = float(port_depth(self.scene, flow_rate=self.scene.tube.area * u))
             level = min(max(self.scene.tube.port_radius - depth, disc.inner_radius), disc.outer_radius)
             x = min(float(liquid_area(disc=disc, surface_radius=level)) / area, top)
-        rest = min(x, top / 2)
-        _, moment, _ = measured_closed_forms(scene=self.scene, fill_ratio=np.array([top - rest, rest]))
-        return float(moment[0] - moment[1])
+        return x
+
+    def _stalled_fill(self) -> float:
+        """As `stalled_fill_ratio`; zero where the gas drives a chamber empty."""
+        top, crest = self.scene.disc.max_fill_ratio, self.path.crest
+
+        def moves(fills: FloatArray) -> BoolArray:
+            own, other = (
+                measured_closed_forms(scene=self.scene, fill_ratio=x)[0] for x in (fills, top - fills)
+            )
+            rest = self._ends(own, other, driven=False)
+            # Only over a crest may a column be held while the gas is off.
+            held = crest is not None and (
+                np.asarray(can_flow(ends=rest, crest=crest, primed=True))
+                | can_flow(ends=rest.reversed(), crest=crest, primed=True)
+            )
+            return np.asarray(can_flow(ends=self._ends(own, other), crest=crest, primed=held))
+
+        return first_stalled(moves, start=top / 2) or 0.0
 
 
 def device_of(

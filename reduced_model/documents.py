@@ -235,20 +235,27 @@ def _operating_point(calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def _residual(calibration: Calibration) -> dict[str, float]:
-    rest = calibration.residual
+def _residual(calibration: Calibration) -> dict[str, Any]:
+    rest, fill = calibration.residual, calibration.budgets["least_fill_ratio"].total
+    moment = calibration.budgets["usable_moment"].total
     return {
         "fill_ratio": rest.fill_ratio,
         "fill_ratio_uncertainty": rest.fill_ratio_uncertainty,
+        "stalled_fill_ratio": rest.stalled_fill_ratio,
+        "least_fill_ratio": rest.least_fill_ratio,
+        "least_fill_ratio_uncertainty": fill,
+        "limited_by": rest.limited_by,
         "largest_fill_ratio": rest.largest_fill_ratio,
         "depth_m": rest.depth,
         "depth_uncertainty": rest.depth_uncertainty,
         "flow_rate_m3_s": rest.flow_rate,
         "usable_volume_m3": rest.usable_volume,
-        "usable_volume_uncertainty": rest.usable_volume_uncertainty,
+        "usable_volume_uncertainty": 2 * fill * calibration.chamber.volume,
         "pair_moment_kg_m": rest.pair_moment,
         "usable_pair_moment_kg_m": rest.usable_pair_moment,
-        "usable_pair_moment_uncertainty": calibration.budgets["usable_moment"].total,
+        "usable_pair_moment_uncertainty": moment,
+        "reach_kg_m": rest.reach,
+        "reach_uncertainty": rest.reach_share * moment,
     }
 
 

@@ -273,6 +273,17 @@ class Tube:
         UNCERTAIN,
         Shown("drag coefficient k", absent="calculated"),
     ]
+    draw_down_factor: Annotated[
+        float,
+        number(POSITIVE),
+        standard(
+            1.0,
+            "depth of the liquid over a port at which gas enters it, over the calculated one; unless "
+            "[uncertainty] states another, 30 % uncertain",
+        ),
+        UNCERTAIN,
+        Shown("factor on the draw-down depth"),
+    ] = 1.0
     models: TubeModels = FINEST_MODELS
     """Of its loss; no key."""
 

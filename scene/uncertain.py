@@ -22,6 +22,12 @@ NORMAL_95: Final = 1.959963984540054
 """Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
 ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
 """Relative expanded uncertainty (95 %) of a roughness for which the scene states none."""
+ASSUMED_DRAW_DOWN_UNCERTAINTY: Final = 0.3
+"""Relative expanded uncertainty (95 %) of the depth at which gas enters a port, where the scene states none.
+
+The two theories of it differ by up to 18 % where the port is as wide as the liquid is deep, liquid that still
+moves needs somewhat more than liquid at rest, and no measurement of such a port is known.
+"""
 _MAY_VANISH: Final = frozenset({"roughness", "extra_loss"})
 """Quantities of the tube that may be zero; where others would reach it, a tenth of the value counts."""
 _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[([01])\])?")
@@ -76,6 +82,7 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
     liquid = scene.liquid
     found = {
         "roughness": ASSUMED_ROUGHNESS_UNCERTAINTY * scene.tube.roughness,
+        "draw_down_factor": ASSUMED_DRAW_DOWN_UNCERTAINTY * scene.tube.draw_down_factor,
         "density": liquid.density_uncertainty * liquid.density,
         "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
     }

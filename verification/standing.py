@@ -65,7 +65,7 @@ SUBJECTS: Final[Mapping[str, _Subject]] = MappingProxyType(
         "residual": _Subject(
             title="Residual liquid over the port",
             assumed="draw-down depth derived, 30 % wide",
-            budgets=("usable_moment",),
+            budgets=("usable_moment", "least_fill_ratio"),
         ),
         "gas": _Subject(
             title="Filling and venting of a chamber with gas",

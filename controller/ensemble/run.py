@@ -22,7 +22,7 @@ from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_by_velocity
+from ringbalance.reduced_model.operating.residual import Drawing
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
@@ -102,8 +102,8 @@ class EnsemblePlan:
     loop: LoopFactor
     """Of a member with the scene's own values."""
     rotor: Rotor
-    residual: tuple[FloatArray, FloatArray]
-    """Factors of the velocity, and the residual fill with each."""
+    drawing: Drawing
+    """From which the residual fill of each member follows."""
 
     def run(self, members: Members, *, seed: int, number: int = 0) -> MemberRuns:
         """Run some members; `number`, of the first of them in the ensemble, identifies its noise."""
@@ -112,7 +112,7 @@ class EnsemblePlan:
         runs["number"] = number + np.arange(runs.size)
         runs["speed"], runs["proportional"] = members.velocity_factor, members.proportional
         runs["gain_real"], runs["gain_imaginary"] = gain.real, gain.imag
-        runs["residual_fill"] = np.interp(members.velocity_factor, *self.residual)
+        runs["residual_fill"] = members.residual_fill(self.drawing)
         runs["stays"] = self._stay(members)
         shared = self.shared.copy()
         shared["key_0"], shared["key_1"] = noise_key(seed=seed)
@@ -168,7 +168,7 @@ class EnsemblePlan:
             plant=transfer.plant,
             loop=loop,
             rotor=scene.rotor,
-            residual=residual_by_velocity(scene, law=model.flow),
+            drawing=Drawing.of(scene, law=model.flow),
         )
 
 

@@ -12,9 +12,10 @@ import numpy as np
 from ringbalance.reduced_model.law.calibrated_law import CalibratedMoment
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.reduced_model.operating.residual import FACTOR, Drawing
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, Scene
-from ringbalance.scene.uncertain import NORMAL_95, nominal_value
+from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value
 
 BLOCK: Final = 8192
 """Members that are drawn and carried together."""
@@ -46,6 +47,8 @@ class MemberUncertainty:
     """One text for each of the four."""
     gas_line: Mapping[str, float] = field(default_factory=dict)
     """Relative, of those of `LINE_KEYS` whose uncertainty the scene states."""
+    draw_down: float = 0.0
+    """Relative, of the depth over a port at which gas enters it."""
 
     @classmethod
     def of(cls, scene: Scene, model: BalancerModel) -> MemberUncertainty:
@@ -67,6 +70,7 @@ class MemberUncertainty:
                 assumed if lag is None else own,
             ),
             gas_line=_line(scene),
+            draw_down=half_widths(scene).get(FACTOR, 0.0) / scene.tube.draw_down_factor,
         )
 
 
@@ -90,6 +94,8 @@ class Members:
     They change the plant, and with it the dead time of its valves.  The controller does not know them: what
     it adds to a valve-open time, `gas_time_offset`, stays the scene's.
     """
+    draw_down: FloatArray | None = None
+    """Factor of the depth over a port at which gas enters it; None: all have the scene's."""
 
     def first(self, size: int) -> Members:
         """The first of them."""
@@ -107,6 +113,11 @@ class Members:
         if "critical_ratio" in own:
             own["critical_ratio"] = min(own["critical_ratio"], LARGEST_RATIO)
         return replace(gas, **own)
+
+    def residual_fill(self, drawing: Drawing) -> FloatArray:
+        """Fill at which gas enters the port of each member's driven chamber."""
+        deeper = 1.0 if self.draw_down is None else self.draw_down
+        return drawing.residual(depth=deeper, velocity=self.velocity_factor)
 
     @classmethod
     def alike(cls, scene: Scene, *, size: int) -> Members:
@@ -128,6 +139,8 @@ class Members:
         """
         random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 0)))
         z = random.standard_normal((4, BLOCK)) / NORMAL_95
+        other = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 1)))
+        deeper = math.log1p(uncertainty_95.draw_down) * other.standard_normal(BLOCK) / NORMAL_95
         line = uncertainty_95.gas_line
         wide = np.array([[math.log1p(line.get(name, 0.0))] for name in LINE_KEYS])
         alike = Members.alike(scene, size=BLOCK)
@@ -139,6 +152,7 @@ class Members:
             lag_angle=alike.lag_angle + uncertainty_95.lag_angle * z[3],
             proportional=alike.proportional,
             gas_line=np.exp(wide * random.standard_normal((4, BLOCK)) / NORMAL_95) if line else None,
+            draw_down=np.exp(deeper),
         )
 
 

@@ -15,6 +15,7 @@ from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.operating.residual import stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Disc
@@ -244,28 +245,39 @@ class LiquidRing:
             primed=pair.primed,
         )
 
-    def largest_pair_moment(self, *, state: DiscState) -> complex:
+    def least_fill(self, *, state: DiscState) -> float:
+        """Fill to which injections can bring a chamber: the residual one, or that at which the gas stalls."""
+        total = state.pairs[0].total
+        stalled = stalled_fill_ratio(law=self.model.flow, total=total, gas_pressure=self.gas_pressure)
+        return min(max(self.residual_fill, stalled), total / 2)
+
+    def largest_pair_moment(self, *, state: DiscState, least_fill: float | None = None) -> complex:
         """Moment of a pair with its usable liquid moved to one side, along and across, kg m.
 
+        Args: `least_fill`: to which a chamber is emptied; default `LiquidRing.least_fill`.
         Source: Eq. 7 of the liquid-ring paper for a pair, by the model's own moment curve.
         """
         total = state.pairs[0].total
-        highest = min(total - min(self.residual_fill, total / 2), self.model.flow.max_fill_ratio)
+        least = self.least_fill(state=state) if least_fill is None else min(least_fill, total / 2)
+        highest = min(total - least, self.model.flow.max_fill_ratio)
         moment = self.model.moment.pair_vector(fill_ratio=highest, opposite_fill_ratio=total - highest)
         return complex(moment)
 
-    def unreachable_vibration(self, *, state: DiscState, rotor: Rotor) -> float:
+    def unreachable_vibration(
+        self, *, state: DiscState, rotor: Rotor, least_fill: float | None = None
+    ) -> float:
         """Vibration that remains with the liquid at its best, m; zero within capacity.
 
         It follows from the distance between the moment that is wanted and the nearest that the disc can form.
         Those fill a polygon whose corners have every pair fully to one side or the other.
+        Args: `least_fill`: as `largest_pair_moment`.
         Source: Eq. 8 of the liquid-ring paper, in every direction and for any number of chambers.
         """
         n = self.chambers
         axes = chamber_directions(n)[: n // 2]
         seen_from = np.exp(1j * np.pi * (2 * np.arange(n) + 1) / n + 0.5j * np.pi)
         signs = np.sign((axes[None, :] * seen_from[:, None].conj()).real)
-        corners = self.largest_pair_moment(state=state) * (signs @ axes)
+        corners = self.largest_pair_moment(state=state, least_fill=least_fill) * (signs @ axes)
         edges = np.roll(corners, -1) - corners
         offset = -rotor.initial_unbalance - corners
         if n > 2 and np.all((edges.conj() * offset).imag >= 0):

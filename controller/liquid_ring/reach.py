@@ -93,8 +93,6 @@ def opening_within(*, drive: Drive, least: float, duration: float, integrator: I
 
 _MAX_DOUBLINGS: Final = 40
 _REFINEMENTS: Final = 6
-_FILLS: Final = 513
-"""At which a stall is looked for."""
 NEARLY_EMPTY: Final = 1e-6
 """Fill ratio at which a chamber's last liquid is looked at."""
 LEAST_PRESSURE: Final = 1.0
@@ -105,20 +103,6 @@ BEYOND_CAPACITY: Final = (
 """What to do about an unbalance that the disc cannot cancel."""
 RUNS_BACK: Final = "raise rotor.speed or lower tube.hump_radius so that the column breaks, or vent the tube"
 """What to do about a full tube that lets liquid run back while the gas is off."""
-
-
-def least_driven_fill(*, law: FlowLaw, total: float, gas_pressure: float) -> float:
-    """Smallest fill ratio to which gas drives a chamber from equal fills; total/2 where it drives nothing."""
-    fills = np.linspace(total / 2, max(0.0, total - law.max_fill_ratio), _FILLS)
-    rest = law.evaluate(fill_ratio=fills, opposite_fill_ratio=total - fills, gas_pressure=0.0, primed=True)
-    flow = law.evaluate(
-        fill_ratio=fills,
-        opposite_fill_ratio=total - fills,
-        gas_pressure=gas_pressure,
-        primed=rest.primed,
-    )
-    stopped = np.flatnonzero(flow.velocity <= 0)
-    return float(fills[stopped[0]] if stopped.size else fills[-1])
 
 
 def starting_pressure(

@@ -24,11 +24,10 @@ from ringbalance.controller.algorithms.target_vector import TargetVector
 from ringbalance.controller.liquid_ring.reach import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,
-    least_driven_fill,
     starting_pressure,
 )
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import residual_fill_ratio, stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -120,9 +119,9 @@ def _noise_at_limit(scene: Scene) -> float:
 
 def usable_fill(scene: Scene, model: BalancerModel) -> float:
     """Smallest fill ratio to which a chamber is driven: its residual one, or that at which the gas stalls."""
-    start = scene.disc.initial_fill
-    by_gas = least_driven_fill(law=model.flow, total=2 * start, gas_pressure=scene.gas.pressure)
-    return min(max(residual_fill_ratio(scene, law=model.flow), by_gas), start)
+    start, law = scene.disc.initial_fill, model.flow
+    stalled = stalled_fill_ratio(law=law, total=2 * start, gas_pressure=scene.gas.pressure)
+    return min(max(residual_fill_ratio(scene, law=law), stalled), start)
 
 
 def with_driving_gas(scene: Scene, model: BalancerModel) -> Scene:

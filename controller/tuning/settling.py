@@ -16,9 +16,9 @@ from ringbalance.controller.liquid_ring.plant import DiscState
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
-from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_gas
+from ringbalance.controller.tuning.loop_factor import with_driving_gas
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_by_velocity
+from ringbalance.reduced_model.operating.residual import Drawing, stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
@@ -163,19 +163,21 @@ def _beyond_capacity(
     """Of the drawn runs, the fraction whose unbalance is beyond the liquid, and beyond it under this gas."""
     ring, state = law_based_of(scene, model).ring, DiscState.initial(disc=scene.disc)
     drawn = Members.drawn(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
-    driven = with_driving_gas(scene, model)
-    residual = np.interp(drawn.velocity_factor[:runs], *residual_by_velocity(driven, law=model.flow))
+    stalled = stalled_fill_ratio(
+        law=model.flow, total=2 * scene.disc.initial_fill, gas_pressure=scene.gas.pressure
+    )
 
-    def fraction(least: FloatArray) -> float:
+    def fraction(asked: Scene, at_least: float) -> float:
+        residual = drawn.first(runs).residual_fill(Drawing.of(asked, law=model.flow))
         left = (
-            replace(ring, residual_fill=float(fill)).unreachable_vibration(
-                state=state, rotor=_rotor(scene, drawn, number)
+            ring.unreachable_vibration(
+                state=state, rotor=_rotor(scene, drawn, number), least_fill=max(float(fill), at_least)
             )
-            for number, fill in enumerate(least)
+            for number, fill in enumerate(residual)
         )
         return sum(vibration > scene.controller.limit for vibration in left) / runs
 
-    return fraction(residual), fraction(np.maximum(residual, usable_fill(scene, model)))
+    return fraction(with_driving_gas(scene, model), 0.0), fraction(scene, stalled)
 
 
 def _rotor(scene: Scene, drawn: Members, number: int) -> Rotor:
@@ -198,7 +200,9 @@ def _one_run(
     faster = rotor.influence_coefficient * float(drawn.velocity_factor[number])
     run = replace(scene.run, seed=scene.run.seed + number)
     gas, rotor = drawn.gas_of(scene.gas, number), replace(rotor, influence_coefficient=faster)
-    return simulate(replace(scene, rotor=rotor, gas=gas, run=run), model)
+    residual = drawn.first(number + 1).residual_fill(Drawing.of(scene, law=model.flow))[number]
+    asked = replace(scene, rotor=rotor, gas=gas, run=run)
+    return simulate(asked, model, residual_fill=float(residual))
 
 
 def _quantile(times: FloatArray, q: float) -> float | None:

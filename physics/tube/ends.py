@@ -1,10 +1,8 @@
-"""The ends of the tube: what they cost beyond the kinetic energy that the "+1" in k + 1 already counts, and
-how deep the liquid over a port must be to keep the gas out of it."""
+"""The ends of the tube: what they cost beyond the kinetic energy that the "+1" in k + 1 already counts."""
 
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -35,14 +33,6 @@ _DOMAIN = 1e-3
 """Relative: reservoir and tube are cut off at a distance, the edge is resolved down to 1e-4 of the bore."""
 _OUTSIDE = 0.3
 """Expanded uncertainty (95 %) of K added above the table, where steady laminar flow is not to be expected."""
-_POINT_SINK: Final = 1.25 / (2 * math.pi**2) ** 0.2
-"""0.6884; Lubin and Springer print 0.69."""
-DRAW_DOWN_UNCERTAINTY: Final = 0.3
-"""Relative, 95 %, of the depth.
-
-A port as wide as the liquid is deep needs about 18 % less than a point, a rim over which the liquid falls as
-over a weir up to 30 % less, and liquid that still moves somewhat more.
-"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -219,21 +209,3 @@ def exit_loss(
     gap = 2 * turned * (1 - turned)
     carried = _laminar_kinetic_factor(ratio) - 1
     return (1 - turned) * (carried + table.value), np.hypot(uncertainty_95, gap)
-
-
-def draw_down_depth(*, flow_rate: npt.ArrayLike, acceleration: float) -> FloatArray:
-    """Depth of liquid over a port in a flat wall at which gas reaches it, h = 0.6884 (Q^2/g_c)^(1/5), m.
-
-    Bernoulli's equation from the surface at rest to the axis of a point sink,
-    h = y + [Q/(2 pi y^2)]^2/(2 g_c), has a solution y only for h at or above its minimum, which lies at
-    y^5 = Q^2/(2 pi^2 g_c).
-    Args: `flow_rate`: Q, m^3/s, any shape. `acceleration`: g_c towards the port, m/s^2.
-    Raises: ValueError: an acceleration that is not positive and finite.
-    Range: inviscid liquid without swirl about the port's axis. A bathtub vortex draws gas from deeper; the
-        rotation of a disc makes none, because its axis lies in the surface.
-    Source: derived; the same power and factor as Lubin and Springer, J. Fluid Mech. 29 (1967) 385.
-    """
-    if not (acceleration > 0 and math.isfinite(acceleration)):
-        raise ValueError("acceleration must be positive and finite: a disc at rest holds no liquid")
-    rate = np.asarray(flow_rate, dtype=np.float64)
-    return np.asarray(_POINT_SINK * (rate**2 / acceleration) ** 0.2)

@@ -1,35 +1,99 @@
-"""Residual liquid: what a chamber keeps when gas is drawn into its port, and what a pair can use."""
+"""What a chamber cannot be emptied of: liquid whose port draws gas, or that the gas no longer drives."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics.tube.ends import DRAW_DOWN_UNCERTAINTY, draw_down_depth
+from ringbalance.physics.tube.draw_down import port_depth
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import FlowLaw
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import half_widths
 
 _SAMPLES: Final = 201
-"""Fills at which gas in the port is looked for before the root is refined."""
+"""Fills at which gas in the port is looked for first."""
 _PIECES: Final = 32
-"""Of an interval that holds the root, per refinement."""
-_FACTORS: Final = 201
-"""Nodes of a table over factors of the velocity."""
-_REFINEMENTS: Final = 2
-"""Leave 2e-6 of the range, within which a straight line is good to 1e-9."""
+"""Of an interval between them; a straight line over one is good to 1e-8 of a fill."""
+_STALL_SAMPLES: Final = 65
+_STALL_ROUNDS: Final = 4
+"""Of refinement, each to a 64th: 1e-8 of a fill is left."""
+_NEARLY_EMPTY: Final = 1e-6
+"""Fill ratio at which a chamber's last liquid is looked at."""
 _NOTHING: Final = 1e-9
 """Below this a fill ratio is not told from zero."""
+FACTOR: Final = "draw_down_factor"
+"""The scene's factor on the depth of `port_depth`, an uncertain input as any other."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drawing:
+    """At which fills gas enters the port of a chamber that a running tube empties."""
+
+    scene: Scene
+    fill_ratio: FloatArray
+    """Of the driven chamber, equally spaced."""
+    flow_rate: FloatArray
+    """Through the running tube there, m^3/s."""
+    depth: FloatArray
+    """Of the liquid over the port there, m."""
+
+    @classmethod
+    def of(cls, scene: Scene, *, law: FlowLaw) -> Drawing:
+        """Tabulate flow and depth of a scene under a law.
+
+        Raises: ValueError: a disc at rest.
+        """
+        fills = np.linspace(0.0, scene.disc.max_fill_ratio, (_SAMPLES - 1) * _PIECES + 1)
+        level = surface_radius(disc=scene.disc, fill_ratio=fills)
+        rate, _ = _flow_rate(scene, law, fills)
+        return cls(
+            scene=scene, fill_ratio=fills, flow_rate=rate, depth=np.asarray(scene.tube.port_radius - level)
+        )
+
+    def residual(self, *, depth: npt.ArrayLike = 1.0, velocity: npt.ArrayLike = 1.0) -> FloatArray:
+        """Fill ratio below which gas enters the port, with factors of the draw-down depth and the velocity.
+
+        The depth over the port, r_p - a(x), equals that of `port_depth` for the flow Q = S u(x) of the law's
+        running tube; the largest such x counts, because a chamber empties from above.
+        Returns: x from 0 (no gas before the chamber is empty, or no flow) to max_fill_ratio (gas at any
+            fill), of the factors' broadcast shape.
+        """
+        factor, faster = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v)) for v in (depth, velocity)))
+
+        def excess(places: npt.NDArray[np.intp]) -> FloatArray:
+            rate = faster[:, None] * self.flow_rate[places]
+            return factor[:, None] * port_depth(self.scene, flow_rate=rate) - self.depth[places]
+
+        last = self.fill_ratio.size - 1
+        drawn = excess(np.arange(0, last + 1, _PIECES)[None, :]) > 0
+        start = np.where(drawn.any(axis=1), last - _PIECES * np.argmax(drawn[:, ::-1], axis=1), -1)
+        places = np.clip(start[:, None], 0, last - _PIECES) + np.arange(_PIECES + 1)
+        fine = excess(places)
+        cell = _PIECES - 1 - np.argmax((fine > 0)[:, -2::-1], axis=1)
+        rows = np.arange(start.size)
+        above, under = fine[rows, cell], fine[rows, cell + 1]
+        step = self.fill_ratio[1] - self.fill_ratio[0]
+        part = above / np.where(above > under, above - under, 1.0)
+        inside = self.fill_ratio[places[rows, cell]] + step * part
+        found = np.where(start == last, self.fill_ratio[-1], np.where(start < 0, 0.0, inside))
+        # Where nothing flows, what rounding leaves over a port on the wall of a mesh is no residual.
+        return np.where(found > _NOTHING, found, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ResidualLiquid:
-    """Limits of a pair's transfer under the scene's gas pressure; uncertainties are expanded (95 %)."""
+    """Limits of a pair's transfer under the scene's gas pressure; uncertainties are expanded (95 %).
+
+    Those of the least fill, and of what follows from it, stand in the calibration's budgets.
+    """
 
     fill_ratio: float
     """Of the driven chamber, at which gas enters its port."""
@@ -39,122 +103,152 @@ class ResidualLiquid:
     depth_uncertainty: float
     flow_rate: float
     """Through the tube then, m^3/s."""
+    stalled_fill_ratio: float
+    """Of the driven chamber, at which an injection moves no liquid any more."""
+    least_fill_ratio: float
+    """To which injections can bring a chamber: the larger one of both, at most equal fills."""
     largest_fill_ratio: float
     """That the opposite chamber reaches then."""
     usable_volume: float
     """That a pair can move from one chamber to the other, m^3."""
-    usable_volume_uncertainty: float
     pair_moment: float
     """Largest moment of a pair with one chamber empty, by geometry, kg m."""
     usable_pair_moment: float
-    """Largest moment of a pair that no gas passes through, kg m."""
-    usable_pair_moment_uncertainty: float
+    """Largest moment of a pair to which injections can bring it, kg m."""
+    reach: float
+    """Largest unbalance that all pairs together cancel in whatever direction it lies, kg m."""
+    reach_share: float
+    """The same over the usable moment of a pair."""
+
+    @property
+    def limited_by(self) -> Literal["draw_down", "gas_pressure", "nothing"]:
+        """What keeps a chamber from being emptied: gas in its port, or gas that drives no liquid any more."""
+        if self.least_fill_ratio == 0:
+            return "nothing"
+        return "gas_pressure" if self.stalled_fill_ratio > self.fill_ratio else "draw_down"
 
     @classmethod
     def of(cls, scene: Scene, *, law: CalibratedLaw) -> ResidualLiquid:
-        """Residual fill with its uncertainty, and the volume and the moment that it leaves to a pair.
+        """Residual fill with its uncertainty, stall, and the volume and the moments that both leave.
 
-        Uncertainty: that of the depth's correlation, and of the velocity to the power 2/5.
+        Uncertainty of the residual fill: that of the depth, and of the velocity through it.
         """
-        x, top = residual_fill_ratio(scene, law=law), scene.disc.max_fill_ratio
-        rate, width = _flow_rate(scene, law, np.array([x]))
-        relative = _depth_uncertainty(rate, width)
+        drawing, top = Drawing.of(scene, law=law), scene.disc.max_fill_ratio
+        x = float(drawing.residual()[0])
+        rate, width = (float(v[0]) for v in _flow_rate(scene, law, np.array([x])))
+        stated = half_widths(scene).get(FACTOR, 0.0) / scene.tube.draw_down_factor
+        relative = math.hypot(stated, _by_flow(scene, rate, width))
         change = min(relative, 0.99)
-        low, high = (float(v) for v in _residual(scene, law, np.array([1 - change, 1 + change])))
-        volume = chamber_volume(disc=scene.disc)
-
-        def moment(fill: float) -> float:
-            return float(law.moment.pair_moment(fill_ratio=max(top - fill, fill), opposite_fill_ratio=fill))
-
-        ends = law.moment.half_width(np.array([x, top - x]))
-        half = min(x, top / 2)
-        depth = float(draw_down_depth(flow_rate=rate[0], acceleration=_acceleration(scene)))
+        low, high = (float(v) for v in drawing.residual(depth=np.array([1 - change, 1 + change])))
+        stalled = stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure)
+        least = min(max(x, stalled), top / 2)
+        usable, share = (
+            _pair_moment(law, top, least),
+            reach_share(scene.disc.chambers, passes_on=x >= stalled),
+        )
+        depth = float(port_depth(scene, flow_rate=rate))
         return cls(
             fill_ratio=x,
             fill_ratio_uncertainty=(high - low) / 2,
             depth=depth,
             depth_uncertainty=relative * depth,
-            flow_rate=float(rate[0]),
-            largest_fill_ratio=top - half,
-            usable_volume=(top - 2 * half) * volume,
-            usable_volume_uncertainty=(high - low) * volume,
-            pair_moment=moment(0.0),
-            usable_pair_moment=moment(half),
-            usable_pair_moment_uncertainty=math.hypot(
-                (moment(min(low, top / 2)) - moment(min(high, top / 2))) / 2, *ends
-            ),
+            flow_rate=rate,
+            stalled_fill_ratio=stalled,
+            least_fill_ratio=least,
+            largest_fill_ratio=top - least,
+            usable_volume=(top - 2 * least) * chamber_volume(disc=scene.disc),
+            pair_moment=_pair_moment(law, top, 0.0),
+            usable_pair_moment=usable,
+            reach=share * usable,
+            reach_share=share,
         )
 
-    def usable_moment_uncertainty(self, scene: Scene, *, law: CalibratedLaw) -> float:
-        """Of the usable pair moment, with the law's own uncertainties in place of those it was found with."""
+    def model_uncertainty(self, scene: Scene, *, law: CalibratedLaw, head: float) -> tuple[float, float]:
+        """Of the least fill and of the usable pair moment, kg m, by numerics and models alone.
+
+        Args: `law`: with these uncertainties and no others. `head`: that of a difference of two wall
+            pressures, Pa, which moves the stall.
+        """
         top, x = scene.disc.max_fill_ratio, self.fill_ratio
-        ends = np.hypot(*law.moment.half_width(np.array([x, top - x])))
-        if self.depth_uncertainty == 0:
-            return float(ends)
-        relative = _depth_uncertainty(*_flow_rate(scene, law, np.array([x])))
-        by_depth = math.sqrt(max(self.usable_pair_moment_uncertainty**2 - ends**2, 0.0))
-        return math.hypot(by_depth * relative * self.depth / self.depth_uncertainty, ends)
+        rate, width = (float(v[0]) for v in _flow_rate(scene, law, np.array([x])))
+        change = min(_by_flow(scene, rate, width), 0.99)
+        drawn = Drawing.of(scene, law=law).residual(depth=np.array([1 - change, 1 + change]))
+        stalled = [
+            stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure + side * head)
+            for side in (1, -1)
+        ]
+        low, high = np.minimum(np.maximum(drawn, stalled), top / 2)
+        by_fill = (_pair_moment(law, top, low) - _pair_moment(law, top, high)) / 2
+        ends = law.moment.half_width(np.array([self.least_fill_ratio, self.largest_fill_ratio]))
+        return float(high - low) / 2, math.hypot(by_fill, *ends)
+
+
+def reach_share(chambers: int, *, passes_on: bool = True) -> float:
+    """Smallest radius of what n pairs cancel together, over what one does along its axis: cot(pi/(2 n)).
+
+    Each of n pairs, pi/n apart, gives a moment between -U and U along its axis: together a regular polygon of
+    2 n sides, U/sin(pi/(2 n)) to its corners and U cot(pi/(2 n)) to its sides: U with four chambers,
+    1.73 U with six.
+    Args: `passes_on`: whether a chamber that is emptied leaves its share to other pairs, as one at its
+        residual fill does. One that the gas drives no further is asked again and again: then U, along a pair.
+    Source: elementary geometry (a sum of segments is a zonotope).
+    """
+    return 1 / math.tan(math.pi / chambers) if passes_on else 1.0
 
 
 def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
-    """Fill ratio below which gas enters the port of the driven chamber under the scene's gas pressure.
+    """Fill ratio below which gas enters the port of the driven chamber under the scene's gas pressure."""
+    return float(Drawing.of(scene, law=law).residual()[0])
 
-    The depth over the port, r_p - a(x), equals that of `draw_down_depth` for the flow Q = S u(x) of the law's
-    running tube, g_c = omega^2 r_p; the largest such x counts, because a chamber empties from above.
-    Returns: x from 0 (no gas before the chamber is empty, or no flow) to max_fill_ratio (gas at any fill).
-    Raises: ValueError: a disc at rest.
+
+def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float) -> float:
+    """Fill ratio at which an injection moves no liquid any more; total/2 where it moves none at equal fills.
+
+    An injection starts with what the tube holds while the gas is off. Over a crest where no column holds
+    that is p_gas = rho omega^2 (a^2 - r_m^2)/2 with vented gas, of a full siphon that of `stall_pressure`. A
+    long injection whose flow has carried the gas off the crest goes on to a lower fill, from which no
+    injection could correct any further.
     """
-    return float(_residual(scene, law, np.ones(1))[0])
+
+    def moves(fills: FloatArray) -> BoolArray:
+        opposite = total - fills
+        rest = law.evaluate(fill_ratio=fills, opposite_fill_ratio=opposite, gas_pressure=0.0, primed=True)
+        flow = law.evaluate(
+            fill_ratio=fills, opposite_fill_ratio=opposite, gas_pressure=gas_pressure, primed=rest.primed
+        )
+        return flow.velocity > 0
+
+    lowest = max(0.0, total - law.max_fill_ratio)
+    stopped = first_stalled(moves, start=total / 2, end=max(lowest, _NEARLY_EMPTY))
+    return lowest if stopped is None else stopped
 
 
-def residual_by_velocity(scene: Scene, *, law: FlowLaw) -> tuple[FloatArray, FloatArray]:
-    """Factors of a law's velocity from 0 to 2, and the same with each: the depth goes with its power 2/5."""
-    factors = np.linspace(0.0, 2.0, _FACTORS)
-    return factors, _residual(scene, law, factors**0.4)
+def first_stalled(
+    moves: Callable[[FloatArray], BoolArray], *, start: float, end: float = _NEARLY_EMPTY
+) -> float | None:
+    """Fill from `start` down to `end` at which liquid first stops moving; None where it moves at all."""
+    for _ in range(_STALL_ROUNDS):
+        fills = np.linspace(start, end, _STALL_SAMPLES)
+        stopped = np.flatnonzero(~moves(fills))
+        if not stopped.size:
+            return None
+        if stopped[0] == 0:
+            return start
+        start, end = float(fills[stopped[0] - 1]), float(fills[stopped[0]])
+    return end
 
 
-def _depth_uncertainty(rate: FloatArray, width: FloatArray) -> float:
-    """Relative: that of the correlation, and of the flow to the power 2/5."""
-    by_flow = 0.4 * float(width[0] / rate[0]) if rate[0] > 0 else 0.0
-    return math.hypot(DRAW_DOWN_UNCERTAINTY, by_flow)
+def _pair_moment(law: CalibratedLaw, total: float, fill: float) -> float:
+    return float(law.moment.pair_moment(fill_ratio=max(total - fill, fill), opposite_fill_ratio=fill))
 
 
-def _acceleration(scene: Scene) -> float:
-    return scene.rotor.speed**2 * scene.tube.port_radius
+def _by_flow(scene: Scene, rate: float, width: float) -> float:
+    """Relative change of the depth over the port by a half-width of the flow."""
+    low, here, high = port_depth(scene, flow_rate=np.array([max(rate - width, 0.0), rate, rate + width]))
+    return float((high - low) / (2 * here)) if rate > 0 else 0.0
 
 
 def _flow_rate(scene: Scene, law: FlowLaw, fills: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Q of the running tube and its expanded uncertainty, m^3/s."""
     flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=True)
     return scene.tube.area * np.maximum(flow.velocity, 0.0), scene.tube.area * flow.uncertainty
-
-
-def _residual(scene: Scene, law: FlowLaw, factors: FloatArray) -> FloatArray:
-    """Largest fills at which `factors` times the draw-down depth reach the liquid's depth over the port."""
-    fills = np.linspace(0.0, scene.disc.max_fill_ratio, _SAMPLES)
-    needed, depth = _depths(scene, law, fills)
-    gas = factors[:, None] * needed - depth > 0
-    last = _SAMPLES - 1 - np.argmax(gas[:, ::-1], axis=1)
-    found = np.where(np.any(gas, axis=1), fills[last], 0.0)
-    inside = np.any(gas, axis=1) & (last < _SAMPLES - 1)
-    if not np.any(inside):
-        return found
-    low, step, held = fills[last[inside]], fills[1] - fills[0], factors[inside, None]
-    for _ in range(_REFINEMENTS):
-        places = low[:, None] + step * np.linspace(0.0, 1.0, _PIECES + 1)
-        needed, depth = _depths(scene, law, np.minimum(places, fills[-1]))
-        excess = held * needed - depth
-        rows = np.arange(low.size)
-        cell = _PIECES - 1 - np.argmax((excess > 0)[:, -2::-1], axis=1)
-        above, below = excess[rows, cell], excess[rows, cell + 1]
-        low, step = places[rows, cell], step / _PIECES
-    found[inside] = low + step * np.where(above > below, above / (above - below), 0.0)
-    # Where nothing flows, what rounding leaves over a port on the wall of a mesh is no residual.
-    return np.where(found > _NOTHING, found, 0.0)
-
-
-def _depths(scene: Scene, law: FlowLaw, fills: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Draw-down depth, and depth of the liquid over the port, m."""
-    needed = draw_down_depth(flow_rate=_flow_rate(scene, law, fills)[0], acceleration=_acceleration(scene))
-    level = surface_radius(disc=scene.disc, fill_ratio=fills)
-    return needed, np.asarray(scene.tube.port_radius - level)

@@ -11,10 +11,12 @@ from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING, THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.pages.requirements import (
+    CAPACITY,
     SMALLEST,
     STANDING,
     Requirement,
     decision,
+    more_capacity,
     requirement_figure,
     requirement_record,
     requirement_table,
@@ -276,8 +278,8 @@ def _actions(evidence: Record, rows: Sequence[Requirement]) -> list[str]:
             "Put the valve into the scene and run tune: it recommends the times to add to the valve-open "
             "times, without which small corrections transfer no liquid."
         )
-    if verdicts.get("Correction capacity of one pair") in {MISSED, OPEN}:
-        told.append("Balance the rotor better by hand, or take a larger disc: the capacity has no reserve.")
+    if verdicts.get(CAPACITY) in {MISSED, OPEN}:
+        told.append(more_capacity(evidence["calibration"]["residual_liquid"]))
     if any("siphon crest radius" in row.rests for row in rows):
         told.append(_crest(evidence))
     if any("bore" in row.rests for row in rows):

@@ -32,6 +32,7 @@ from ringbalance.reports.summary import (
 )
 from ringbalance.scene import Scene
 
+CAPACITY: Final = "Correction capacity in any direction"
 STANDING: Final = "Vibration up to which the scene’s valve-open times transfer no liquid"
 SMALLEST: Final = "Smallest correction that the valve can give"
 _NONE: Final = "the scene asks for none"
@@ -134,31 +135,34 @@ def _capacity(evidence: Record) -> Requirement | None:
     stated = (own.get("requirement") or {}).get("correction_moment_kg_m") is not None
     path = "summary.requirement.correction_moment_kg_m" if stated else "summary.needed_moment_kg_m"
     width = 0.0 if stated else own.get("needed_uncertainty_kg_m") or 0.0
-    usable = "calibration.residual_liquid.usable_pair_moment_kg_m"
-    total, needed = _usable_width(evidence), evidence_at(evidence, path)
+    reach, total = "calibration.residual_liquid.reach_kg_m", rest["reach_uncertainty"]
+    needed = evidence_at(evidence, path)
     both = math.hypot(total, width)
     return Requirement(
-        name="Correction capacity of one pair",
+        name=CAPACITY,
         wanted=f"at least {read(evidence, path, 'kg m', width=width)}",
-        result=read(evidence, usable, "kg m", width=total),
-        verdict=above(rest["usable_pair_moment_kg_m"], needed, both),
+        result=read(evidence, reach, "kg m", width=total),
+        verdict=above(rest["reach_kg_m"], needed, both),
         rests=resting(
             evidence,
             *(() if stated else ("rotor.initial_amplitude",)),
-            *("rotor.influence_coefficient", "disc.plate_thickness", "tube.bore"),
+            *("rotor.influence_coefficient", "disc.plate_thickness"),
+            "tube.hump_radius" if rest.get("limited_by") == "gas_pressure" else "tube.bore",
         ),
         required=needed,
-        reached=rest["usable_pair_moment_kg_m"],
+        reached=rest["reach_kg_m"],
         uncertainty=both,
     )
 
 
-def _usable_width(evidence: Record) -> float:
-    calibration = evidence["calibration"]
-    budget = (calibration.get("budgets") or {}).get("usable_moment")
-    return float(
-        budget["total"] if budget else calibration["residual_liquid"]["usable_pair_moment_uncertainty"]
-    )
+def more_capacity(rest: Record) -> str:
+    """What to do about a capacity that is too small, by what limits it."""
+    if rest.get("limited_by") == "gas_pressure":
+        return (
+            "Raise the gas pressure, and tune again, for the flow becomes faster: at this pressure the gas "
+            "stalls before the capacity is used."
+        )
+    return "Balance the rotor better by hand, or take a larger disc: the capacity has no reserve."
 
 
 def _gas_pressure(evidence: Record) -> Requirement | None:

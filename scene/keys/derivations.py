@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.keys.fields import LETTERS
+from ringbalance.scene.keys.fields import LEAST_CHAMBERS, LETTERS
 
 _NEARLY_WHOLE = 1e-3
 
@@ -28,12 +28,12 @@ def swept_area(*, radius: npt.ArrayLike, central_angle: float, plate_thickness: 
 def even_number_of_chambers(central_angle: float) -> int | None:
     """Number of chambers of an angle theta (rad) that fill the circle; None when it would not be even.
 
-    n = 2 pi / theta, when that is an even whole number to within 0.001, as drawings round angles.
+    n = 2 pi / theta, when that is an even whole number from 4 on to within 0.001, as drawings round angles.
     """
     exact = 2 * math.pi / central_angle
     nearest = round(exact) if exact <= len(LETTERS) else 0
     close = abs(exact - nearest) <= _NEARLY_WHOLE
-    return nearest if close and nearest >= 2 and nearest % 2 == 0 else None
+    return nearest if close and nearest >= LEAST_CHAMBERS and nearest % 2 == 0 else None
 
 
 def trial_sequence(chambers: int) -> tuple[str, ...]:

@@ -16,6 +16,8 @@ from ringbalance.scene.units import DIMENSIONS, FieldError, parse_quantity
 _LARGEST_NUMBER = 1e9
 _LONGEST_NAME = 200
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+LEAST_CHAMBERS = 4
+"""Two pairs: one corrects along its own line only."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,15 +147,17 @@ def _whole(value: object, allowed: str) -> int:
 
 
 def chamber_count() -> Reader:
-    """Reader of the number of chambers: even, and no more than there are letters for."""
-    allowed = f"an even whole number from 2 to {len(LETTERS)}"
+    """Reader of the number of chambers: even, at least two pairs, and no more than there are letters for."""
+    allowed = f"an even whole number from {LEAST_CHAMBERS} to {len(LETTERS)}"
 
     def read(value: object) -> int:
         count = _whole(value, allowed)
         if count % 2:
             raise FieldError("it must be even: each chamber needs its opposite", allowed)
-        if not 2 <= count <= len(LETTERS):
-            raise FieldError(f"it must lie from 2 to {len(LETTERS)}", allowed)
+        if count == 2:
+            raise FieldError("two chambers correct along one line only", allowed)
+        if not LEAST_CHAMBERS <= count <= len(LETTERS):
+            raise FieldError(f"it must lie from {LEAST_CHAMBERS} to {len(LETTERS)}", allowed)
         return count
 
     return Reader(read=read, allowed=allowed, summary=allowed)

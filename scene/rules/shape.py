@@ -101,9 +101,10 @@ def _chambers_even(angle: float) -> Finding | None:
     if even_number_of_chambers(angle) is not None:
         return None
     return Finding(
-        problem=f"360 deg / central_angle = {2 * math.pi / angle:.6g} is not an even number of chambers",
-        allowed="180 deg, 90 deg, 60 deg, 45 deg, 36 deg ... (13.8462 deg for 26 chambers at the most), "
-        "or chambers given as well",
+        problem=f"360 deg / central_angle = {2 * math.pi / angle:.6g} is not an even number of chambers, at "
+        "least four",
+        allowed="90 deg, 60 deg, 45 deg, 36 deg ... (13.8462 deg for 26 chambers at the most), or at most "
+        "90 deg with chambers given as well",
     )
 
 

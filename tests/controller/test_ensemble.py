@@ -34,7 +34,7 @@ from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment, paper_model
-from ringbalance.reduced_model.operating.residual import residual_by_velocity, residual_fill_ratio
+from ringbalance.reduced_model.operating.residual import Drawing, residual_fill_ratio
 from ringbalance.scene.models import Scene
 
 EXACT = MemberUncertainty(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)
@@ -89,7 +89,9 @@ def alone(scene: Scene, model: BalancerModel, members: Members, member: int) -> 
         flow=replace(law, drag_coefficient=k),
         moment=replace(moment, moment_per_transferred_mass=held),
     )
-    return replace(scene, rotor=rotor, controller=settings), changed
+    assert members.draw_down is not None
+    tube = replace(scene.tube, draw_down_factor=float(members.draw_down[member]))
+    return replace(scene, rotor=rotor, controller=settings, tube=tube), changed
 
 
 def various(scene: Scene, *, size: int) -> Members:
@@ -104,6 +106,7 @@ def various(scene: Scene, *, size: int) -> Members:
         influence_coefficient=base.influence_coefficient * random.uniform(0.8, 1.2, size),
         lag_angle=lag,
         proportional=base.proportional * random.uniform(0.4, 3.0, size),
+        draw_down=random.uniform(0.5, 1.5, size),
     )
 
 
@@ -119,7 +122,7 @@ def test_every_member_is_the_scalar_run(scene: Scene, chambers: int, noise: bool
         asked = replace(asked, sensor=scene.sensor)
     model = paper_model(asked)
     members = various(asked, size=size)
-    residuals = np.interp(members.velocity_factor, *residual_by_velocity(asked, law=model.flow))
+    residuals = members.residual_fill(Drawing.of(asked, law=model.flow))
     found = simulate_members(asked, model, members=members, seed=4)
     outcomes = []
     for member in range(size):
@@ -305,14 +308,18 @@ def test_more_uncertainty_more_overshoot(scene: Scene, model: BalancerModel) -> 
 
 
 def test_members_are_drawn_with_the_half_widths(scene: Scene) -> None:
-    uncertainty_95 = MemberUncertainty(velocity=0.1, moment=0.02, influence_coefficient=0.2, lag_angle=0.05)
+    uncertainty_95 = MemberUncertainty(
+        velocity=0.1, moment=0.02, influence_coefficient=0.2, lag_angle=0.05, draw_down=0.3
+    )
     drawn = Members.drawn(scene, uncertainty_95=uncertainty_95, seed=0, block=0)
     for values, low, high in (
         (drawn.velocity_factor, 1 / 1.1, 1.1),
         (drawn.moment_factor, 1 / 1.02, 1.02),
         (drawn.influence_coefficient / scene.rotor.influence_coefficient, 1 / 1.2, 1.2),
         (drawn.lag_angle - scene.rotor.lag_angle, -0.05, 0.05),
+        (drawn.draw_down, 1 / 1.3, 1.3),
     ):
+        assert values is not None
         assert np.mean((values > low) & (values < high)) == pytest.approx(0.95, abs=0.01)
         assert np.mean(values > high) == pytest.approx(0.025, abs=0.007)
 

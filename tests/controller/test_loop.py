@@ -144,7 +144,7 @@ def test_an_unbalance_beyond_the_capacity_is_said_so(scene: Scene, model: Balanc
 @pytest.mark.parametrize("kind", ["target_vector", "law_based"])
 def test_neighbours_give_what_a_chamber_at_its_residual_fill_cannot(scene: Scene, kind: str) -> None:
     disc = replace(scene.disc, chambers=8, central_angle=math.pi / 4)
-    eight = with_rotor(replace(scene, disc=disc), initial_amplitude=10e-6, initial_phase=0.3)
+    eight = with_rotor(replace(scene, disc=disc), initial_amplitude=10.5e-6, initial_phase=0.3)
     run = simulate(with_controller(eight, kind=kind), paper_model(eight))
     assert run.settled, run.status
     # The unbalance lies between A and B, and is more than both can cancel: C gives what they lack.

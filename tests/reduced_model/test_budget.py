@@ -123,13 +123,18 @@ class _Exact:
         return min(broken, full), full, rest
 
     def _residual(self) -> float:
-        top, tube = self.disc.max_fill_ratio, self.scene.tube
+        top, tube, disc = self.disc.max_fill_ratio, self.scene.tube, self.disc
+        pull, nu = self.square * tube.port_radius, self.scene.liquid.kinematic_viscosity
+        feed = math.sqrt(disc.central_angle * disc.outer_radius * disc.axial_width / math.pi)
 
         def excess(x: float) -> float:
             u = self._flow(x, top - x, primed=True)[0]
             rate = math.pi / 4 * tube.bore**2 * u
-            depth = 1.25 * (2 * math.pi**2) ** -0.2 * (rate**2 / (self.square * tube.port_radius)) ** 0.2
-            return float(depth - (tube.port_radius - self._level(x)))
+            sink = 1.25 * (2 * math.pi**2) ** -0.2 * (rate**2 / pull) ** 0.2
+            near = min(sink, 1.5 * (rate / (math.pi * tube.bore * math.sqrt(pull))) ** (2 / 3))
+            way = math.log(feed / max(near, tube.bore / 2)) - 0.75
+            depth = (near**4 + 6 * nu * rate / (math.pi * pull) * way) ** 0.25
+            return float(tube.draw_down_factor * depth - (tube.port_radius - self._level(x)))
 
         return _solution(excess, 0.0, top / 2)
 
@@ -150,6 +155,7 @@ class _Exact:
             "wall_pressure": self._pressure(self._level(top)),
             "moment": self._moment(top),
             "lambda": 2 * level * math.sin(self._angle(level)) / self._angle(level),
+            "least_fill_ratio": x,
             "usable_moment": self._moment(top - x) - self._moment(x),
             "velocity": u,
             "drag_coefficient": 2 * math.exp(self.heads[0](np.log(u))) / u**2 - 1,
@@ -252,7 +258,9 @@ def test_inputs_are_named_by_their_place_in_the_scene(table_1_scene: Scene) -> N
 
 def test_a_scene_with_exact_inputs_leaves_numerics_and_models(table_1_scene: Scene) -> None:
     scene = table_1_scene
-    exact = _uncertain(scene, dict.fromkeys(("density", "kinematic_viscosity", "roughness"), 0.0))
+    exact = _uncertain(
+        scene, dict.fromkeys(("density", "kinematic_viscosity", "roughness", "draw_down_factor"), 0.0)
+    )
     for budget in budgets(scene=exact, calibration=calibrate(exact)).values():
         assert not budget.inputs
         assert budget.total == math.hypot(budget.numerical, budget.model) > 0

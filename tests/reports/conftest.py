@@ -147,6 +147,8 @@ def _calibration() -> dict[str, Any]:
             "pair_moment_kg_m": 1238e-6,
             "usable_pair_moment_kg_m": 922e-6,
             "usable_pair_moment_uncertainty": 100e-6,
+            "reach_kg_m": 922e-6,
+            "reach_uncertainty": 100e-6,
         },
         "budgets": {
             "lambda": budget(0.07204, "m", numerical=2e-8, input=1.1e-4, model=2e-6),

@@ -170,7 +170,7 @@ CHANGES: tuple[tuple[tuple[Any, ...], Any, str], ...] = (
     (("closed_loop", "calibrated", "settling_time_s"), 9.87, "9.87"),
     (("closed_loop", "paper", "overshoots"), 1717, "1717"),
     (("closed_loop", "calibrated", "loop_factor"), 1.234, "1.23"),
-    (("calibration", "residual_liquid", "usable_pair_moment_kg_m"), 777e-6, "780 ± 100"),
+    (("calibration", "residual_liquid", "reach_kg_m"), 777e-6, "780 ± 100"),
     (("verification", 1, "quantities", 0, "value"), 2.345e5, "0.23450"),
     (("verification", 1, "consequence"), "Use the other formula.", "Use the other formula."),
     (("verification", 0, "doubts"), ["Nobody has seen it."], "Nobody has seen it."),

@@ -106,7 +106,7 @@ def test_junk_in_place_of_values(
 @given(
     outer=st.floats(5, 500),
     inner=st.floats(0.1, 1.1),
-    chambers=st.sampled_from([2, 4, 6, 8]),
+    chambers=st.sampled_from([4, 6, 8]),
     angle=st.floats(0.3, 1.05),
     plate=st.floats(0, 0.6),
     hump=st.floats(0.1, 1.1),

@@ -60,7 +60,7 @@ class Axis:
 AXES: Final = (
     Axis("speed", "speed", "rpm", 1.0, 1e5, usual=(300.0, 6e4)),
     Axis("fill", "largest fill ratio", "1", 1e-6, 1.0, usual=(0.05, 0.9)),
-    Axis("angle", "central angle", "deg", 5.0, 175.0, usual=(20.0, 170.0), spacing="linear"),
+    Axis("angle", "central angle", "deg", 5.0, 89.0, usual=(10.0, 85.0), spacing="linear"),
     Axis("plate", "plate thickness over that which closes the chamber", "1", 0.0, 1.05, (0.0, 0.8), "linear"),
     Axis("viscosity", "kinematic viscosity", "m^2/s", 1e-7, 1e-2, usual=(1e-7, 1e-3)),
     Axis("bore", "bore", "mm", 0.1, 20.0, usual=(0.3, 6.0)),
@@ -112,7 +112,7 @@ def _column(scene: Scene, speed: float) -> float:
 def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, float]) -> Document:
     """The document of a scene's own file with some axes set.
 
-    What hangs on a value follows it: two chambers for any central angle, bends that the bore can take, and a
+    What hangs on a value follows it: four chambers for any central angle, bends that the bore can take, and a
     tube that reaches over the crest.
     """
     changed: Document = {table: {} for table in _TABLES} | deepcopy(dict(document))
@@ -131,8 +131,7 @@ def fitted(
     """The document of `varied` with a rotor that suits what its disc can balance, and the loop's axes set.
 
     A disc that carries less liquid is put on a lighter rotor: its influence coefficient grows so that all
-    liquid of a pair makes the same vibration, and limit, gain and noise mean what they meant before. The
-    unbalance of a disc with a single pair lies along that pair, the only direction it can balance.
+    liquid of a pair makes the same vibration, and limit, gain and noise mean what they meant before.
     Args: `scene`: the scene that was varied. `made`: the scene that the document makes.
     """
     changed = deepcopy(dict(document))
@@ -142,7 +141,7 @@ def fitted(
     if "assumed_influence_coefficient" in control:
         believed = lighter * scene.controller.assumed_influence_coefficient
         control["assumed_influence_coefficient"] = _influence(believed)
-    rotor["initial_vibration"] = _vibration(scene=scene, made=made, values=values)
+    rotor["initial_vibration"] = _vibration(scene=scene, values=values)
     control["proportional"] = f"{values.get('gain', 1.0) * scene.controller.proportional!r} s/m"
     noise = values.get("noise", scene.sensor.amplitude_noise / scene.controller.limit)
     changed["sensor"]["amplitude_noise"] = f"{noise * scene.controller.limit!r} m"
@@ -153,11 +152,9 @@ def _influence(coefficient: float) -> str:
     return f"{coefficient!r} m/(kg*m)"
 
 
-def _vibration(*, scene: Scene, made: Scene, values: Mapping[str, float]) -> Document:
+def _vibration(*, scene: Scene, values: Mapping[str, float]) -> Document:
     before, phase = scene.rotor.initial_amplitude, scene.rotor.initial_phase
     amplitude = values["unbalance"] * _capacity(scene) if "unbalance" in values else before
-    if made.disc.chambers == 2:
-        phase = -scene.rotor.lag_angle
     return {"amplitude": f"{amplitude!r} m", "phase": f"{math.degrees(phase)!r} deg"}
 
 
@@ -180,7 +177,7 @@ def _set_plate(document: Document, value: float, scene: Scene, values: Values) -
 
 
 def _set_angle(document: Document, value: float, _: Scene, __: Values) -> None:
-    document["disc"] |= {"central_angle": f"{value!r} deg", "chambers": 2}
+    document["disc"] |= {"central_angle": f"{value!r} deg", "chambers": 4}
     document["controller"].pop("sequence", None)
 
 

@@ -18,6 +18,7 @@ from ringbalance.reduced_model.chamber.values import (
 from ringbalance.reduced_model.contribution import Contribution, percent
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.rules.validity import METAL_DENSITY
 
 Terms = Mapping[str, Contribution]
 
@@ -30,8 +31,6 @@ SURFACE_TENSION: Final = 0.073
 """Of water at 20 degC against air, N/m: taken for every ordinary liquid, as an upper bound."""
 METAL_SURFACE_TENSION: Final = 0.72
 """Of gallium, N/m: taken above `METAL_DENSITY`."""
-METAL_DENSITY: Final = 3000.0
-"""kg/m^3."""
 _MODES: Final = 24
 """Of a chamber; what higher ones hold of gravity's tilt falls with the square of their number."""
 _SWING_FLOOR: Final = 0.2

@@ -73,8 +73,8 @@ def test_thin_rings_answer_in_higher_modes(table_1_scene: Scene) -> None:
 def test_a_fast_rotor_by_hand(table_1_calibration: Calibration) -> None:
     # a = 34.888 mm, alpha 0.70558, ln(R2/a) 0.24336, g/omega^2 8.943 um over a depth of 9.612 mm.  Shares of
     # modes 1 to 3 by quadrature: sin phi 0.5454 and -0.0495, cos phi 0.0976; s^2 1.1005, 3.538 and 6.180.
-    # Times 0.94^2 to 1.06^2 the first holds 1, where damping leaves 1/d: E = 4.822e-7, layers 2 R2/B + q/depth
-    # + (1 - q)/alpha = 5.082 with q = 1.0834/sinh(1.0834) = 0.8282, so d = 2.495e-3; the others swing
+    # Times 0.94^2 to 1.06^2 the first holds 1, where damping leaves 1/d: E = 4.822e-7, layers 2 R2/B +
+    # q/depth + (1 - q)/alpha = 5.082 with q = 1.0834/sinh(1.0834) = 0.8282, so d = 2.495e-3; the others swing
     # 1.470 and 1.224 from the lower end: 0.5454 400.8 + 0.061 and 0.143 g/omega^2 = 20.3 % of the depth.
     chamber = table_1_calibration.chamber
     assert chamber.moment.status.ok

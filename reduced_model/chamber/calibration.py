@@ -17,7 +17,7 @@ from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
 from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import RingValues
-from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
+from ringbalance.reduced_model.tables import HermiteTable, level_table, table_from_samples
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -63,7 +63,8 @@ class Curve:
         """
         squares = (self.uncertainty**2 + inputs**2 + self.interpolation**2)[: self.table.value.size]
         nodes = self.table.nodes
-        return table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
+        # Where waves may become resonant it steps from node to node.
+        return level_table(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -129,7 +129,10 @@ def chamber_hierarchies(scene: Scene) -> tuple[ModelHierarchy, ModelHierarchy]:
 def _swing_uncertainty(
     scene: Scene, fills: FloatArray, terms: Mapping[str, Mapping[str, Contribution]], part: str
 ) -> float:
-    """What linear sloshing leaves open: its square, its meshes, what its frequencies' uncertainty moves."""
+    """What linear sloshing leaves open: its square, its meshes, what its frequencies' uncertainty moves.
+
+    At most 1: nothing is known then.
+    """
     if scene.environment.shaft == "vertical":
         return 0.0
     swing = amplification(scene, fills)
@@ -137,7 +140,7 @@ def _swing_uncertainty(
     ripple, sloshing = (terms[part][term].value or 0.0 for term in (RIPPLE, SLOSHING))
     between = ripple * float(np.max(swing.largest - swing.lowest, initial=0.0))
     waves = ((terms["pressures"][RIPPLE].value or 0.0) * factor) ** 2
-    return waves + between + _SWING_MESH * sloshing
+    return min(waves + between + _SWING_MESH * sloshing, 1.0)
 
 
 def _mesh_error(scene: Scene, angular_cells: int) -> float:

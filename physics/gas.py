@@ -28,6 +28,7 @@ import numpy.typing as npt
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, GasProcess, Scene
+from ringbalance.scene.rules.validity import AIR_CONSTANT
 
 REFERENCE_PRESSURE: Final = 1e5
 """Of the reference atmosphere of ISO 6358, Pa."""
@@ -39,8 +40,6 @@ _LAMINAR_RATIO: Final = 0.999
 """Pressure ratio above which the conductance is taken as laminar."""
 VENTED: Final = 1 - _LAMINAR_RATIO
 """Gauge pressure over ambient pressure below which a chamber counts as vented."""
-_AIR_CONSTANT: Final = 287.05
-"""R of dry air, J/(kg K)."""
 _NORMAL_PRESSURE: Final = 101325.0
 _NORMAL_TEMPERATURE: Final = 273.15
 """Of a normal litre, Pa and K: DIN 1343."""
@@ -139,7 +138,7 @@ def nozzle_flow(*, pressure: float, area: float, temperature: float) -> float:
     """
     gamma = HEAT_CAPACITY_RATIO
     shape: float = math.sqrt(gamma) * (2 / (gamma + 1)) ** ((gamma + 1) / (2 * (gamma - 1)))
-    return pressure * area * shape * math.sqrt(_AIR_CONSTANT * temperature)
+    return pressure * area * shape * math.sqrt(AIR_CONSTANT * temperature)
 
 
 def pressure_factor(scene: Scene) -> float:
@@ -148,12 +147,13 @@ def pressure_factor(scene: Scene) -> float:
     Measured on the shaft's axis it is the ratio of an isothermal column that turns with the disc up to the
     surface at equal fills, exp(omega^2 a^2/(2 R T)), for the driven chamber and, because it vents to the same
     place, for the opposite one: p_abs f - p_a f = p f.
+    Range: an exponent up to 1/4, `scene.rules.validity`; a scene beyond is refused.
     Source: dp/dr = rho omega^2 r with rho = p/(R T).
     """
     if scene.gas.measured_at == "chamber":
         return 1.0
     surface = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))
-    return math.exp((scene.rotor.speed * surface) ** 2 / (2 * _AIR_CONSTANT * scene.gas.temperature))
+    return math.exp((scene.rotor.speed * surface) ** 2 / (2 * AIR_CONSTANT * scene.gas.temperature))
 
 
 def vented_pressure(scene: Scene) -> float:

@@ -19,11 +19,13 @@ from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
 from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
+from ringbalance.reduced_model.chamber.range import compression
 from ringbalance.reduced_model.chamber.values import paper_closed_forms, share_across
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.rules.validity import LARGEST_COMPRESSION
 
 PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 """Gas pressures of the law's table, over the scene's own."""
@@ -196,15 +198,18 @@ def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
     """What limits a chamber at the reported fill ratios."""
     scene, chamber = calibration.scene, calibration.chamber
     fills, computed = chamber.reported_fill_ratio, chamber.ring.closed[list(chamber.reported)]
-    return _row_status(scene, fill_ratio=fills, closed=computed & closed_ring(scene, fills))
+    closed = computed & closed_ring(scene, fills)
+    return _row_status(scene, fill_ratio=fills, closed=closed, fullest=fills)
 
 
 def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[RowStatus, ...]:
     """What limits a velocity out of a chamber at fill ratios, under the scene's gas pressure."""
+    scene = calibration.scene
     return _row_status(
-        calibration.scene,
+        scene,
         fill_ratio=fill_ratio,
-        closed=closed_ring(calibration.scene, fill_ratio),
+        closed=closed_ring(scene, fill_ratio),
+        fullest=np.maximum(fill_ratio, scene.disc.max_fill_ratio - fill_ratio),
         residual=calibration.residual.fill_ratio,
     )
 
@@ -298,6 +303,7 @@ class RowStatus(StrEnum):
     PORT_UNCOVERED = "port_uncovered"
     OVER_CREST = "over_crest"
     GAS_DRAWN = "gas_drawn"
+    LIQUID_COMPRESSED = "liquid_compressed"
 
 
 REMEDIES: Final[Mapping[RowStatus, str]] = MappingProxyType(
@@ -309,17 +315,25 @@ REMEDIES: Final[Mapping[RowStatus, str]] = MappingProxyType(
         "off: lower disc.max_fill_ratio or tube.hump_radius",
         RowStatus.GAS_DRAWN: "less than the residual liquid, so gas is drawn into the port and the velocity "
         "is not that of liquid alone: empty a chamber down to its residual fill ratio only",
+        RowStatus.LIQUID_COMPRESSED: "the pressure makes the liquid denser by more than any model here holds "
+        "for: lower rotor.speed, gas.pressure or disc.max_fill_ratio",
     }
 )
 
 
 def _row_status(
-    scene: Scene, *, fill_ratio: FloatArray, closed: BoolArray, residual: float = 0.0
+    scene: Scene,
+    *,
+    fill_ratio: FloatArray,
+    closed: BoolArray,
+    fullest: FloatArray,
+    residual: float = 0.0,
 ) -> tuple[RowStatus, ...]:
     """Status of each fill ratio x; an empty chamber is limited by its residual liquid alone.
 
     NO_RING: not `closed` under gravity. PORT_UNCOVERED: a >= r_p. OVER_CREST: a <= r_m. GAS_DRAWN: x below
-    `residual`, for what flows out of the chamber. With the radii a of the concentric surface, r_p of the port
+    `residual`, for what flows out of the chamber. LIQUID_COMPRESSED: by `fullest` of the chambers that count.
+    With the radii a of the concentric surface, r_p of the port
     and r_m of the crest.
     """
     level, crest = surface_radius(disc=scene.disc, fill_ratio=fill_ratio), scene.tube.hump_radius
@@ -329,6 +343,7 @@ def _row_status(
         ((level >= scene.tube.port_radius) & (fill_ratio > 0), RowStatus.PORT_UNCOVERED),
         (inside & (fill_ratio > 0), RowStatus.OVER_CREST),
         (fill_ratio < residual, RowStatus.GAS_DRAWN),
+        (compression(scene, fullest) > LARGEST_COMPRESSION, RowStatus.LIQUID_COMPRESSED),
     )
     return tuple(
         next((status for where, status in limits if where[row]), RowStatus.OK)

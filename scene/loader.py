@@ -20,7 +20,7 @@ from ringbalance.scene.liquids import with_liquid
 from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import ShownOrigin
-from ringbalance.scene.rules import shape, working
+from ringbalance.scene.rules import shape, validity, working
 from ringbalance.scene.rules.check import failed_checks
 from ringbalance.scene.toml_reading import read_toml
 
@@ -173,7 +173,7 @@ def _read_liquid_ring(
         reading, mesh_faults = deferred.with_chamber(reading)
         faults = (*faults, *mesh_faults)
     reading, liquid_faults = with_liquid(reading.completed())
-    failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS))
+    failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS, *validity.CHECKS))
     uncertain = working.uncertainty_faults(reading)
     return reading, (*faults, *reading.missing_faults(), *liquid_faults, *failed, *uncertain)
 

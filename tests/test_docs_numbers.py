@@ -106,13 +106,17 @@ def test_waves_on_the_paper_s_disc(paper_scene: Scene) -> None:
     page, disc = "how-it-works.md", paper_scene.disc
     found = sloshing_response(
         disc=disc,
-        fill_ratio=[0.25, 0.36, 0.38],
+        fill_ratio=[0.25, 0.36, 0.38, 0.5],
         angular_velocity=paper_scene.rotor.speed,
         kinematic_viscosity=paper_scene.liquid.kinematic_viscosity,
         gravity=9.81,
     )
     moment, pressure = (np.abs(each.value) for each in (found.amplification, found.pressure_amplification))
     agrees(page, r"on the paper's disc ([\d.]+) at equal fills", moment[0])
+    low, high = found.amplification_interval[0]
+    agrees(page, r"\(([\d.]+) to ([\d.]+) for natural frequencies", low, high)
+    fullest = found.amplification_interval[3]
+    agrees(page, r"anything from ([\d.]+) to (\d+) times", *fullest)
     assert moment[1] < 2 < moment[2]
     assert "2 from a fill of 0.37 up" in words(page)
     (third,) = [fill for mode, fill in resonant_fills(disc=disc) if mode == 3]

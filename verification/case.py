@@ -113,6 +113,16 @@ class RestsOn(_Record):
         return self
 
 
+class LeftOut(_Record):
+    """Readings that a validation does not judge; the case's numbers `<name>_points` and so on count them."""
+
+    name: Identifier
+    why: Text
+    """Following their number: "of shorter tubes, which flow leaves before it has developed"."""
+    taught: bool = False
+    """Whether they taught a coefficient: they are no predictions at all, and not among all readings."""
+
+
 class Quantity(_Record):
     """One judged number: its limit and the limit's reason stand before the result."""
 
@@ -185,6 +195,8 @@ class CaseDefinition(_Record):
     """Why the criteria lead to this verdict and no other, where that may be disputed."""
     rests_on: tuple[RestsOn, ...] = ()
     """Inputs that decide the claim."""
+    left_out: tuple[LeftOut, ...] = ()
+    """Of a validation: what the sources have and no verdict rests on."""
     headline: bool = False
     cost: Literal["light", "heavy"] = "light"
     quantity: tuple[Quantity, ...] = Field(min_length=1)
@@ -223,6 +235,9 @@ class CaseDefinition(_Record):
             raise ValueError(f"about: a case that is no claim may name some of {', '.join(SUBJECTS)}")
         _unique("quantity", [quantity.name for quantity in self.quantity])
         _unique("rests_on", [one.path for one in self.rests_on])
+        _unique("left_out", [one.name for one in self.left_out])
+        if self.left_out and self.kind != "validation":
+            raise ValueError("left_out: only a validation leaves readings out")
         _unique("must_fail", [mutation.id for mutation in self.must_fail])
         for quantity in self.quantity:
             self._check_quantity(quantity)

@@ -27,7 +27,7 @@ Document = dict[str, Any]
 _LISTED: Final = {"id", "kind", "about", "paper", "number", "title", "claim", "cost"}
 _DEPARTS: Final = {Verdict.CORRECTED, Verdict.REFUTED, Verdict.INCONCLUSIVE}
 _AS_DEFINED: Final = _LISTED | {
-    *("protects", "assumes", "does_not_cover", "equations", "headline", "judged_on"),
+    *("protects", "assumes", "does_not_cover", "equations", "headline", "judged_on", "left_out"),
 }
 """What a record has as its case.toml has it."""
 

@@ -10,7 +10,14 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
-HEADS: Final = ("Quantity", "Validated by measurements", "Verified by cases", "Calibrated", "Assumed")
+HEADS: Final = (
+    "Quantity",
+    "Validated by measurements",
+    "Left out of that, and why",
+    "Verified by cases",
+    "Calibrated",
+    "Assumed",
+)
 NO_DATA: Final = "no data"
 _NEARLY_ALL: Final = 0.99
 
@@ -47,6 +54,7 @@ SUBJECTS: Final[Mapping[str, _Subject]] = MappingProxyType(
         ),
         "fittings": _Subject(
             title="Entrance, exit, bends and developing flow",
+            calibrated="the bore of each tube measured, to one of its points",
             assumed="bends one by one, far from each other",
             budgets=("drag_coefficient", "velocity"),
         ),
@@ -73,7 +81,7 @@ SUBJECTS: Final[Mapping[str, _Subject]] = MappingProxyType(
         ),
         "waves": _Subject(
             title="Waves on the liquid ring",
-            calibrated="6 % of a natural frequency, to 24 points of four tanks",
+            calibrated="6 % of a natural frequency, to tanks that are not judged",
             assumed="damping; Coriolis force without data",
         ),
         "vibration": _Subject(
@@ -137,11 +145,14 @@ def _points(cases: Sequence[Mapping[str, Any]], name: str, key: str) -> float:
 
 
 def _row(subject: _Subject, cases: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    measured = [_measured(case) for case in cases if case["kind"] == "validation"]
+    validations = [case for case in cases if case["kind"] == "validation"]
+    measured = [_measured(case) for case in validations]
+    left_out = [text for case in validations if (text := _left_out(case))]
     verified = [case["id"].replace("_", " ") for case in cases if case["kind"].endswith("verification")]
     return (
         subject.title,
         "; ".join(measured) or NO_DATA,
+        "; ".join(left_out) or ("nothing" if measured else ""),
         ", ".join(verified) or "by tests alone",
         subject.calibrated,
         subject.assumed,
@@ -155,17 +166,54 @@ def _too_wide(numbers: Mapping[str, float]) -> str:
     return f" ({100 * numbers['width_needed']:.0f} % of its width would hold 95 %)"
 
 
+def _name(case: Mapping[str, Any]) -> str:
+    return str(case["id"]).removeprefix("measured_").replace("_", " ")
+
+
 def _measured(case: Mapping[str, Any]) -> str:
-    """Such as "smooth tubes: 536 points, 96.8 % within, bias -1.5 %, scatter 1.6 %"."""
-    name = case["id"].removeprefix("measured_").replace("_", " ")
+    """Such as "ducts: 107 of 125 points, 97.2 % within, bias +1.1 %, ..., of all 125 89.6 % within".
+
+    Points that taught a coefficient are predictions of nothing and not counted.
+    """
     if case["verdict"] == "not run":
-        return f"{name}: not run" + (" (a heavy case)" if case["cost"] == "heavy" else "")
+        return f"{_name(case)}: not run" + (" (a heavy case)" if case["cost"] == "heavy" else "")
     numbers = case["numbers"]
-    parts = [f"{numbers['points']:.0f} points" if "points" in numbers else "a correlation of measurements"]
+    parts = [_counted(numbers)]
     if "share_within" in numbers:
         parts += [
-            f"{100 * numbers['share_within']:.1f} % within" + _too_wide(numbers),
+            f"{_percent(numbers['share_within'])} within" + _too_wide(numbers),
             f"bias {100 * numbers['bias']:+.1f} %",
             f"scatter {100 * numbers['standard_deviation']:.1f} %",
         ]
-    return f"{name}: {', '.join(parts)}" + ("" if case["verdict"] == "confirmed" else f" ({case['verdict']})")
+    if "worst_mean" in numbers:
+        parts.append(f"means off by up to {100 * numbers['worst_mean']:+.1f} %")
+    if numbers.get("all_points", 0) > numbers.get("points", 0):
+        parts.append(f"of all {numbers['all_points']:.0f} {_percent(numbers['all_within'])} within")
+    verdict = "" if case["verdict"] == "confirmed" else f" ({case['verdict']})"
+    return f"{_name(case)}: {', '.join(parts)}{verdict}"
+
+
+def _counted(numbers: Mapping[str, float]) -> str:
+    if "points" not in numbers:
+        return "a correlation of measurements"
+    judged, everything = numbers["points"], numbers.get("all_points", 0)
+    return f"{judged:.0f} of {everything:.0f} points" if everything > judged else f"{judged:.0f} points"
+
+
+def _left_out(case: Mapping[str, Any]) -> str:
+    """Such as "ducts: 18 points of a flat duct ... (44.4 % within, bias -5.7 %)"."""
+    numbers, texts = case.get("numbers", {}), []
+    for one in case.get("left_out", ()):
+        name = one["name"]
+        if f"{name}_points" not in numbers:
+            continue
+        found = ""
+        if not one["taught"]:
+            bias = f"bias {100 * numbers[f'{name}_bias']:+.1f} %"
+            found = f" ({_percent(numbers[f'{name}_within'])} within, {bias})"
+        texts.append(f"{numbers[f'{name}_points']:.0f} points {one['why']}{found}")
+    return f"{_name(case)}: {', '.join(texts)}" if texts else ""
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %"

@@ -16,7 +16,7 @@ from ringbalance.physics import deferred
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.physics.sloshing.fast import LOWEST
-from ringbalance.physics.sloshing.range import SMALL
+from ringbalance.physics.sloshing.range import SMALL, swept
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
@@ -52,10 +52,16 @@ class RingWaves:
     frequencies, and s is the middle of a resonance."""
     amplification: Estimate
     """Change of the chamber's moment over that of a surface which follows gravity at once, shape ()."""
+    amplification_interval: FloatArray
+    """Lower and upper end (95 %), shape (2,), as those of `SloshingResponse`."""
     pressure_amplification: Estimate
     """Change of the mean pressure on the outer wall over that under such a surface, shape ()."""
+    pressure_amplification_interval: FloatArray
+    """The same of it, shape (2,)."""
     surface_amplitude: Estimate
     """Largest displacement of the surface, m zero-to-peak, shape ()."""
+    surface_amplitude_interval: FloatArray
+    """The same of it, m, shape (2,)."""
     damped_share: float
     """Amplification with the walls' Stokes layers over that without viscosity."""
     statistics: Statistics
@@ -118,16 +124,20 @@ def ring_waves(
     relative = system.faceting + system.reduced.squared_errors[0] + system.reduced.left_out
     change = _SAFETY * np.abs(last - before) + relative * last
     amplitude = Estimate(value=np.array(scale * last[2]), uncertainty=np.array(scale * change[2]))
+    ends = _intervals(system.reduced, frequency_ratio, ekman, values, change[:3] / last[:3])
     return RingWaves(
         surface_radius=surface_radius,
         frequency_ratio=Estimate(value=values, uncertainty=widths),
         vortical_share=shares,
         amplification=Estimate(value=np.array(last[0]), uncertainty=np.array(change[0])),
+        amplification_interval=ends[:, 0].copy(),
         pressure_amplification=Estimate(value=np.array(last[1]), uncertainty=np.array(change[1])),
+        pressure_amplification_interval=ends[:, 1].copy(),
         surface_amplitude=amplitude,
+        surface_amplitude_interval=scale * ends[:, 2],
         damped_share=float(last[3]),
         statistics=Statistics(unknowns=system.unknowns, relative_residual=system.reduced.residual),
-        status=_status(system, surface_radius, float(amplitude.value), scale),
+        status=_status(system, surface_radius, scale * float(ends[1, 2]), scale),
     )
 
 
@@ -247,6 +257,19 @@ def answer(reduced: ReducedWaves, fields: int, ratio: float, ekman: float) -> tu
     )
 
 
+def _intervals(
+    reduced: ReducedWaves, ratio: float, ekman: float, natural: FloatArray, share: FloatArray
+) -> FloatArray:
+    """Ends of the first three of `answer` by natural frequencies and by `share`, the solution's own error."""
+    fields = reduced.levels[-1]
+
+    def response(ratios: FloatArray) -> FloatArray:
+        return np.array([answer(reduced, fields, float(s), ekman)[:3] for s in ratios])
+
+    low, high = swept(response, frequency_ratio=ratio, natural=natural)
+    return np.stack([low * (1 - np.minimum(share, 1.0)), high * (1 + share)])
+
+
 def _status(system: WaveSystem, radius: float, amplitude: float, tilt: float) -> Status:
     if system.reduced.excess > _ACCEPTED:
         text = f"a linear solve left {system.reduced.excess:.0f} times its tolerance: use a better mesh"
@@ -257,8 +280,7 @@ def _status(system: WaveSystem, radius: float, amplitude: float, tilt: float) ->
     share = amplitude / (system.scale - radius)
     if share > SMALL:
         text = (
-            f"waves would reach {share:.2g} of the ring's depth, too high for this theory: "
-            "turn the disc faster"
+            f"waves may reach {share:.2g} of the ring's depth, too high for this theory: turn the disc faster"
         )
         return Status(code=StatusCode.OUT_OF_RANGE, text=text)
     return Status()

@@ -13,7 +13,7 @@ from ringbalance.physics.convergence import gci
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.physics.sloshing.imported import RingWaves, ring_waves
 from ringbalance.physics.sloshing.modes import FORMAL_ORDER, default_sloshing_cells
-from ringbalance.physics.sloshing.range import SMALL
+from ringbalance.physics.sloshing.range import SMALL, swept
 from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
@@ -28,11 +28,20 @@ class SloshingResponse:
     surface_radius: FloatArray
     """a, m, shape (n,)."""
     amplification: Estimate
-    """Change of the chamber's moment over that of a surface which follows gravity at once, shape (n,)."""
+    """Change of the chamber's moment over that of a surface which follows gravity at once, shape (n,).
+
+    Half-widths are those of the solution alone, here and below; the intervals hold them, too."""
+    amplification_interval: FloatArray
+    """Its lower and upper end (95 %), shape (n, 2), natural frequencies being known to
+    `FREQUENCY_UNCERTAINTY` only.  Where a mode may meet the force, the upper end rests on the damping."""
     pressure_amplification: Estimate
     """Change of the mean pressure on the outer wall over that under such a surface, shape (n,)."""
+    pressure_amplification_interval: FloatArray
+    """The same of it, shape (n, 2)."""
     surface_amplitude: Estimate
     """Largest displacement of the surface, m zero-to-peak, shape (n,)."""
+    surface_amplitude_interval: FloatArray
+    """The same of it, m, shape (n, 2)."""
     damped_share: FloatArray
     """Amplification with the walls' Stokes layers over that without any viscosity, shape (n,): near 1 away
     from resonance, and where it is small the peak rests on an estimate of the damping."""
@@ -61,7 +70,7 @@ def sloshing_response(
         frequency_ratio: s, above 0; 1 for gravity.
         cells: three meshes or more, finest first; default those of `sloshing_modes`. An imported chamber
             has its own mesh.
-    Returns: SloshingResponse; status says where the waves would not be small, or gravity leaves no ring.
+    Returns: SloshingResponse; status says where the waves might not be small, or gravity leaves no ring.
     Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
     Validity: small planar waves; thin Stokes layers on all walls without the Coriolis force, which makes the
         damping, and with it a peak, good to a factor of about two.
@@ -86,24 +95,41 @@ def sloshing_response(
     meshes = cells or default_sloshing_cells(disc=disc)
     ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
 
-    def on_mesh(radius: float, counts: tuple[int, int]) -> tuple[float, ...]:
+    def on_mesh(radius: float, counts: tuple[int, int]) -> FloatArray:
         system = sloshing_system(disc=disc, surface_radius=radius, cells=counts)
-        return _answer(system, frequency_ratio, ekman)
+        return _answers(system, np.array([frequency_ratio]), ekman)[0]
 
     found = np.array([[on_mesh(float(a), counts) for counts in meshes] for a in radii])
     widths = _half_widths(found, meshes)
     scale = gravity / angular_velocity**2
     amplitude = Estimate(value=scale * found[:, 0, 1], uncertainty=scale * widths[:, 1])
+    ends = np.array([_interval(disc, float(a), meshes[1], frequency_ratio, ekman) for a in radii])
+    # At either end the solution errs by about the same share as in the middle.
+    share = (widths / found[:, 0])[:, [0, 1, 3]]
+    ends *= 1 + np.stack([-np.minimum(share, 1.0), share], axis=1)
     return SloshingResponse(
         fill_ratio=fills,
         surface_radius=radii,
         amplification=Estimate(value=found[:, 0, 0].copy(), uncertainty=widths[:, 0]),
+        amplification_interval=ends[:, :, 0].copy(),
         pressure_amplification=Estimate(value=found[:, 0, 3].copy(), uncertainty=widths[:, 3]),
+        pressure_amplification_interval=ends[:, :, 2].copy(),
         surface_amplitude=amplitude,
+        surface_amplitude_interval=scale * ends[:, :, 1],
         damped_share=found[:, 0, 2].copy(),
         statistics=Statistics(unknowns=(2 * meshes[0][0] + 1) * (2 * meshes[0][1] + 1)),
-        status=_status(fills, disc.outer_radius - radii, amplitude.value, scale - radii),
+        status=_status(fills, disc.outer_radius - radii, scale * ends[:, 1, 1], scale - radii),
     )
+
+
+def _interval(disc: Disc, radius: float, cells: tuple[int, int], ratio: float, ekman: float) -> FloatArray:
+    """Ends by natural frequencies of moment, displacement (as `_answers`) and wall pressure, shape (2, 3)."""
+    system = sloshing_system(disc=disc, surface_radius=radius, cells=cells)
+
+    def response(ratios: FloatArray) -> FloatArray:
+        return _answers(system, ratios, ekman)[:, [0, 1, 3]]
+
+    return np.stack(swept(response, frequency_ratio=ratio, natural=system.natural_frequencies()))
 
 
 def _imported(fills: FloatArray, radii: FloatArray, waves: Sequence[RingWaves]) -> SloshingResponse:
@@ -116,12 +142,18 @@ def _imported(fills: FloatArray, radii: FloatArray, waves: Sequence[RingWaves]) 
         )
         return Estimate(value=value, uncertainty=uncertainty)
 
+    def ends(name: str) -> FloatArray:
+        return np.array([getattr(each, f"{name}_interval") for each in waves])
+
     return SloshingResponse(
         fill_ratio=fills,
         surface_radius=radii,
         amplification=along("amplification"),
+        amplification_interval=ends("amplification"),
         pressure_amplification=along("pressure_amplification"),
+        pressure_amplification_interval=ends("pressure_amplification"),
         surface_amplitude=along("surface_amplitude"),
+        surface_amplitude_interval=ends("surface_amplitude"),
         damped_share=np.array([each.damped_share for each in waves]),
         statistics=waves[0].statistics,
         status=next((each.status for each in waves if not each.status.ok), Status()),
@@ -147,26 +179,28 @@ def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float, ra
         raise ValueError("kinematic_viscosity and gravity must be finite and not negative")
 
 
-def _answer(system: SloshingSystem, ratio: float, ekman: float) -> tuple[float, ...]:
+def _answers(system: SloshingSystem, ratios: FloatArray, ekman: float) -> FloatArray:
     """Amplification, largest displacement for g/omega^2 = 1 (any unit of length), share left by damping, and
-
-    amplification of the wall pressure.
+    amplification of the wall pressure, by rows along the ratios.
     """
-    forcing = system.outflow[1] + 1j * system.outflow[2]
-    swinging = -(ratio**2) * system.kinetic + 2j * ratio * system.coriolis + system.centrifugal
-    layers = 1j * ratio * np.sqrt(1j * ratio * ekman) * system.wall_loss
+    s = ratios[:, None, None]
+    forcing = 1j * s * (system.outflow[1] + 1j * system.outflow[2])[:, None]
+    swinging = -(s**2) * system.kinetic + 2j * s * system.coriolis + system.centrifugal
+    layers = 1j * s * np.sqrt(1j * s * ekman) * system.wall_loss
     damped, free, still = (
-        np.linalg.solve(matrix, 1j * ratio * forcing)
+        np.linalg.solve(matrix, forcing)[:, :, 0].T
         for matrix in (swinging + layers, swinging, system.centrifugal.astype(np.complex128))
     )
     # Of the swing of the liquid's first moment, both components.
-    swings = (float(np.linalg.norm(system.outflow[1:] @ psi)) for psi in (damped, still, free))
-    moment, reference, undamped = swings
-    displacement = float(np.abs(system.flux @ damped).max()) / ratio
-    pressure = (
-        system.wall_drive - 1j * ratio * (system.potential @ damped) + 2 * (system.surface_mean @ damped)
+    moment, reference, undamped = (
+        np.linalg.norm(system.outflow[1:] @ psi, axis=0) for psi in (damped, still, free)
     )
-    return moment / reference, displacement, moment / undamped, float(abs(pressure / system.wall_drive))
+    displacement = np.abs(system.flux @ damped).max(axis=0) / ratios
+    pressure = (
+        system.wall_drive - 1j * ratios * (system.potential @ damped) + 2 * (system.surface_mean @ damped)
+    )
+    columns = (moment / reference, displacement, moment / undamped, np.abs(pressure / system.wall_drive))
+    return np.stack(columns, axis=1)
 
 
 def _status(fills: FloatArray, depth: FloatArray, amplitude: FloatArray, beyond: FloatArray) -> Status:
@@ -182,7 +216,7 @@ def _status(fills: FloatArray, depth: FloatArray, amplitude: FloatArray, beyond:
         return Status(
             code=StatusCode.OUT_OF_RANGE,
             text=(
-                f"at a fill ratio of {fills[worst]:.3g} waves would reach {share[worst]:.2g} of the ring's "
+                f"at a fill ratio of {fills[worst]:.3g} waves may reach {share[worst]:.2g} of the ring's "
                 "depth, too high for this theory: avoid that fill, or turn the disc faster"
             ),
         )

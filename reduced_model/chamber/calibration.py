@@ -18,7 +18,7 @@ from ringbalance.reduced_model.chamber.pressure_table import even_table, pressur
 from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import RingValues
-from ringbalance.reduced_model.tables import HermiteTable, level_table, table_from_samples
+from ringbalance.reduced_model.tables import HermiteTable, level_table
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -65,9 +65,8 @@ class Curve:
         """
         count, nodes = self.interpolation.size, self.table.nodes
         squares = (self.uncertainty**2 + inputs**2)[:count] + self.interpolation**2
-        # Errors of a finer table step where walls do.
-        made = table_from_samples if count == nodes.size else level_table
-        return made(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
+        # Errors step from node to node: where walls do, and where waves may become resonant.
+        return level_table(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,14 +8,17 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume, liquid_area
+from ringbalance.mesh.geometry import chamber_volume, liquid_area, surface_radius, wall_radius
+from ringbalance.physics.gas import pressure_factor
+from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing.range import SMALL
 from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.terms import MEAN, chamber_contributions, wave_height
-from ringbalance.reduced_model.contribution import Contribution
+from ringbalance.reduced_model.contribution import Contribution, percent
 from ringbalance.scene.arrays import FloatArray, distinct
 from ringbalance.scene.models import Scene
+from ringbalance.scene.rules.validity import LARGEST_COMPRESSION, bulk_modulus
 
 FILLS: Final = (0.2, 0.5, 1.0)
 """Shares of max_fill_ratio."""
@@ -55,17 +58,50 @@ def mean_gravity(scene: Scene) -> float:
     return max(found[part][MEAN].value or 0.0 for part in ("pressures", "moments"))
 
 
+def compression(scene: Scene, fills: FloatArray) -> FloatArray:
+    """By how much the liquid is denser on the outer wall, p/K, with the scene's gas pressure on it.
+
+    Returns: Shares along the fills; those above `LARGEST_COMPRESSION` are beyond every model here, and so
+        are velocities that such a pressure drives.
+    Source: p = f p_gas + rho omega^2 (R2^2 - a^2)/2; `scene.rules.validity`.
+    """
+    column = hydrostatic_pressure(
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        inner=surface_radius(disc=scene.disc, fill_ratio=fills),
+        outer=wall_radius(disc=scene.disc),
+    )
+    pressure = column + max(scene.gas.pressure, 0.0) * pressure_factor(scene)
+    return np.asarray(pressure / bulk_modulus(scene.liquid))
+
+
 def chamber_status(scene: Scene) -> Status:
-    """Whether linear sloshing and a closed ring hold over the range of fills, by estimates."""
+    """Whether linear sloshing, a closed ring and one density hold over the range of fills, by estimates."""
     fills = chamber_fills(scene)
     if fills.size == range_fills(scene).size:
-        return _waves(scene, fills)
+        dense = _dense(scene)
+        return _waves(scene, fills) if dense.ok else dense
     lowest = f"above a fill ratio of {fills[0]:.3g} only" if fills.size else "at no fill of this scene"
     return Status(
         code=StatusCode.NO_RING if fills.size == 0 else StatusCode.OUT_OF_RANGE,
         text=(
             f"gravity leaves a closed ring {lowest}: elsewhere liquid runs along the wall every turn and no "
             "model describes it; turn faster or fill more"
+        ),
+    )
+
+
+def _dense(scene: Scene) -> Status:
+    share = float(compression(scene, np.array([scene.disc.max_fill_ratio]))[0])
+    if share <= LARGEST_COMPRESSION:
+        return Status()
+    pressure = share * bulk_modulus(scene.liquid)
+    return Status(
+        code=StatusCode.OUT_OF_RANGE,
+        text=(
+            f"up to {pressure / 1e6:.4g} MPa on the outer wall would make the liquid {percent(share)} denser "
+            f"there, and no model holds above {percent(LARGEST_COMPRESSION)}, velocities included: lower "
+            "rotor.speed, gas.pressure or disc.max_fill_ratio"
         ),
     )
 

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
+from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE
 from ringbalance.reduced_model.chamber.values import (
     by_closed_form,
     by_quadrature,
     drawing_shares,
     share_across,
 )
-from ringbalance.reduced_model.contribution import Contribution
+from ringbalance.reduced_model.contribution import Contribution, percent
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.rules.validity import METAL_DENSITY
 
 Terms = Mapping[str, Contribution]
 
@@ -29,10 +31,6 @@ SURFACE_TENSION: Final = 0.073
 """Of water at 20 degC against air, N/m: taken for every ordinary liquid, as an upper bound."""
 METAL_SURFACE_TENSION: Final = 0.72
 """Of gallium, N/m: taken above `METAL_DENSITY`."""
-METAL_DENSITY: Final = 3000.0
-"""kg/m^3."""
-LARGEST_SWING: Final = 30.0
-"""Amplification that damping leaves at resonance, about."""
 _MODES: Final = 24
 """Of a chamber; what higher ones hold of gravity's tilt falls with the square of their number."""
 _SWING_FLOOR: Final = 0.2
@@ -106,26 +104,33 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
     return found
 
 
-def amplification(scene: Scene, fills: FloatArray | float) -> FloatArray:
-    """Estimate of how much the swinging liquid enlarges gravity's ripple, |1/(1 - 1/s^2)|.
+class Swing(NamedTuple):
+    """Amplification of gravity's ripple, natural frequencies being known to `FREQUENCY_UNCERTAINTY`."""
 
-    Returns: Factors along the fills, at most 30; 1 on a vertical shaft.
-    Source: s^2 = k tanh(k ln(R2/a)), the lowest mode without Coriolis force, undamped, driven at s = 1.
+    lowest: FloatArray
+    largest: FloatArray
+
+
+def amplification(scene: Scene, fills: FloatArray | float) -> Swing:
+    """Estimate of how much the swinging liquid enlarges gravity's ripple, |1/(1 - (1 + i d)/s^2)|.
+
+    Returns: Factors along the fills; 1 on a vertical shaft.
+    Source: s^2 = k tanh(k ln(R2/a)), the lowest mode without Coriolis force, driven at s = 1; d, `_swing`.
     """
     if scene.environment.shaft == "vertical":
-        return np.ones(np.shape(fills))
-    disc, k = scene.disc, np.pi / scene.disc.central_angle
-    square = k * np.tanh(k * np.log(disc.outer_radius / surface_radius(disc=disc, fill_ratio=fills)))
-    return _swing(square)
+        return Swing(np.ones(np.shape(fills)), np.ones(np.shape(fills)))
+    disc = scene.disc
+    depth = np.log(disc.outer_radius / surface_radius(disc=disc, fill_ratio=fills))
+    return _swing(scene, np.pi / disc.central_angle, depth, disc.central_angle / 2)
 
 
 def wave_height(scene: Scene, fills: FloatArray) -> FloatArray:
-    """Estimated height of the waves that gravity makes, zero-to-peak, over the depth of the ring.
+    """Estimated height that gravity's waves may have, zero-to-peak, over the depth of the ring.
 
     A surface across gravity alone, g/omega^2 sin(phi) and cos(phi), is taken apart into the modes of a
-    chamber with half-angle alpha, k = j pi/(2 alpha), each of which answers with 1/(1 - 1/s^2) as in
-    `amplification`. For the 90 deg of the liquid-ring paper within a factor of three of finite elements,
-    thin rings included; half circles from a quarter of them up.
+    chamber with half-angle alpha, k = j pi/(2 alpha), each of which answers as in `amplification` with the
+    largest swing that its frequency's uncertainty allows. For the 90 deg of the liquid-ring paper within a
+    factor of three of finite elements, thin rings included; half circles from a quarter of them up.
     """
     if scene.environment.shaft == "vertical":
         return np.zeros(np.shape(fills))
@@ -134,16 +139,29 @@ def wave_height(scene: Scene, fills: FloatArray) -> FloatArray:
     k = mode * np.pi / (2 * alpha)
     less, more = (alpha * np.sinc((k + sign) * alpha / np.pi) for sign in (-1, 1))
     shares = np.abs(less + np.where(mode % 2, -more, more)) / alpha
-    answers = shares * _swing(k * np.tanh(k * np.log(scene.disc.outer_radius / a)))
+    answers = shares * _swing(scene, k, np.log(scene.disc.outer_radius / a), alpha).largest
     # The two parts follow each other by a quarter of a turn.
     height = np.hypot(answers[..., ::2].sum(axis=-1), answers[..., 1::2].sum(axis=-1))
     tilt = scene.environment.gravity / scene.rotor.speed**2
     return np.asarray(height * tilt / (scene.disc.outer_radius - a[..., 0]))
 
 
-def _swing(square: FloatArray) -> FloatArray:
-    """|1/(1 - 1/s^2)|, at most `LARGEST_SWING`."""
-    return np.asarray(np.minimum(1 / np.maximum(np.abs(1 - 1 / square), 1e-9), LARGEST_SWING))
+def _swing(scene: Scene, k: FloatArray | float, depth: FloatArray, alpha: FloatArray | float) -> Swing:
+    """|1/(1 - (1 + i d)/s^2)| over what s may be, of modes cos(k phi) of rings ln(R2/a) deep.
+
+    d = (E/2)^(1/2) [2 R2/B + q/depth + (1 - q)/alpha], q = 2 k depth/sinh(2 k depth), is what Stokes layers
+    on ends, outer wall and plates take at s = 1, E = nu/(omega R2^2); at a peak within a factor of two of
+    finite elements.
+    Source: the layers of `sloshing_system` on phi = cosh(k ln(R2/r)) cos(k phi), plates at r = R2.
+    """
+    disc, twice = scene.disc, 2 * k * depth
+    ekman = scene.liquid.kinematic_viscosity / (abs(scene.rotor.speed) * disc.outer_radius**2)
+    shallow = -2 * twice * np.exp(-twice) / np.expm1(-2 * twice)
+    layers = 2 * disc.outer_radius / disc.axial_width + shallow / depth + (1 - shallow) / alpha
+    damping, square = np.sqrt(ekman / 2) * layers, k * np.tanh(k * depth)
+    ends = LOWEST_TRUE**2 * square, HIGHEST_TRUE**2 * square
+    low, high, nearest = (1 / np.hypot(1 - 1 / end, damping / end) for end in (*ends, np.clip(1.0, *ends)))
+    return Swing(np.minimum(low, high), np.asarray(nearest))
 
 
 def _wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
@@ -164,7 +182,7 @@ def chamber_contributions(scene: Scene, fills: FloatArray) -> Mapping[str, Terms
 def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
     base = by_closed_form(scene, fill)
     tilted = by_quadrature(scene, fill) if scene.environment.gravity else base
-    factor = float(amplification(scene, np.array(fill)))
+    lowest, largest = (float(end) for end in amplification(scene, np.array(fill)))
 
     def gravity(ripple: float, mean: float, swing: float) -> dict[str, float]:
         return {RIPPLE: ripple, SLOSHING: ripple * swing, MEAN: mean}
@@ -173,7 +191,7 @@ def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
         "pressures": gravity(
             tilted.wall_pressure_ripple / base.wall_pressure,
             abs(tilted.wall_pressure / base.wall_pressure - 1),
-            _CORIOLIS * max(1.0, factor),
+            _CORIOLIS * max(1.0, largest),
         ),
         "moments": gravity(
             tilted.moment_ripple / base.moment,
@@ -181,7 +199,7 @@ def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
                 abs(tilted.moment / base.moment - 1),
                 abs(tilted.moment_per_mass / base.moment_per_mass - 1),
             ),
-            abs(factor - 1) + _SWING_FLOOR,
+            max(abs(lowest - 1), abs(largest - 1)) + _SWING_FLOOR,
         ),
     }
 
@@ -195,7 +213,8 @@ def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
     strips = 1 - chamber_volume(disc=disc) / bare
     pressures = part == "pressures"
     first = "rho omega^2 G |R2 s_2 - a s|/P" if pressures else "rho B a^2 G |shape|/U"
-    swing = "2 max(1, |1/(1 - 1/s^2)|)" if pressures else "(|1/(1 - 1/s^2)| - 1)"
+    swing = "2 max(1, |1/(1 - 1/s^2)|)" if pressures else "||1/(1 - 1/s^2)| - 1|"
+    known = percent(FREQUENCY_UNCERTAINTY)
     force = "and the Coriolis force on its flux" if pressures else "without Coriolis force"
     found = (
         (PLATES, strips, "1 - V/(B theta (R2^2 - R1^2)/2)", "Eqs. 3, 7 and 12 against the exact geometry"),
@@ -203,7 +222,7 @@ def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
         (
             SLOSHING,
             largest[SLOSHING],
-            f"ripple times {swing}, s^2 = k tanh(k ln(R2/a)), k = pi/theta",
+            f"ripple times {swing}, s^2 = k tanh(k ln(R2/a)), k = pi/theta, s known to {known}",
             f"lowest mode of a chamber {force}, driven at 1x",
         ),
         (

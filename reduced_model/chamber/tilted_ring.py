@@ -10,7 +10,7 @@ chamber is integrated over its walls instead, `mesh.cut`.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Final
 
 import numpy as np
@@ -25,6 +25,7 @@ from ringbalance.mesh.geometry import (
     surface_radius,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc, Scene
 
 POINTS: Final = 20
@@ -33,7 +34,11 @@ RADIAL_POINTS: Final = 14
 _OPEN_POINTS: Final = 200
 """The same where part of the wall is dry: about four digits of gravity's effect."""
 _STEPS: Final = (12, 60)
-"""Newton's method and halving."""
+"""At most, of Newton's method on a closed ring, and within bounds where the wall is dry."""
+_KINKED: Final = 12
+"""Steps after which bounds are halved, should kinks send Newton's method to and fro."""
+_DRY_ROUND_OFF: Final = 1e-13
+"""Of an area, over R2^2, where the wall is dry."""
 _TURN: Final = (8, 96)
 """Fewest and most angles of gravity over a turn."""
 _AVERAGING: Final = 1e-12
@@ -84,19 +89,17 @@ class TiltedRing:
         length, turn, shaft = scene.environment.gravity / square, turn_samples(scene), scene.environment.shaft
         table = imported_table(disc)
 
-        def turned(fills: FloatArray, *, cut: bool) -> _Turned:
+        def turned(fills: FloatArray) -> _Turned:
             if table is not None:
                 return _imported(disc, table, length, fills, turn if shaft == "horizontal" else 0)
-            if shaft == "vertical":
-                return _along(disc, length, fills, cut)
-            return _across(disc, length, fills, turn, cut)
+            return _of_sector(disc, length, fills, turn, shaft, cut=False)
 
-        found = turned(fill_ratio, cut=False)
+        found = turned(fill_ratio)
         is_open = ~np.all(found.closed, axis=1)
-        if np.any(is_open) and table is None:
-            parts = turned(fill_ratio[is_open], cut=True)
+        for place in np.flatnonzero(is_open) if table is None else ():
+            part = _over_dry_wall(disc, length, float(fill_ratio[place]), turn, shaft)
             for name in ("wall_pressure", "surface_square", "moment", "moment_per_volume"):
-                getattr(found, name)[is_open] = getattr(parts, name)
+                getattr(found, name)[place] = getattr(part, name)[0]
         scale = density * square / 2
         return cls(
             wall_pressure=scale * found.wall_pressure.mean(axis=1),
@@ -119,6 +122,20 @@ class _Turned:
     moment: FloatArray
     moment_per_volume: FloatArray
     closed: BoolArray
+
+
+def _of_sector(
+    disc: Disc, length: float, fills: FloatArray, turn: int, shaft: Shaft, *, cut: bool
+) -> _Turned:
+    if shaft == "vertical":
+        return _along(disc, length, fills, cut)
+    return _across(disc, length, fills, turn, cut)
+
+
+@lru_cache(maxsize=128)
+def _over_dry_wall(disc: Disc, length: float, fill: float, turn: int, shaft: Shaft) -> _Turned:
+    """At one fill, and once for all who ask for it: each takes a tenth of a second."""
+    return _of_sector(disc, length, np.array([fill]), turn, shaft, cut=True)
 
 
 def turn_samples(scene: Scene) -> int:
@@ -154,22 +171,27 @@ def _first_harmonic(values: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True)
 class _Search:
-    """b^2 or c^2, by Newton's method or, where dry parts of the wall make kinks, by halving its bounds."""
+    """b^2 or c^2, by Newton's method; where dry parts of the wall make kinks, within bounds that close in."""
 
     value: FloatArray
     low: FloatArray
     high: FloatArray
-    halved: bool
+    bounded: bool
 
-    def narrowed(self, excess: FloatArray, opening: FloatArray) -> _Search:
+    def narrowed(self, excess: FloatArray, opening: FloatArray, step: int) -> _Search:
         """After the liquid's area exceeded its target by `excess`, which falls with b^2 like `opening`."""
-        if not self.halved:
-            # No opening: the surface has left the chamber, and the bound is the next place to look.
-            step = excess / np.maximum(opening, np.finfo(float).tiny ** 0.5)
-            return replace(self, value=np.clip(self.value + step, self.low, self.high))
+        # No opening: the surface has left the chamber, and the bound is the next place to look.
+        newton = self.value + excess / np.maximum(opening, np.finfo(float).tiny ** 0.5)
+        if not self.bounded:
+            return replace(self, value=np.clip(newton, self.low, self.high))
         low = np.where(excess > 0, self.value, self.low)
         high = np.where(excess > 0, self.high, self.value)
-        return replace(self, value=(low + high) / 2, low=low, high=high)
+        inside = (newton >= low) & (newton <= high) & (step < _KINKED)
+        return replace(self, value=np.where(inside, newton, (low + high) / 2), low=low, high=high)
+
+    def reached(self, excess: FloatArray, outer: float) -> bool:
+        """Whether nothing but rounding is left."""
+        return bool(np.all(np.abs(excess) <= (_DRY_ROUND_OFF if self.bounded else _ROUND_OFF) * outer**2))
 
 
 def _held(disc: Disc, radius: FloatArray) -> FloatArray:
@@ -183,17 +205,19 @@ def _along(disc: Disc, length: float, fills: FloatArray, cut: bool) -> _Turned:
     rise, weight = length * disc.axial_width * abscissa[None, :], weights[None, :] / 2
     target = liquid_area(disc=disc, surface_radius=np.sqrt(start))
     reach = length * disc.axial_width + outer**2 * 1e-12
-    search = _Search(value=start, low=start - reach, high=start + reach, halved=cut)
+    search = _Search(value=start, low=start - reach, high=start + reach, bounded=cut)
 
     def surface() -> tuple[FloatArray, FloatArray]:
         """Radius, and half-angle where it is wet."""
         radius = _held(disc, np.sqrt(np.maximum(search.value[:, None] + rise, 0.0)))
         return radius, np.where(radius < outer, half_angle(disc=disc, radius=radius), 0.0)
 
-    for _ in range(_STEPS[cut]):
+    for step in range(_STEPS[cut]):
         radius, alpha = surface()
-        area = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=1)
-        search = search.narrowed(area - target, np.sum(weight * alpha, axis=1))
+        excess = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=1) - target
+        if cut and search.reached(excess, outer):
+            break
+        search = search.narrowed(excess, np.sum(weight * alpha, axis=1), step)
     radius, alpha = surface()
     level = search.value[:, None] + rise
     moment = np.sum(weight * liquid_first_moment(disc=disc, surface_radius=radius), axis=1)
@@ -220,16 +244,16 @@ def _across(disc: Disc, length: float, fills: FloatArray, turn: int, cut: bool) 
     first = (start[:, None] + length * np.sin(alpha) / alpha * np.cos(psi[..., 0])) ** 2
     reach = length**2 + 2 * outer * length + outer**2 * 1e-12
     middle = np.broadcast_to(start[:, None] ** 2, first.shape)
-    search = _Search(value=first, low=middle - reach, high=middle + reach, halved=cut)
-    for _ in range(_STEPS[cut]):
+    search = _Search(value=first, low=middle - reach, high=middle + reach, bounded=cut)
+    for step in range(_STEPS[cut]):
         for _ in range(3):
             level, slope = _level(disc, length, radius, eta, psi)
             radius = _held(disc, radius - (level - search.value[..., None]) / slope)
         opening = np.where(radius < outer, 2 * half_angle(disc=disc, radius=radius) * radius / slope, 0.0)
-        area = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=2)
-        if not cut and np.all(np.abs(area - target) <= _ROUND_OFF * outer**2):
+        excess = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=2) - target
+        if search.reached(excess, outer):
             break
-        search = search.narrowed(area - target, np.sum(weight * opening, axis=2))
+        search = search.narrowed(excess, np.sum(weight * opening, axis=2), step)
     _, slope = _level(disc, length, radius, eta, psi)
     half = half_angle(disc=disc, radius=radius)
     share = np.where(radius < outer, weight * half * radius / slope, 0.0)

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.friction import reynolds_number, turbulent_share
 from ringbalance.reduced_model.chamber.range import (
     chamber_fills,
@@ -32,7 +33,7 @@ from ringbalance.reduced_model.chamber.terms import (
     wall_layers,
 )
 from ringbalance.reduced_model.chamber.values import by_closed_form
-from ringbalance.reduced_model.contribution import Contribution
+from ringbalance.reduced_model.contribution import Contribution, percent
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.selection.range_flow import (
     CONSTANT_MODELS,
@@ -110,10 +111,11 @@ def _chamber(scene: Scene) -> Iterator[Contribution]:
 def _sloshing_formula(scene: Scene, fills: FloatArray) -> str:
     if scene.environment.shaft == "vertical":
         return "on a vertical shaft gravity does not turn in the disc's frame"
-    largest = float(np.max(amplification(scene, fills)))
+    largest = float(np.max(amplification(scene, fills).largest))
     return (
         "first order in g/(omega^2 a), times 1 + 2 max(1, n) in the wall pressure, where the liquid's swing "
-        f"at 1x makes n = |1/(1 - 1/s^2)| up to {largest:.2g} over the range of fills, at every speed"
+        f"at 1x makes n = |1/(1 - 1/s^2)| up to {largest:.2g} over the range of fills, s being known to "
+        f"{percent(FREQUENCY_UNCERTAINTY)}"
     )
 
 

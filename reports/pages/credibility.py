@@ -29,8 +29,9 @@ def _standing(evidence: Record) -> Table:
     rows = standing_rows(cases, balancer=evidence.get("balancer", "liquid_ring"))
     return Table(
         caption="What stands behind each predicted quantity. Measurements are those of others on parts like "
-        "the device’s; “within” is the share of the points that lie within both 95 % intervals, bias and "
-        "scatter are those of predicted over measured values.",
+        "the device’s; “within” is the share of the judged points that lie within both 95 % intervals, bias "
+        "and scatter are those of predicted over measured values. Points that taught a coefficient are left "
+        "out and not counted as predicted.",
         heads=HEADS,
         rows=[tuple(cell.replace(" -", " −") for cell in row) for row in rows],
         style="dense",

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ringbalance.physics.sloshing.modes import IMPORTED_SHARES, resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
@@ -21,6 +21,8 @@ _COARSE: Final = ((8, 24), (4, 12), (2, 6))
 """Meshes for figures and sentences: three digits."""
 _NEAR: Final = 0.15
 """Distance of a frequency from the speed, over the speed, that counts as a fill to avoid."""
+_MEETING: Final = (1 / HIGHEST_TRUE, 1 / LOWEST_TRUE)
+"""Frequencies over the speed, by theory, that may be the speed."""
 
 
 def _collect(work: Work) -> Record | None:
@@ -51,15 +53,20 @@ def _collect(work: Work) -> Record | None:
         "frequency_ratio": modes.frequency_ratio.value.T.tolist(),
         "frequency_ratio_uncertainty": modes.frequency_ratio.uncertainty.T.tolist(),
         "amplification": answer.amplification.value[:-1].tolist(),
+        "amplification_interval": answer.amplification_interval[:-1].tolist(),
         "pressure_amplification": answer.pressure_amplification.value[:-1].tolist(),
+        "pressure_amplification_interval": answer.pressure_amplification_interval[:-1].tolist(),
         "surface_amplitude_m": answer.surface_amplitude.value[:-1].tolist(),
+        "largest_surface_amplitude_m": answer.surface_amplitude_interval[:-1, 1].tolist(),
         "depth_m": (scene.disc.outer_radius - answer.surface_radius[:-1]).tolist(),
         "imported": imported,
         "resonant": [{"mode": mode, "fill_ratio": x} for mode, x in met],
         "equal": {
             "fill_ratio": scene.disc.initial_fill,
             "amplification": float(answer.amplification.value[-1]),
+            "amplification_interval": answer.amplification_interval[-1].tolist(),
             "pressure_amplification": float(answer.pressure_amplification.value[-1]),
+            "pressure_amplification_interval": answer.pressure_amplification_interval[-1].tolist(),
             "surface_amplitude_m": float(answer.surface_amplitude.value[-1]),
             "tilt_ratio": float(
                 scene.environment.gravity / (scene.rotor.speed**2 * answer.surface_radius[-1])
@@ -80,7 +87,7 @@ def _view(found: Record, _evidence: Record) -> Record:
 
 def _equal(found: Record) -> str:
     equal = found["equal"]
-    moment, pressure = (short(equal[key], digits=2) for key in ("amplification", "pressure_amplification"))
+    moment, pressure = (_with_ends(equal, key) for key in ("amplification", "pressure_amplification"))
     return (
         f"At equal fills gravity swings a chamber’s moment {moment} times as much as a surface that followed "
         f"at once would, and the wall pressure {pressure} times: the Coriolis force on the "
@@ -90,13 +97,19 @@ def _equal(found: Record) -> str:
     )
 
 
+def _with_ends(equal: Record, key: str) -> str:
+    """Such as "0.79 (0.63 to 1.0)", by what natural frequencies may be."""
+    ends = " to ".join(short(end, digits=2) for end in equal[f"{key}_interval"])
+    return f"{short(equal[key], digits=2)} ({ends})"
+
+
 def _avoid(found: Record) -> str:
     fills, top = np.asarray(found["fill_ratio"]), found["frequency_ratio"][0][-1]
     # Even modes of a sector hardly feel gravity, which pulls the whole chamber one way.
-    strong = [item for item in found["resonant"] if found["imported"] or item["mode"] % 2]
+    strong = [mode for mode in _meeting(found) if found["imported"] or mode % 2]
     if not strong and abs(top - 1) > _NEAR:
         return f"No mode that gravity can drive meets the speed up to a fill ratio of {short(fills[-1])}."
-    told = [f"{' to '.join(_within(found, item['mode']))} (mode {item['mode']})" for item in strong]
+    told = [f"{' to '.join(_within(found, mode))} (mode {mode})" for mode in strong]
     near = (
         [f"from about {short(_nearing(found), digits=2)} up, where the first mode comes near the speed"]
         if abs(top - 1) <= _NEAR
@@ -108,10 +121,17 @@ def _avoid(found: Record) -> str:
     )
 
 
+def _meeting(found: Record) -> list[int]:
+    """Modes that meet the speed, or may meet it for what their frequencies may be."""
+    met = {item["mode"] for item in found["resonant"]}
+    low, high = _MEETING
+    ratios = enumerate(found["frequency_ratio"], start=1)
+    return sorted(met | {mode for mode, s in ratios if s[0] < high and s[-1] > low})
+
+
 def _within(found: Record, mode: int) -> list[str]:
     """Fills between which a mode may meet the speed."""
-    speeds = (1 - FREQUENCY_UNCERTAINTY, 1 + FREQUENCY_UNCERTAINTY)
-    ends = np.interp(speeds, found["frequency_ratio"][mode - 1], found["fill_ratio"])
+    ends = np.interp(_MEETING, found["frequency_ratio"][mode - 1], found["fill_ratio"])
     return [short(float(end), digits=2) for end in ends]
 
 
@@ -124,7 +144,7 @@ def _nearing(found: Record) -> float:
 
 def _reservation(found: Record) -> list[str]:
     if found["status"]["code"] == "ok":
-        share = max(np.asarray(found["surface_amplitude_m"]) / np.asarray(found["depth_m"]))
+        share = max(np.asarray(found["largest_surface_amplitude_m"]) / np.asarray(found["depth_m"]))
         return [f"The waves stay within {percent(share, digits=2)} of the ring’s depth: small, as assumed."]
     return [found["status"]["text"][0].upper() + found["status"]["text"][1:] + "."]
 

@@ -18,7 +18,7 @@ from ringbalance.mesh.export import scikit_fem_mesh
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing.response import sloshing_response
+from ringbalance.physics.sloshing.response import SloshingResponse, sloshing_response
 from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.reference.sloshing_exact import CosineWaves
@@ -129,6 +129,49 @@ def test_forced_swing_matches_the_spectral_one(disc: Disc, s: float) -> None:
     assert found.damped_share[0] == 1.0
     pressure = waves.pressure_amplification(frequency_ratio=s, depth=depth)
     assert found.pressure_amplification.value[0] == pytest.approx(pressure, rel=1e-4)
+
+
+@pytest.mark.parametrize("fill", [0.25, 0.4, 0.5])
+def test_the_interval_is_what_exact_waves_do_within_six_per_cent(disc: Disc, fill: float) -> None:
+    """Without viscosity and plates; natural frequencies q times as high answer at s/q."""
+    found = sloshing_response(
+        disc=bare(disc, np.pi / 2),
+        fill_ratio=fill,
+        angular_velocity=OMEGA,
+        kinematic_viscosity=0.0,
+        gravity=9.81,
+    )
+    depth = float(np.log(disc.outer_radius / found.surface_radius[0]))
+    waves = CosineWaves.of(central_angle=np.pi / 2, depth=depth)
+    ratios = 1 / np.linspace(0.94, 1.06, 61)
+    moments = [waves.amplification(frequency_ratio=s) for s in ratios]
+    pressures = [waves.pressure_amplification(frequency_ratio=s, depth=depth) for s in ratios]
+    assert found.amplification_interval[0] == pytest.approx([min(moments), max(moments)], rel=1e-2)
+    assert found.pressure_amplification_interval[0] == pytest.approx(
+        [min(pressures), max(pressures)], rel=1e-2
+    )
+    assert max(moments) - moments[30] > 1.1 * (moments[30] - min(moments))
+
+
+def test_a_peak_within_the_interval_is_found(disc: Disc) -> None:
+    """The third mode 3 % beside the speed: the upper end is the highest that any force nearby makes."""
+    fill = 1.06 * dict(resonant_fills(disc=disc, modes=3))[3]
+
+    def at(s: float) -> SloshingResponse:
+        return sloshing_response(
+            disc=disc,
+            fill_ratio=fill,
+            angular_velocity=OMEGA,
+            kinematic_viscosity=1e-6,
+            gravity=9.81,
+            frequency_ratio=s,
+            cells=((8, 24), (4, 12), (2, 6)),
+        )
+
+    there = at(1.0)
+    peak = max(float(at(s).amplification.value[0]) for s in 1.03 + 2e-4 * np.arange(-40, 41))
+    assert there.amplification.value[0] < 0.3 * peak
+    assert there.amplification_interval[0, 1] == pytest.approx(peak, rel=0.1)
 
 
 class Potential:

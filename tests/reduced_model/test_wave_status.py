@@ -12,12 +12,28 @@ from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.chamber.terms import _wave_mean, wave_height
+from ringbalance.reduced_model.chamber.values import by_quadrature
 from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 
 def at_speed(scene: Scene, rpm: float) -> Scene:
     return replace(scene, rotor=replace(scene.rotor, speed=rpm * math.pi / 30))
+
+
+def highest(scene: Scene, fills: FloatArray) -> FloatArray:
+    """Waves over the depth by finite elements, as high as frequencies known to 6 % let them be."""
+    found = sloshing_response(
+        disc=scene.disc,
+        fill_ratio=fills,
+        angular_velocity=scene.rotor.speed,
+        kinematic_viscosity=scene.liquid.kinematic_viscosity,
+        gravity=scene.environment.gravity,
+        cells=((8, 24), (4, 12), (2, 6)),
+    )
+    depth = scene.disc.outer_radius - found.surface_radius
+    return np.asarray(found.surface_amplitude_interval[:, 1] / depth)
 
 
 @pytest.fixture(scope="module")
@@ -36,50 +52,62 @@ def test_moment_pressure_and_lambda_inherit_the_status(slow: Calibration) -> Non
 
 
 def test_the_interval_holds_the_waves_of_finite_elements(slow: Calibration) -> None:
-    # Waves of 1.06 of the depth at the largest fill: second order is about 1.06^2/4 = 28 %.
+    # Second order is about (eta/h)^2/4, and no more than all of the value.
     scene, chamber = slow.scene, slow.chamber
-    found = sloshing_response(
-        disc=scene.disc,
-        fill_ratio=[0.5],
-        angular_velocity=scene.rotor.speed,
-        kinematic_viscosity=1e-6,
-        gravity=9.80665,
-    )
-    high = found.surface_amplitude.value[0] / (scene.disc.outer_radius - found.surface_radius[0])
-    assert high == pytest.approx(1.06, abs=0.01)
-    assert 1.0 < float(wave_height(scene, np.array(0.5))) / high < 2.0
-    last = chamber.reported[-1]
+    at = [place for place in chamber.reported if chamber.fill_ratio[place] > 0]
+    high = highest(scene, chamber.fill_ratio[at])
     for curve in (chamber.moment, chamber.wall_pressure):
-        assert high**2 / 4 < curve.uncertainty[last] / curve.value[last] < 1.0
+        share = curve.uncertainty[at] / curve.value[at]
+        assert np.all(share > np.minimum(high**2 / 4, 1.0) / 9)
+        assert share[-1] > min(high[-1] ** 2 / 4, 0.999)
 
 
 def test_thin_rings_answer_in_higher_modes(table_1_scene: Scene) -> None:
     # Limits: the factor of three that the estimate claims; the lowest mode alone has 0.16 to 0.5 here.
     fills = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.5])
-    disc, speed = table_1_scene.disc, table_1_scene.rotor.speed
-    found = sloshing_response(
-        disc=disc, fill_ratio=fills, angular_velocity=speed, kinematic_viscosity=1e-6, gravity=9.80665
-    )
-    high = found.surface_amplitude.value / (disc.outer_radius - found.surface_radius)
-    ratio = wave_height(table_1_scene, fills) / high
+    ratio = wave_height(table_1_scene, fills) / highest(table_1_scene, fills)
     assert np.all((ratio > 1 / 3) & (ratio < 3)), ratio
     assert np.all(ratio[:3] > 1), ratio
 
 
 def test_a_fast_rotor_by_hand(table_1_calibration: Calibration) -> None:
     # a = 34.888 mm, alpha 0.70558, ln(R2/a) 0.24336, g/omega^2 8.943 um over a depth of 9.612 mm.  Shares of
-    # modes 1 to 3 by quadrature: sin phi 0.5454 and -0.0495, cos phi 0.0976; s^2 1.1005, 3.538 and 6.180;
-    # swings 10.95, 1.394 and 1.193: sqrt((5.972 + 0.059)^2 + 0.136^2) g/omega^2 = 0.5613 % of the depth, and
-    # a little more by higher modes.
-    assert table_1_calibration.chamber.moment.status.ok
+    # modes 1 to 3 by quadrature: sin phi 0.5454 and -0.0495, cos phi 0.0976; s^2 1.1005, 3.538 and 6.180.
+    # Times 0.94^2 to 1.06^2 the first holds 1, where damping leaves 1/d: E = 4.822e-7, layers 2 R2/B +
+    # q/depth + (1 - q)/alpha = 5.082 with q = 1.0834/sinh(1.0834) = 0.8282, so d = 2.495e-3; the others swing
+    # 1.470 and 1.224 from the lower end: 0.5454 400.8 + 0.061 and 0.143 g/omega^2 = 20.3 % of the depth.
+    chamber = table_1_calibration.chamber
+    assert chamber.moment.status.ok
     height = float(wave_height(table_1_calibration.scene, np.array(0.5)))
-    assert height == pytest.approx(5.613e-3, rel=0.02)
-    assert float(_wave_mean(table_1_calibration.scene, np.array(0.5))) == pytest.approx(height**2 / 4)
+    assert height == pytest.approx(0.203, rel=0.02)
+    last = chamber.reported[-1]
+    share = chamber.moment.uncertainty[last] / chamber.moment.value[last]
+    assert share == pytest.approx(height**2 / 4, rel=0.05)
 
 
 def test_the_bound_falls_with_the_fourth_power_of_the_speed(table_1_scene: Scene) -> None:
-    one, two = (float(_wave_mean(at_speed(table_1_scene, rpm), np.array(0.4))) for rpm in (3000.0, 6000.0))
-    assert one / two == pytest.approx(16.0)
+    # At a fill of 0.3, away from what damping leaves of a resonance.
+    one, two = (float(_wave_mean(at_speed(table_1_scene, rpm), np.array(0.3))) for rpm in (3000.0, 6000.0))
+    assert one / two == pytest.approx(16.0, rel=1e-3)
+
+
+def test_models_are_chosen_by_what_frequencies_may_be(table_1_calibration: Calibration) -> None:
+    """At a fill of 0.5 the first mode is at 0.94 of the speed: within 6 % the swing may be a hundredfold."""
+    (row,) = (used for used in table_1_calibration.models_used if "sloshing" in used.term)
+    assert row.model != "left out"
+    share = row.estimated_contribution
+    scene = table_1_calibration.scene
+    found = sloshing_response(
+        disc=scene.disc,
+        fill_ratio=0.5,
+        angular_velocity=scene.rotor.speed,
+        kinematic_viscosity=scene.liquid.kinematic_viscosity,
+        gravity=scene.environment.gravity,
+    )
+    # Gravity's ripple of the pressure that a surface following at once makes is 0.017 %.
+    ripple = by_quadrature(scene, 0.5).wall_pressure_ripple / by_quadrature(scene, 0.5).wall_pressure
+    assert share is not None
+    assert 1 < share / (ripple * found.pressure_amplification_interval[0, 1]) < 4
 
 
 def test_a_vertical_shaft_makes_no_waves(table_1_scene: Scene) -> None:

@@ -28,6 +28,7 @@ def waves(*, resonant: list[Record], top: float, code: str = "ok", text: str = "
         "amplification": [0.2, 1.0, 4.0],
         "pressure_amplification": [3.1, 3.5, 6.0],
         "surface_amplitude_m": [1e-6, 1e-6, 2e-6],
+        "largest_surface_amplitude_m": [2e-6, 2e-6, 4e-6],
         "depth_m": [1e-3, 3e-3, 5e-3],
         "resonant": resonant,
         "imported": False,
@@ -35,6 +36,8 @@ def waves(*, resonant: list[Record], top: float, code: str = "ok", text: str = "
             "fill_ratio": 0.25,
             "amplification": 0.8,
             "pressure_amplification": 3.6,
+            "amplification_interval": [0.63, 1.02],
+            "pressure_amplification_interval": [3.1, 4.1],
             "surface_amplitude_m": 1e-6,
             "tilt_ratio": 2e-4,
         },
@@ -58,13 +61,19 @@ def test_fills_that_gravity_drives_are_named_and_others_are_not() -> None:
 
 def test_a_first_mode_that_nears_the_speed_is_named() -> None:
     assert "from about 0.5 up" in findings(waves(resonant=[], top=0.95))
-    assert "No mode" in findings(waves(resonant=[], top=0.6))
+    assert "No mode" in findings(waves(resonant=[], top=0.6) | {"frequency_ratio": [[0.3, 0.5, 0.6]]})
+
+
+def test_a_mode_that_only_may_meet_the_speed_is_named() -> None:
+    record = waves(resonant=[], top=0.6)
+    record["frequency_ratio"][2] = [0.7, 0.8, 0.97]
+    assert "0.47 to 0.5 (mode 3)" in findings(record)
 
 
 def test_the_swing_of_the_pressure_is_reported_beside_that_of_the_moment() -> None:
     told = findings(waves(resonant=[], top=0.6))
-    assert "0.8 times" in told
-    assert "the wall pressure 3.6 times" in told
+    assert "0.8 (0.63 to 1" in told
+    assert "the wall pressure 3.6 (3.1 to 4.1) times" in told
 
 
 def test_waves_that_are_not_small_are_said() -> None:

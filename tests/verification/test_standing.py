@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
+from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.reduced_model.budget import UNITS
 from ringbalance.verification.catalogue import load_cases
-from ringbalance.verification.standing import NO_DATA, SUBJECTS, budget_standing, standing_rows
+from ringbalance.verification.document import case_document
+from ringbalance.verification.runner import paper_scene, run_case
+from ringbalance.verification.standing import HEADS, NO_DATA, SUBJECTS, budget_standing, standing_rows
 
 
 def _case(**changes: Any) -> dict[str, Any]:
@@ -15,8 +20,8 @@ def _case(**changes: Any) -> dict[str, Any]:
     return {**case, "cost": "light", "numbers": numbers, **changes}
 
 
-def _cell(*cases: dict[str, Any], subject: str = "friction", column: int = 1) -> str:
-    return standing_rows(cases)[list(SUBJECTS).index(subject)][column]
+def _cell(*cases: dict[str, Any], subject: str = "friction", head: str = "Validated by measurements") -> str:
+    return standing_rows(cases)[list(SUBJECTS).index(subject)][HEADS.index(head)]
 
 
 def test_measurements_show_their_points_and_what_was_found() -> None:
@@ -31,8 +36,39 @@ def test_measurements_show_their_points_and_what_was_found() -> None:
 def test_verification_is_no_validation() -> None:
     solver = _case(id="manufactured_2d", kind="code_verification", numbers={})
     assert _cell(solver) == NO_DATA
-    assert _cell(solver, column=2) == "manufactured 2d"
-    assert _cell(_case(), column=2) == "by tests alone"
+    assert _cell(solver, head="Verified by cases") == "manufactured 2d"
+    assert _cell(_case(), head="Verified by cases") == "by tests alone"
+
+
+@pytest.mark.parametrize(
+    ("name", "readings", "judged", "everything", "left_out"),
+    [
+        ("ducts", 125, "107 of 125 points, 97.2 % within", "of all 125 89.6 %", "18 points of a flat duct"),
+        ("laminar_tubes", 69, "42 of 63 points, 100.0 % within", "of all 63 88.9 %", "6 points which gave"),
+        ("rotor", 782, "318 points", "off by up to +4.0 %", "464 points with none"),
+        ("smooth_tubes", 577, "536 of 577 points", "of all 577 92.9 %", "30 points by McKeon"),
+        ("waves", 52, "28 points, 100.0 % within", "bias", "24 points of four"),
+    ],
+)
+def test_what_is_left_out_is_counted_and_what_taught_is_no_prediction(
+    name: str, readings: int, judged: str, everything: str, left_out: str
+) -> None:
+    """Against the rows of the data files."""
+    case = case_document(run_case(f"measured_{name}", scene=paper_scene()))
+    subject, numbers = case["about"][0], case["numbers"]
+    assert judged in _cell(case, subject=subject)
+    assert everything in _cell(case, subject=subject)
+    assert left_out in _cell(case, subject=subject, head="Left out of that, and why")
+    counted = sum(numbers[f"{one['name']}_points"] for one in case["left_out"])
+    assert numbers["points"] + counted == readings
+
+
+def test_the_stated_uncertainty_of_waves_follows_from_the_points_that_taught_it() -> None:
+    case = case_document(run_case("measured_waves", scene=paper_scene()))
+    assert case["verdict"] == "confirmed"
+    assert case["numbers"]["taught_width"] == pytest.approx(FREQUENCY_UNCERTAINTY, rel=0.085)
+    (judged,) = (one for one in case["quantities"] if one["name"] == "calibration")
+    assert judged["verdict"] == "confirmed"
 
 
 def test_a_budget_says_which_of_its_models_have_no_data() -> None:

@@ -206,7 +206,7 @@ def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judge
     data = measurements("addington_1960")
     study = load_case("measured_waves").study
     assert study is not None
-    taught = np.isin(data.series, study.settings["without"])
+    taught = np.isin(data.series, study.settings["taught"])
     found = compare(data.where(taught)).statistics
     width = math.hypot(found.bias, 2 * found.standard_deviation)
     assert round(width, 2) == FREQUENCY_UNCERTAINTY

@@ -21,6 +21,8 @@ Values = Mapping[str, float]
 """By axis, in the axis' unit."""
 MAP_PREFIX: Final = "map of "
 """Of the name of a map's table."""
+_ON_SHAFT: Final = 0.5
+"""Of the axis "place", from which the gas pressure is one on the shaft."""
 _TABLES: Final = ("environment", "gas", "sensor", "controller", "run", "accuracy")
 """That a scene file may leave out."""
 
@@ -58,7 +60,7 @@ class Axis:
 
 
 AXES: Final = (
-    Axis("speed", "speed", "rpm", 1.0, 1e5, usual=(300.0, 6e4)),
+    Axis("speed", "speed", "rpm", 1.0, 3e5, usual=(300.0, 6e4)),
     Axis("fill", "largest fill ratio", "1", 1e-6, 1.0, usual=(0.05, 0.9)),
     Axis("angle", "central angle", "deg", 5.0, 89.0, usual=(10.0, 85.0), spacing="linear"),
     Axis("plate", "plate thickness over that which closes the chamber", "1", 0.0, 1.05, (0.0, 0.8), "linear"),
@@ -66,6 +68,9 @@ AXES: Final = (
     Axis("bore", "bore", "mm", 0.1, 20.0, usual=(0.3, 6.0)),
     Axis("roughness", "roughness over bore", "1", 1e-7, 0.06, usual=(1e-6, 0.02)),
     Axis("pressure", "gas pressure over the column to the siphon crest", "1", 0.0, 4.0, (0.8, 3.0), "linear"),
+    Axis(
+        "place", "gas pressure on the shaft from a half up", "1", 0.0, 1.0, usual=(0.0, 0.4), spacing="linear"
+    ),
     Axis("unbalance", "unbalance over what one pair can carry", "1", 0.01, 1.5, usual=(0.05, 0.9)),
     Axis("gain", "controller gain over the scene's", "1", 1e-4, 1e3, usual=(0.01, 10.0)),
     Axis("noise", "sensor noise over the limit", "1", 1e-4, 10.0, usual=(1e-3, 0.5)),
@@ -212,6 +217,10 @@ def _set_pressure(document: Document, value: float, scene: Scene, values: Values
     document["gas"]["pressure"] = f"{value * _column(scene, speed)!r} Pa"
 
 
+def _set_place(document: Document, value: float, _: Scene, __: Values) -> None:
+    document["gas"]["measured_at"] = "chamber" if value < _ON_SHAFT else "shaft"
+
+
 def _set_tolerance(document: Document, value: float, _: Scene, __: Values) -> None:
     document["accuracy"] = {"tolerance": f"{100 * value!r} %"}
 
@@ -224,6 +233,7 @@ _SETTERS: Final = {
     "bore": _set_bore,
     "roughness": _set_roughness,
     "pressure": _set_pressure,
+    "place": _set_place,
     "tolerance": _set_tolerance,
 }
 """What hangs on the whole scene, such as the unbalance, is set by `fitted` when that is made."""

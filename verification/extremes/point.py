@@ -32,6 +32,13 @@ ROUND_OFF: Final = 1e-12
 WIDE: Final = 1.0
 """Half-width over value from which on an answer is no more than an order of magnitude."""
 
+_SOUND_SPEED: Final = 1480.0
+"""m/s, in water at 20 degC."""
+_BULK_MODULUS: Final = 2.2e9
+"""Pa, of the same."""
+_PLAIN_LIQUID: Final = (0.33, 0.05)
+"""Of the speed of sound and of the bulk modulus, beyond which no answer may stand without a reservation."""
+
 
 class Ending(StrEnum):
     """How a point ended."""
@@ -167,6 +174,21 @@ def _calibration_faults(calibration: Calibration, ratio: float) -> Iterator[str]
     if np.any(np.diff(head) <= 0):
         yield "the tube's head does not grow with the velocity"
     yield from _law_faults(calibration)
+    yield from _absurd(calibration)
+
+
+def _absurd(calibration: Calibration) -> Iterator[str]:
+    """Velocities and pressures at which the liquid is nothing like one of a single density."""
+    if not calibration.chamber.status.ok:
+        return
+    law, gas = calibration.flow_law, calibration.scene.gas.pressure
+    fills = np.linspace(0.0, law.max_fill_ratio, 9)
+    fastest = np.abs(law.evaluate(fill_ratio=fills, gas_pressure=gas, primed=True).velocity).max()
+    if fastest > _PLAIN_LIQUID[0] * _SOUND_SPEED:
+        yield f"{fastest:.3g} m/s in the tube without a reservation"
+    highest = calibration.chamber.wall_pressure.value.max()
+    if highest > _PLAIN_LIQUID[1] * _BULK_MODULUS:
+        yield f"{highest / 1e6:.3g} MPa on the wall without a reservation"
 
 
 def _law_faults(calibration: Calibration) -> Iterator[str]:

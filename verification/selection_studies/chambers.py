@@ -13,6 +13,7 @@ from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.cut.tilted import tilted_liquid
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics import deferred
+from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.reduced_model.chamber.element_check import ImportedElements, scene_ring
 from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
 from ringbalance.reduced_model.chamber.terms import (
@@ -32,7 +33,7 @@ from ringbalance.reduced_model.chamber.values import (
     by_quadrature,
     drawing_shares,
 )
-from ringbalance.reduced_model.contribution import Contribution
+from ringbalance.reduced_model.contribution import Contribution, percent
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
@@ -111,7 +112,8 @@ def chamber_hierarchies(scene: Scene) -> tuple[ModelHierarchy, ModelHierarchy]:
             top_uncertainty=float(np.sqrt(floor**2 + capillary**2 + swing**2)),
             top_uncertainty_from=(
                 f"grid convergence, about {floor:.1e}; surface tension, which no model includes, up to "
-                f"{capillary:.1e}; waves beyond linear sloshing, about {swing:.1e}"
+                f"{capillary:.1e}; waves at frequencies that are known to {percent(FREQUENCY_UNCERTAINTY)}, "
+                f"and beyond linear sloshing, about {swing:.1e}"
             ),
             status=chamber_status(scene),
         )
@@ -127,12 +129,18 @@ def chamber_hierarchies(scene: Scene) -> tuple[ModelHierarchy, ModelHierarchy]:
 def _swing_uncertainty(
     scene: Scene, fills: FloatArray, terms: Mapping[str, Mapping[str, Contribution]], part: str
 ) -> float:
-    """What linear sloshing leaves open: its square, and the meshes of the swinging liquid."""
+    """What linear sloshing leaves open: its square, its meshes, what its frequencies' uncertainty moves.
+
+    At most 1: nothing is known then.
+    """
     if scene.environment.shaft == "vertical":
         return 0.0
-    factor = float(np.max(amplification(scene, fills), initial=1.0))
+    swing = amplification(scene, fills)
+    factor = float(np.max(swing.largest, initial=1.0))
+    ripple, sloshing = (terms[part][term].value or 0.0 for term in (RIPPLE, SLOSHING))
+    between = ripple * float(np.max(swing.largest - swing.lowest, initial=0.0))
     waves = ((terms["pressures"][RIPPLE].value or 0.0) * factor) ** 2
-    return waves + _SWING_MESH * (terms[part][SLOSHING].value or 0.0)
+    return min(waves + between + _SWING_MESH * sloshing, 1.0)
 
 
 def _mesh_error(scene: Scene, angular_cells: int) -> float:

@@ -52,12 +52,12 @@ def _ring(scene: Scene) -> tuple[_Row, ...]:
     across = scene.environment.shaft == "horizontal" and gravity > 0
     swing, formula = None, "|1/(1 - 1/s^2)|, s^2 = k tanh(k ln(R2/a)), k = pi/theta"
     if across:
-        swing = float(amplification(scene, fill))
+        swing = float(amplification(scene, fill).largest)
     pull = omega**2 * a / gravity if gravity else None
     layers = "layers at the walls of a chamber, sqrt(Ek) R2 thick"
     return (
         ("omega^2 a/g", pull, "omega^2 a/g", "gravity against the ring"),
-        ("sloshing ratio", swing, formula, "how much swinging enlarges gravity's ripple at 1x"),
+        ("sloshing ratio", swing, formula, "how much swinging may enlarge gravity's ripple at 1x"),
         ("Bond number", bond, "rho omega^2 a (R2 - a)^2/sigma", "surface tension against the ring"),
         ("Ekman number", wall_layers(scene, np.array(fill))[1], "nu/(omega R2^2)", layers),
     )

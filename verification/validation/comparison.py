@@ -206,6 +206,23 @@ def _check(data: Measurements, kind: Kind) -> None:
         raise MeasurementsError("\n".join(faults))
 
 
+def beside_judged(
+    judged: Comparison, left_out: Mapping[str, Comparison] = MappingProxyType({}), *, taught: int = 0
+) -> dict[str, float]:
+    """Numbers of what a case leaves out, and of all readings together.
+
+    Args: `left_out`: comparisons that are not judged, by name. `taught`: readings that taught a coefficient,
+        which are no predictions and count in nothing but `taught_points`.
+    Returns: `<name>_points`, `<name>_within` and `<name>_bias` of each, `all_points`, `all_within`.
+    """
+    found = {"taught_points": float(taught)} if taught else {}
+    for name, one in left_out.items():
+        within = float(np.mean(one.used <= 1))
+        found |= {f"{name}_points": float(one.used.size), f"{name}_within": within, f"{name}_bias": one.bias}
+    used = np.concatenate([judged.used, *(one.used for one in left_out.values())])
+    return {**found, "all_points": float(used.size), "all_within": float(np.mean(used <= 1))}
+
+
 def study(
     scene: Scene,
     level: Level,
@@ -213,22 +230,34 @@ def study(
     *,
     sets: Sequence[str],
     unit: str,
-    without: Sequence[str] = (),
+    taught: Sequence[str] = (),
     beside: Mapping[str, str] = MappingProxyType({}),
 ) -> Evidence:
     """Evidence of a case that compares bundled data sets of one kind, whatever the scene.
 
-    Args: `unit`: of what was measured, SI. `without`: series that are not judged. `beside`: a set that is
-        not judged either, by the name of its numbers.
+    Args: `unit`: of what was measured, SI. `taught`: series from which the stated uncertainty was taken; how
+        far their bias and twice their scatter are from it is found as `calibration`. `beside`: sets that are
+        not judged either, by the name of their numbers.
     """
-    judged = [measurements(name) for name in sets]
-    found = data_evidence(
-        *(data.where(~np.isin(data.series, without)) for data in judged), unit=unit, mutation=defect
+    sources = [measurements(name) for name in sets]
+    teaching = [np.isin(data.series, taught) for data in sources]
+    parts = [data.where(~one) for data, one in zip(sources, teaching, strict=True)]
+    found = data_evidence(*parts, unit=unit, mutation=defect)
+    others = {name: compare(measurements(other)) for name, other in beside.items()}
+    count = sum(int(one.sum()) for one in teaching)
+    more = beside_judged(compare(*parts, mutation=defect), others, taught=count)
+    if not count:
+        return dataclasses.replace(found, numbers={**found.numbers, **more})
+    rest = [data.where(one) for data, one in zip(sources, teaching, strict=True) if one.any()]
+    teachers = compare(*rest, mutation=defect)
+    width = math.hypot(teachers.bias, 2 * teachers.statistics.standard_deviation)
+    more["taught_width"] = width
+    stated = float(np.mean(teachers.stated / teachers.predicted))
+    return dataclasses.replace(
+        found,
+        found={**found.found, **as_found(calibration=abs(width / stated - 1))},
+        numbers={**found.numbers, **more},
     )
-    more = {name: compare(measurements(other)).statistics for name, other in beside.items()}
-    points = {f"{name}_points": float(one.points) for name, one in more.items()}
-    within = {f"{name}_within": one.share_within for name, one in more.items()}
-    return dataclasses.replace(found, numbers={**found.numbers, **points, **within})
 
 
 def data_evidence(*sets: Measurements, unit: str, mutation: str | None = None) -> Evidence:

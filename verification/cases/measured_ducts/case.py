@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.validation.comparison import MUTATIONS, friction
+from ringbalance.verification.validation.comparison import MUTATIONS, beside_judged, friction
 from ringbalance.verification.validation.kinds import measurements
 
 _LAMINAR: Final = 1800.0
@@ -27,14 +27,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     points = friction(*sets, mutation=mutation)
     wide = np.char.find(points.series, "8:1") >= 0
     narrow, reynolds = points.where(~wide), points.columns["reynolds"][~wide]
-    whole, laminar, turbulent, wide_duct = (
+    whole, laminar, turbulent = (
         part.statistics
-        for part in (
-            narrow,
-            narrow.where(reynolds < _LAMINAR),
-            narrow.where(reynolds >= _TURBULENT),
-            points.where(wide),
-        )
+        for part in (narrow, narrow.where(reynolds < _LAMINAR), narrow.where(reynolds >= _TURBULENT))
     )
     cornish = friction(sets[0], mutation=mutation)
     return Evidence(
@@ -46,9 +41,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "turbulent_points": float(turbulent.points),
             "turbulent_bias": turbulent.bias,
             "turbulent_standard_deviation": turbulent.standard_deviation,
-            "wide_points": float(wide_duct.points),
-            "wide_bias": wide_duct.bias,
-            "wide_share": wide_duct.share_within,
+            **beside_judged(narrow, {"wide": points.where(wide)}),
         },
         series=(cornish.over_reynolds("a rectangular duct (2.9 to 1)"),),
     )

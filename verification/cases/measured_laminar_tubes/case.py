@@ -11,7 +11,7 @@ from ringbalance.identification.data.measurements import Measurements
 from ringbalance.scene.arrays import BoolArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level
-from ringbalance.verification.validation.comparison import compare, data_evidence
+from ringbalance.verification.validation.comparison import beside_judged, compare, data_evidence
 from ringbalance.verification.validation.kinds import CALIBRATING, measurements, tube_numbers
 
 _DEVELOPED: Final = 0.0125
@@ -22,24 +22,27 @@ _CONTRADICTED: Final = 1.5e5
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     data = measurements("eisenklam_1958")
-    usable, developed = _usable(data)
-    found = data_evidence(data.where(usable & developed), unit="Pa", mutation=defect)
-    short = compare(data.where(usable & ~developed)).statistics
+    taught, contradicted, developed = _kinds(data)
+    usable = ~taught & ~contradicted
+    judged = data.where(usable & developed)
+    found = data_evidence(judged, unit="Pa", mutation=defect)
+    left_out = {
+        "contradicted": compare(data.where(contradicted)),
+        "short": compare(data.where(usable & ~developed)),
+    }
     uncut = compare(data.where(usable & np.char.startswith(data.series, "tube")))
     more = {
+        **beside_judged(compare(judged, mutation=defect), left_out, taught=int(taught.sum())),
         "laminar_points": found.numbers["points"],
-        "short_points": float(short.points),
-        "short_bias": short.bias,
-        "short_within": short.share_within,
         "long_worst": float(np.max(np.abs(uncut.predicted / uncut.measured - 1))),
     }
     return dataclasses.replace(found, numbers={**found.numbers, **more})
 
 
-def _usable(data: Measurements) -> tuple[BoolArray, BoolArray]:
-    """Points that taught no bore and contradict no others, and those where flow could develop."""
+def _kinds(data: Measurements) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Points that taught a bore, those that contradict others, and those where flow could develop."""
     taught = np.isin(data.series, CALIBRATING)
     cut = np.char.startswith(data.series, "cut")
     contradicted = cut & (data.columns["pressure"] < _CONTRADICTED)
     reynolds, slenderness = tube_numbers(data)
-    return ~taught & ~contradicted, slenderness >= _DEVELOPED * reynolds
+    return taught, contradicted & ~taught, slenderness >= _DEVELOPED * reynolds

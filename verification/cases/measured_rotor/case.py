@@ -20,12 +20,14 @@ _WASHER: Final = 12.4e-6
 """Unbalance of a washer, kg m."""
 _WASHER_UNCERTAINTY: Final = 0.5e-6
 """Of each, 95 %, kg m."""
+_TAUGHT: Final = (0, 1, 2)
+"""Numbers of washers that gave the coefficient."""
 _PREDICTED: Final = (3, 4)
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     run = measurements("rodrigues_2011")
-    rotor = _calibrated(scene.rotor, [_amplitude(run, "plain", count) for count in (0, 1, 2)])
+    rotor = _calibrated(scene.rotor, [_amplitude(run, "plain", count) for count in _TAUGHT])
     rotor = dataclasses.replace(
         rotor, influence_coefficient=MUTATIONS.get(defect, 1.0) * rotor.influence_coefficient
     )
@@ -38,7 +40,9 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             for count in _PREDICTED
         },
         numbers={
-            "points": float(sum(_chosen(run, "plain", count).size for count in range(5))),
+            "points": float(sum(_chosen(run, "plain", count).size for count in _PREDICTED)),
+            "taught_points": float(sum(_chosen(run, "plain", count).size for count in _TAUGHT)),
+            "worst_mean": max((predicted[n] / _amplitude(run, "plain", n) - 1 for n in _PREDICTED), key=abs),
             "influence_coefficient": rotor.influence_coefficient,
             "balls_up": _amplitude(run, "abb_runup", 4),
             "balls_down": _amplitude(run, "abb_rundown", 4),

@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.validation.comparison import Comparison, friction
+from ringbalance.verification.validation.comparison import Comparison, beside_judged, friction
 from ringbalance.verification.validation.kinds import measurements
 
 _FULLY_ROUGH: Final = 70.0
@@ -24,6 +24,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         found=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
         numbers={
             **statistics.numbers(),
+            **beside_judged(points),
             "worst": float(np.max(points.predicted / points.measured - 1)),
             "rough_points": float(rough.points),
             "rough_bias": rough.bias,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
@@ -20,6 +20,7 @@ from ringbalance.controller.liquid_ring.reach import (
     starting_pressure,
 )
 from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.simulation import (
     NOISE_DEVIATIONS,
     Injection,
@@ -57,6 +58,8 @@ class Facts:
     """The same of the first time that it held for the hold time."""
     drift: float = 0.0
     """Largest change of a fill ratio while the gas was off."""
+    runs_back: tuple[bool, ...] = ()
+    """Whether liquid of each pair still ran back at the end of the last stretch of time."""
     samples: list[Sample] = field(default_factory=list)
     injections: list[Injection] = field(default_factory=list)
     shortened: int = 0
@@ -96,6 +99,20 @@ class Facts:
         return self.plant.unreachable_vibration(state=self.state, rotor=self.scene.rotor)
 
     @property
+    def drains(self) -> bool:
+        """Whether what still runs back, its pairs level, would take the vibration above the limit."""
+        if not any(self.runs_back):
+            return False
+        level = [
+            replace(pair, fill=pair.total / 2) if back else pair
+            for pair, back in zip(self.state.pairs, self.runs_back, strict=True)
+        ]
+        moment = disc_unbalance(
+            moment=self.plant.model.moment, fill_ratio=DiscState(pairs=tuple(level)).fills()
+        )
+        return abs(complex(self.scene.rotor.vibration(moment))) > self.scene.controller.limit
+
+    @property
     def settling_time(self) -> float | None:
         """s, from which on the amplitude first held; None when it has not, or is not expected to stay."""
         if self.loop.stays and self.held_since < math.inf:
@@ -120,6 +137,8 @@ class Facts:
             return Outcome.SETTLED
         if self.unreachable_amplitude > limit and not self.loop.unstable:
             return Outcome.CAPACITY_EXCEEDED
+        if self.drains:
+            return Outcome.DRIFTING
         higher = self.final_amplitude > self.initial_amplitude + self.noise_floor
         if has_grown(self.cause, higher):
             return Outcome.DRIFTING if self.drift > NOTICEABLE else Outcome.DIVERGING

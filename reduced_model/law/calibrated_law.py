@@ -133,15 +133,11 @@ class CalibratedLaw:
         """What acts on the tube in one direction; `reverse`: out of the opposite chamber."""
         own, other = asked.fill_ratio, asked.opposite_fill_ratio
         ends = self.ends(fill_ratio=own, opposite_fill_ratio=other, gas_pressure=asked.gas_pressure)
-        allowed = np.ones_like(asked.primed)
-        if self.path.hump_pressure is None:
-            allowed = (asked.gas_pressure > 0) & (asked.primed | (not reverse))
         return Drive(
             ends=ends.reversed() if reverse else ends,
             upstream_uncertainty=self.wall_pressure_uncertainty(other if reverse else own),
             downstream_uncertainty=self.wall_pressure_uncertainty(own if reverse else other),
             primed=asked.primed,
-            allowed=allowed,
         )
 
     def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:

@@ -16,7 +16,7 @@ from ringbalance.controller.liquid_ring.reach import (
     BEYOND_CAPACITY,
     LEAST_PRESSURE,
     NEARLY_EMPTY,
-    RUNS_BACK,
+    runs_back_text,
     starting_pressure,
 )
 from ringbalance.controller.liquid_ring.transfer import Event
@@ -344,10 +344,8 @@ def _diverging(facts: Facts) -> str:
 
 
 def _drifting(facts: Facts) -> str:
-    return (
-        f"{_not_settled(facts)}; the full tube lets liquid run back while the gas is off (up to "
-        f"{facts.drift:.3g} in fill between samples): {RUNS_BACK}"
-    )
+    why = runs_back_text(facts.scene, residual_fill=facts.plant.residual_fill)
+    return f"{_not_settled(facts)}; up to {facts.drift:.3g} in fill runs back between samples: {why}"
 
 
 def _too_short(facts: Facts) -> str:

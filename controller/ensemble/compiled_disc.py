@@ -27,7 +27,7 @@ def reset(shared: Record, run: Record) -> None:
 @in_place
 def any_wet(shared: Record, run: Record) -> bool:
     """Whether any tube holds a column or lets liquid through without one, or any pair moves."""
-    found = shared.floods > 0
+    found = bool(shared.floods)
     for i in range(shared.chambers // 2):
         found = found or run.wet[i] > 0.0
     return found
@@ -146,11 +146,11 @@ def drains(shared: Record, run: Record) -> bool:
     for i in range(shared.chambers // 2):
         back = run.runs_back[i] > 0.0
         run.trial[i] = shared.total / 2.0 if back else run.fill[i]
-        found = found or back
+        found = found or bool(back)
     if not found:
         return False
     real, imaginary = vibration(shared, run, True)
-    return math.hypot(real, imaginary) > shared.limit
+    return bool(math.hypot(real, imaginary) > shared.limit)
 
 
 @in_place

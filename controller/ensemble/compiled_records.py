@@ -78,7 +78,7 @@ SHARED: Final = np.dtype(
             "begin",
             np.int64,
             (OFF_DRY + 2,),
-        ),  # first interval of ON, DRY, OFF and OFF_DRY, and behind the last
+        ),  # first interval of the four flows, and behind the last
         ("edge", np.float64, (INTERVALS,)),  # lowest x of an interval
         ("sense", np.int64, (INTERVALS,)),  # 1: out of the driven chamber, -1: back into it, 0: none
         ("holds", np.int64, (INTERVALS,)),  # whether the tube holds a column afterwards

@@ -138,7 +138,7 @@ def _driving(plant: Record, at: tuple[float, float, float, float]) -> float:
 
 @inlined
 def _allowed(plant: Record, at: tuple[float, float, float, float]) -> bool:
-    """Under a one-way law liquid leaves a chamber while there is gas in it, or where its level passes the crest."""
+    """Under a one-way law liquid leaves a chamber with gas in it, or one whose level passes the crest."""
     return bool(not plant.one_way or at[0] > plant.gas_off or at[2] - plant.column_pressure > at[1])
 
 

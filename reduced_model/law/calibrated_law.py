@@ -129,6 +129,10 @@ class CalibratedLaw:
             port_pressure=self.path.port_pressure,
         )
 
+    def holds(self, fill_ratio: float) -> bool:
+        """Whether a chamber of that fill keeps it against a lower one with the gas off."""
+        return self.path.holds(max(float(self.wall_pressure(fill_ratio)), 0.0))
+
     def drive(self, asked: Conditions, *, reverse: bool) -> Drive:
         """What acts on the tube in one direction; `reverse`: out of the opposite chamber."""
         own, other = asked.fill_ratio, asked.opposite_fill_ratio

@@ -125,6 +125,11 @@ class PaperLaw:
             primed=np.asarray(flows | returns),
         )
 
+    def holds(self, fill_ratio: float) -> bool:
+        """Whether a chamber of that fill keeps it against a lower one with the gas off."""
+        level = self.pressure_per_fill_difference * fill_ratio
+        return self.return_pressure is None or level <= self.return_pressure
+
     def _returns(self, asked: Conditions) -> BoolArray:
         """Whether the opposite chamber's liquid passes the crest against the driven one's gas."""
         if self.return_pressure is None:

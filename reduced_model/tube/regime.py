@@ -178,8 +178,8 @@ class TubePath:
     port_pressure: float
     """rho omega^2 (R2^2 - r_p^2)/2, Pa."""
     hump_pressure: float | None
-    """rho omega^2 (R2^2 - r_m^2)/2, Pa; None: no crest, the tube stays at the port's radius, under the levels of
-    both chambers, and is full whether the gas is on or off."""
+    """rho omega^2 (R2^2 - r_m^2)/2, Pa; None: no crest, the tube stays at the port's radius, under the levels
+    of both chambers, and is full whether the gas is on or off."""
     trapped: bool
     """Whether the gas over the siphon crest must be displaced through the downstream port."""
     vapour_pressure: float
@@ -206,8 +206,8 @@ class TubePath:
     def return_pressure(self) -> float:
         """Hydrostatic pressure of a vented chamber above which liquid leaves it against a vented one, Pa.
 
-        Below, a full column over the crest parts: D_m - P and the pressure p_c of its cavity.  Without a crest
-        nothing parts, and the chambers level out.
+        D_m + p_c, with the pressure p_c of a cavity: below, a full column over the crest parts.  Without a
+        crest nothing parts, and the chambers level out.
         """
         if self.crest is None:
             return 0.0
@@ -218,7 +218,7 @@ class TubePath:
             downstream_hydrostatic=self.port_pressure,
             port_pressure=self.port_pressure,
         )
-        return -self.crest.separation_margin(still)
+        return -float(self.crest.separation_margin(still))
 
     def holds(self, level: float) -> bool:
         """Whether a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off."""

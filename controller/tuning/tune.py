@@ -185,6 +185,8 @@ def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
 
 def _line_reaches(lines: tuple[LineAnswer, ...], *, settles: bool) -> bool | None:
     """Whether a given line can, which its runs show; of a default range: None when not all are sure to."""
+    if not lines[0].holds:
+        return settles
     above = [answer.above_limit for answer in lines]
     if not any(above):
         return True

@@ -345,7 +345,7 @@ def _diverging(facts: Facts) -> str:
 
 def _drifting(facts: Facts) -> str:
     why = runs_back_text(facts.scene, residual_fill=facts.plant.residual_fill)
-    return f"{_not_settled(facts)}; up to {facts.drift:.3g} in fill runs back between samples: {why}"
+    return f"{_not_settled(facts)}, up to {facts.drift:.3g} in fill is lost between samples; {why}"
 
 
 def _too_short(facts: Facts) -> str:

@@ -13,9 +13,8 @@ import numpy as np
 
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.predict.device import Device, Models
+from ringbalance.identification.predict.device import Device, Models, runs_back
 from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
-from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Scene
 
@@ -75,12 +74,6 @@ def _fills(device: Device, observations: Observations) -> FloatArray:
     return found
 
 
-def _runs_back(scene: Scene, _: Observations) -> str:
-    """Why no injection leaves a change behind; empty where the tube holds at equal fills."""
-    warning = Holding.of(scene, fill_ratio=scene.disc.initial_fill).warning
-    return f"by this scene no injection leaves a change behind: {warning}" if warning else ""
-
-
 def _covariance(observations: Observations) -> FloatArray:
     """Of the measured parts, shape (2 n, 2 n); in units of one vector's where the noise is not given.
 
@@ -126,5 +119,5 @@ INJECTION: Final = PredictedKind(
     noise_given=_noise_given,
     column=lambda _: "amplitude_after",
     informs=always("lambda_factor", "bore", "extra_loss"),
-    obstacle=_runs_back,
+    obstacle=runs_back,
 )

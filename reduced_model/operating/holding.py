@@ -41,15 +41,15 @@ class Holding:
         if self.holds:
             return ""
         if self.hump_radius is None:
-            tube = "without a siphon crest the tube stays full"
+            tube = "without a siphon crest the tube stays full and"
         else:
-            tube = f"over a siphon crest at {_mm(self.hump_radius)} mm a full tube does not part"
+            tube = f"over a siphon crest at {_mm(self.hump_radius)} mm a full tube does not part: it"
         cure = "raise rotor.speed: at this one no siphon crest holds it"
         if self.largest_hump_radius is not None:
             cure = f"give the tube a crest inside {_mm(self.largest_hump_radius)} mm (tube.hump_radius)"
         return (
-            f"{tube}: while the gas is off the fullest chamber runs back until both level out, and no such "
-            f"correction lasts: {cure}"
+            f"{tube} lets liquid of the fullest chamber run back while the gas is off, so no such correction "
+            f"lasts: {cure}"
         )
 
 

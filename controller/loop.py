@@ -181,9 +181,15 @@ class _Run(Facts):
         return self.seen[1]
 
     @property
+    def _rests(self) -> bool:
+        """Whether no liquid can move until a valve is commanded to open."""
+        return self.state.rests and not self.plant.floods
+
+    @property
     def _held(self) -> bool:
         """Whether the amplitude has held; what the time limit has cut short would have ended otherwise."""
         held = not self.cut and has_held(self.time, self.since, self.scene.controller.hold_time)
+        held = held and not self.drains
         if held and self.held_since == math.inf:
             self.held_since = self.since
         return held
@@ -209,7 +215,7 @@ class _Run(Facts):
                 and has_risen(first.amplitude, last.amplitude, self.noise_floor),
                 self.idle,
                 IDLE_OPERATIONS + self.plant.chambers,
-                command.resting and self.exact and self.state.rests and not (self.cut or self.to_time_limit),
+                command.resting and self.exact and self._rests and not (self.cut or self.to_time_limit),
                 self.remaining,
             )
         )
@@ -275,7 +281,7 @@ class _Run(Facts):
         duration = min(self.scene.controller.period, self.remaining)
         self.cut = self.cut or duration < self.scene.controller.period
         if duration > 0:
-            points = 1 if self.state.rests else DRIFT_POINTS
+            points = 1 if self._rests else DRIFT_POINTS
             points = points if self.plant.dynamics is None else TAIL_POINTS
             self._pass(self.plant.advance(self.state, gas_times={}, duration=duration, points=points))
 
@@ -285,7 +291,7 @@ class _Run(Facts):
         later = time > np.concatenate([[self.time], time[:-1]])
         self._keep(time[later], advance.fill_ratio[:, later])
         self.state = advance.state
-        self.drift = max(self.drift, advance.drift)
+        self.drift, self.runs_back = max(self.drift, advance.drift), advance.runs_back
         self.time = float(time[-1])
 
     def _keep(self, time: FloatArray, fill_ratio: FloatArray) -> None:

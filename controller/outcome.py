@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
@@ -12,8 +12,9 @@ import numpy as np
 
 from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, RUNS_BACK
+from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, runs_back_text
 from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.shortfall import liquid_not_driven, moment_missing
 from ringbalance.controller.simulation import (
     NOISE_DEVIATIONS,
@@ -51,6 +52,8 @@ class Facts:
     """The same of the first time that it held for the hold time."""
     drift: float = 0.0
     """Largest change of a fill ratio while the gas was off."""
+    runs_back: tuple[bool, ...] = ()
+    """Whether liquid of each pair still ran back at the end of the last stretch of time."""
     samples: list[Sample] = field(default_factory=list)
     injections: list[Injection] = field(default_factory=list)
     shortened: int = 0
@@ -97,6 +100,20 @@ class Facts:
         )
 
     @property
+    def drains(self) -> bool:
+        """Whether what still runs back, its pairs level, would take the vibration above the limit."""
+        if not any(self.runs_back):
+            return False
+        level = [
+            replace(pair, fill=pair.total / 2) if back else pair
+            for pair, back in zip(self.state.pairs, self.runs_back, strict=True)
+        ]
+        moment = disc_unbalance(
+            moment=self.plant.model.moment, fill_ratio=DiscState(pairs=tuple(level)).fills()
+        )
+        return abs(complex(self.scene.rotor.vibration(moment))) > self.scene.controller.limit
+
+    @property
     def settling_time(self) -> float | None:
         """s, from which on the amplitude first held; None when it has not, or is not expected to stay."""
         if self.loop.stays and self.held_since < math.inf:
@@ -121,6 +138,8 @@ class Facts:
             return Outcome.SETTLED
         if self.beyond_disc > limit and not self.loop.unstable:
             return Outcome.CAPACITY_EXCEEDED
+        if self.drains:
+            return Outcome.DRIFTING
         higher = self.final_amplitude > self.initial_amplitude + self.noise_floor
         if has_grown(self.cause, higher):
             return Outcome.DRIFTING if self.drift > NOTICEABLE else Outcome.DIVERGING
@@ -133,9 +152,7 @@ class Facts:
         if self.refused and self.cause is Cause.IDLE:
             return Outcome.CHAMBER_EMPTY
         if self.last_command and not _longest(self).operation.moved:
-            if _longest(self).operation.event in {Event.EMPTY, Event.FULL}:
-                return Outcome.CHAMBER_EMPTY
-            return Outcome.GAS_TIME_TOO_SHORT if _over_too_soon(self) else Outcome.STALLED
+            return _unmoved(self)
         return Outcome.TOO_MANY_SAMPLES if self.cause is Cause.SAMPLES else _out_of_time(self)
 
     @property
@@ -153,6 +170,13 @@ class Facts:
 
 def _longest(facts: Facts) -> Injection:
     return max(facts.last_command, key=lambda injection: injection.operation.duration)
+
+
+def _unmoved(facts: Facts) -> Outcome:
+    """Why the last command moved nothing."""
+    if _longest(facts).operation.event in {Event.EMPTY, Event.FULL}:
+        return Outcome.CHAMBER_EMPTY
+    return Outcome.GAS_TIME_TOO_SHORT if _over_too_soon(facts) else Outcome.STALLED
 
 
 def _over_too_soon(facts: Facts) -> bool:
@@ -317,10 +341,8 @@ def _diverging(facts: Facts) -> str:
 
 
 def _drifting(facts: Facts) -> str:
-    return (
-        f"{_not_settled(facts)}; the full tube lets liquid run back while the gas is off (up to "
-        f"{facts.drift:.3g} in fill between samples): {RUNS_BACK}"
-    )
+    why = runs_back_text(facts.scene, residual_fill=facts.plant.residual_fill)
+    return f"{_not_settled(facts)}, up to {facts.drift:.3g} in fill is lost between samples; {why}"
 
 
 def _too_short(facts: Facts) -> str:

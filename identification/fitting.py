@@ -63,7 +63,7 @@ def problem_of(
     for each in data:
         if KINDS[each.kind].balancer != scene.balancer:
             raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
-        if reason := PREDICTED[each.kind].too_long(scene, each):
+        if reason := PREDICTED[each.kind].obstacle(scene, each):
             raise FitError(f"{each.file}: {reason}")
     names = informed(scene, data) if parameters is None else list(parameters)
     return Problem(

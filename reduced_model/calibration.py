@@ -26,6 +26,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.loading import load_law
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law, paper_model
+from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
@@ -78,6 +79,11 @@ class Calibration:
     def budgets(self) -> Mapping[str, Budget]:
         """Uncertainty budget of every main quantity, made when it is first asked for."""
         return budgets(scene=self.scene, calibration=self)
+
+    @property
+    def holding(self) -> Holding:
+        """Whether the fullest chamber that runs reach keeps its liquid with the gas off."""
+        return Holding.of(self.scene, fill_ratio=self.residual.largest_fill_ratio)
 
     @property
     def model(self) -> BalancerModel:

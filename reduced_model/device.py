@@ -105,7 +105,6 @@ class Device:
             ends=ends,
             crest=self.path.crest,
             primed=primed,
-            allowed=self.path.crest is not None or ends.upstream_gas > 0,
             siphon=partial(self._velocity, 0),
             separation=partial(self._velocity, 1),
         )

@@ -59,6 +59,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "asynchronous_instability": _instability(calibration),
         "identifiability": calibration.identifiability,
         "tolerance": scene.tolerance,
+        "holding": _holding(calibration),
         "gas_line": line_document(calibration.gas_line),
         "models_used": [asdict(term) for term in calibration.models_used],
         "findings": [asdict(each) for each in mesh_findings(scene)],
@@ -283,6 +284,16 @@ def _tube_liquid(calibration: Calibration) -> dict[str, Any]:
     }
 
 
+def _holding(calibration: Calibration) -> dict[str, Any]:
+    found = calibration.holding
+    return {
+        "holds": found.holds,
+        "fill_ratio": calibration.residual.largest_fill_ratio,
+        "largest_hump_radius_m": found.largest_hump_radius,
+        "warning": found.warning,
+    }
+
+
 def _instability(calibration: Calibration) -> dict[str, Any] | None:
     found = calibration.instability
     if found is None:
@@ -311,8 +322,8 @@ REMEDIES: Final[Mapping[RowStatus, str]] = MappingProxyType(
         RowStatus.NO_RING: "gravity leaves no closed ring at this speed: raise rotor.speed",
         RowStatus.PORT_UNCOVERED: "the liquid does not reach the port, so gas passes through and the chamber "
         "cannot be emptied further: move tube.port_radius towards disc.outer_radius",
-        RowStatus.OVER_CREST: "the level lies inside the siphon crest, so liquid runs back while the gas is "
-        "off: lower disc.max_fill_ratio or tube.hump_radius",
+        RowStatus.OVER_CREST: "the level lies inside the siphon crest, or there is none, so liquid runs back "
+        "while the gas is off: lower disc.max_fill_ratio or tube.hump_radius",
         RowStatus.GAS_DRAWN: "less than the residual liquid, so gas is drawn into the port and the velocity "
         "is not that of liquid alone: empty a chamber down to its residual fill ratio only",
         RowStatus.LIQUID_COMPRESSED: "the pressure makes the liquid denser by more than any model here holds "
@@ -333,11 +344,10 @@ def _row_status(
 
     NO_RING: not `closed` under gravity. PORT_UNCOVERED: a >= r_p. OVER_CREST: a <= r_m. GAS_DRAWN: x below
     `residual`, for what flows out of the chamber. LIQUID_COMPRESSED: by `fullest` of the chambers that count.
-    With the radii a of the concentric surface, r_p of the port
-    and r_m of the crest.
+    With the radii a of the concentric surface, r_p of the port and r_m of the crest, or r_p without one.
     """
     level, crest = surface_radius(disc=scene.disc, fill_ratio=fill_ratio), scene.tube.hump_radius
-    inside = np.zeros(level.shape, dtype=np.bool_) if crest is None else level <= crest
+    inside = level <= (scene.tube.port_radius if crest is None else crest)
     limits = (
         (~closed & (fill_ratio > 0), RowStatus.NO_RING),
         ((level >= scene.tube.port_radius) & (fill_ratio > 0), RowStatus.PORT_UNCOVERED),

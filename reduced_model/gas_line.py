@@ -57,7 +57,8 @@ class LineAnswer:
     venting_time: float
     """Back to ambient, s."""
     shortest_opening: float | None
-    """Shortest valve-open time whose effect is sure, s: it primes the tube; None: the gas starts no flow."""
+    """Shortest valve-open time whose effect is sure, s: it primes the tube; None: the gas starts no flow, or
+    what it moves runs back."""
     smallest_correction: float | None
     """Change of the vibration by the shortest opening, m."""
     limit: float
@@ -66,6 +67,8 @@ class LineAnswer:
     """The `largest_correction` at which the limit is sure to be reached, m."""
     dead_time: float | None = None
     """Valve-open time that an injection of the size of the limit loses against the steady velocity, s."""
+    holds: bool = True
+    """Whether what an injection moves stays moved with the gas off."""
     standing_amplitude: float | None = None
     """Amplitude up to which no injection by the scene's gain and offsets transfers liquid, m."""
 
@@ -182,12 +185,15 @@ def _answer(scene: Scene, end: _LineEnd, fills: Fills, injection: ShortInjection
         limit=limit,
         largest_correction=largest_correction(limit, chambers=scene.disc.chambers),
         dead_time=dead,
+        holds=fills.hold,
         standing_amplitude=standing,
     )
 
 
 def line_text(answers: tuple[LineAnswer, ...]) -> str:
     """The smallest correction that the line can deliver, in one phrase."""
+    if not answers[0].holds:
+        return "what an injection moves runs back while the gas is off"
     if any(answer.smallest_correction is None for answer in answers):
         return "the gas starts no flow at equal fills"
     whose = "the scene's" if answers[0].end == "given" else "not in the scene, default range"
@@ -239,6 +245,7 @@ def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
     """For JSON, in SI."""
     return {
         "given": answers[0].end == "given",
+        "holds": answers[0].holds,
         "limit_m": answers[0].limit,
         "largest_correction_m": answers[0].largest_correction,
         "ends": [

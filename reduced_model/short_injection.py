@@ -35,6 +35,7 @@ from ringbalance.physics.gas import GasLine
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.tube.path import crest_middle, crest_span
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
@@ -77,6 +78,14 @@ class Fills:
     model: BalancerModel
     driven: float
     opposite: float
+
+    @property
+    def hold(self) -> bool:
+        """Whether what an injection moves stays moved with the gas off."""
+        law = self.model.flow
+        if isinstance(law, CalibratedLaw | PaperLaw):
+            return law.holds(max(self.driven, self.opposite))
+        return True
 
     def gas_volume(self, scene: Scene) -> float:
         """Of the driven chamber, with the scene's dead volume, m^3."""
@@ -174,9 +183,9 @@ def _crest_of(tube: Tube, model: BalancerModel) -> _Crest:
 
 
 def short_injections(scene: Scene, lines: Sequence[GasLine], fills: Fills) -> tuple[ShortInjection, ...]:
-    """Injections by each of several gas lines; none where the gas starts no flow."""
+    """Injections by each of several gas lines; none where the gas starts no flow, or its liquid runs back."""
     edges, model = _edges_of(fills, scene.gas.pressure), fills.model
-    if edges is None:
+    if edges is None or not fills.hold:
         return ()
     crest = _crest_of(scene.tube, model)
     mass = model.density * scene.tube.length

@@ -198,11 +198,11 @@ class Tube:
     hump_radius: Annotated[
         PositiveLength | None,
         unused(
-            "the straight tube of the paper's Eq. 18: always a full siphon",
+            "the straight tube of the paper's Eq. 18, always full: no correction lasts",
             "smallest radius on the path from port to port",
         ),
         UNCERTAIN,
-        Shown("siphon crest radius", "mm", absent="none: always a full siphon"),
+        Shown("siphon crest radius", "mm", absent="none: always full"),
     ]
     hump_position: Annotated[
         ProperFraction,

@@ -177,7 +177,7 @@ class LawBased:
         if times:
             disc = self.ring.advance(disc, gas_times=times, duration=max(times.values()), points=1).state
             rest -= max(times.values())
-        if rest > 0 and any(pair.primed for pair in disc.pairs):
+        if rest > 0 and (self.ring.floods or any(pair.primed for pair in disc.pairs)):
             disc = self.ring.advance(disc, gas_times={}, duration=rest, points=1).state
         return disc
 

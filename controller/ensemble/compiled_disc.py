@@ -11,7 +11,7 @@ from typing import Final
 from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_records import Record
 from ringbalance.controller.ensemble.transfer import gas_off, gas_on
-from ringbalance.controller.formulas import piece_rise
+from ringbalance.controller.formulas import NOTICEABLE, piece_rise
 from ringbalance.controller.liquid_ring.reach import FILL_ERROR, TIME_ERROR
 
 _piece_rise: Final = in_place(piece_rise)
@@ -21,13 +21,13 @@ _piece_rise: Final = in_place(piece_rise)
 def reset(shared: Record, run: Record) -> None:
     """All pairs level, no tube full."""
     for i in range(shared.chambers // 2):
-        run.fill[i], run.wet[i], run.side[i] = shared.initial_fill, 0.0, 1.0
+        run.fill[i], run.wet[i], run.side[i], run.runs_back[i] = shared.initial_fill, 0.0, 1.0, 0.0
 
 
 @in_place
 def any_wet(shared: Record, run: Record) -> bool:
-    """Whether any tube holds a column, or any pair moves."""
-    found = False
+    """Whether any tube holds a column or lets liquid through without one, or any pair moves."""
+    found = bool(shared.floods)
     for i in range(shared.chambers // 2):
         found = found or run.wet[i] > 0.0
     return found
@@ -76,10 +76,10 @@ def _pair_at(shared: Record, run: Record, i: int, time: float) -> tuple[float, b
         driven = fill if first else shared.total - fill
         driven, wet = gas_on(shared, driven, wet, min(time, duration) * run.speed)
         fill = driven if first else shared.total - driven
-    if left <= 0.0 or not wet:
+    if left <= 0.0 or not (wet or shared.floods):
         return fill, wet, first, 0.0
     driven = fill if first else shared.total - fill
-    driven, wet = gas_off(shared, driven, left * run.speed)
+    driven, wet = gas_off(shared, driven, wet, left * run.speed)
     after = driven if first else shared.total - driven
     return after, wet, first, abs(after - fill)
 
@@ -133,9 +133,24 @@ def move(shared: Record, run: Record, time: float) -> float:
         run.fill_before[i], run.wet_before[i], run.side_before[i] = run.fill[i], run.wet[i], run.side[i]
         fill, wet, first, ran = _pair_at(shared, run, i, time)
         run.fill[i], run.wet[i], run.side[i] = fill, 1.0 if wet else 0.0, 1.0 if first else 0.0
+        run.runs_back[i] = 1.0 if ran > NOTICEABLE and (wet or shared.floods) else 0.0
         drift = max(drift, ran)
     run.drift = max(run.drift, drift)
     return drift
+
+
+@in_place
+def drains(shared: Record, run: Record) -> bool:
+    """Whether what still runs back would take the vibration above the limit, as `Facts.drains`."""
+    found = False
+    for i in range(shared.chambers // 2):
+        back = run.runs_back[i] > 0.0
+        run.trial[i] = shared.total / 2.0 if back else run.fill[i]
+        found = found or bool(back)
+    if not found:
+        return False
+    real, imaginary = vibration(shared, run, True)
+    return bool(math.hypot(real, imaginary) > shared.limit)
 
 
 @in_place

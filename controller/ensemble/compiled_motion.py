@@ -8,6 +8,7 @@ from typing import Any
 from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_disc import kept, leave_out, vibration
 from ringbalance.controller.ensemble.compiled_records import Record
+from ringbalance.controller.formulas import NOTICEABLE
 from ringbalance.controller.liquid_ring.compiled_events import command, rests
 from ringbalance.controller.liquid_ring.compiled_gas import gas_volume
 from ringbalance.controller.liquid_ring.compiled_march import advance, least_later, opening_within
@@ -153,3 +154,5 @@ def _note(shared: Record, plant: Record, run: Record, motions: Any, notes: Float
     for i in range(half):
         run.drift = max(run.drift, motions[i].ran_back)
         run.wet[i] = 0.0 if rests(plant, motions[i]) else 1.0
+        moves = motions[i].primed or motions[i].direction != 0
+        run.runs_back[i] = 1.0 if moves and motions[i].ran_back > NOTICEABLE else 0.0

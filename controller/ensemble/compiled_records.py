@@ -44,6 +44,7 @@ _REAL: Final = (
 )
 _WHOLE: Final = (
     "linear",  # whether the law has a closed form
+    "floods",  # whether liquid runs through an unprimed tube with the gas off
     "lowest_empties",  # whether the driven chamber has no liquid left at `lowest`
     "highest_empties",  # whether the opposite chamber has none left at `highest`
     "chambers",
@@ -66,12 +67,18 @@ DRY: Final = 1
 """With gas on and an empty tube."""
 OFF: Final = 2
 """With gas off and a full tube."""
+OFF_DRY: Final = 3
+"""With gas off and an empty tube."""
 SHARED: Final = np.dtype(
     [(name, np.float64) for name in _REAL]
     + [(name, np.int64) for name in _WHOLE]
     + [(name, np.uint64) for name in ("key_0", "key_1")]
     + [
-        ("begin", np.int64, (OFF + 2,)),  # first interval of ON, DRY and OFF, and behind the last
+        (
+            "begin",
+            np.int64,
+            (OFF_DRY + 2,),
+        ),  # first interval of the four flows, and behind the last
         ("edge", np.float64, (INTERVALS,)),  # lowest x of an interval
         ("sense", np.int64, (INTERVALS,)),  # 1: out of the driven chamber, -1: back into it, 0: none
         ("holds", np.int64, (INTERVALS,)),  # whether the tube holds a column afterwards
@@ -150,6 +157,7 @@ _RUN_PAIRS: Final = (
     "wet_before",
     "side_before",
     "trial",  # room for the fills at one instant
+    "runs_back",  # whether liquid still ran back as the last wait ended
 )
 GAS_LINE: Final = ("passing", "critical_ratio", "dead_volume", "valve_lag")
 """Constants of a `PLANT` that belong to a chamber's gas line."""

@@ -8,6 +8,7 @@ from typing import Any, Final
 from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_disc import (
     any_wet,
+    drains,
     kept,
     leave_out,
     move,
@@ -110,7 +111,8 @@ def _pass_calm(shared: Record, run: Record) -> None:
 @in_place
 def _holds(shared: Record, run: Record, time: float) -> bool:
     """Whether the run has settled by a time, s, as `simulate` finds it."""
-    return bool(run.stays and not run.cut and _has_held(time, run.since, shared.hold_time))
+    held = run.stays and not run.cut and _has_held(time, run.since, shared.hold_time)
+    return bool(held and not drains(shared, run))
 
 
 @in_place

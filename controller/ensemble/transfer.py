@@ -8,19 +8,19 @@ numbers.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.compilation.compiled import compiled
-from ringbalance.controller.ensemble.compiled_records import DRY, OFF, ON, PATH_NODES, SHARED, Record
+from ringbalance.controller.ensemble.compiled_records import DRY, OFF, OFF_DRY, ON, PATH_NODES, SHARED, Record
 from ringbalance.controller.formulas import linear_course, piece_part, piece_rise
-from ringbalance.controller.liquid_ring.integrators import LinearSquaredVelocity
+from ringbalance.controller.liquid_ring.integrators import LinearSquaredVelocity, closed_form, integrator_of
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError
 from ringbalance.controller.liquid_ring.records import PLANT
-from ringbalance.controller.liquid_ring.transfer import Drive, Event
+from ringbalance.controller.liquid_ring.transfer import Drive, Event, floods
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import FloatArray
 
@@ -73,28 +73,31 @@ class PairTransfer:
         shared = np.zeros(1, dtype=SHARED)
         for name in ("gas_pressure", "exchange_rate", "total", "lowest", "highest"):
             shared[name] = getattr(drive, name)
+        shared["floods"] = floods(model.flow, total=total)
         shared["lowest_empties"] = drive.boundary_event(drive.lowest) is Event.EMPTY
         shared["highest_empties"] = drive.boundary_event(drive.highest) is Event.EMPTY
         if dynamics is not None:
             shared["moving"] = True
             return cls(shared=shared, plant=dynamics.plant(total=total, relative_error=RELATIVE_ERROR))
-        if isinstance(model.flow, LinearSquaredVelocity):
+        if integrator_of(model.flow) is closed_form:
+            law = cast(LinearSquaredVelocity, model.flow)
             shared["linear"] = True
-            shared["squared_per_pressure"] = model.flow.velocity_squared_per_pressure
-            shared["pressure_per_fill"] = model.flow.pressure_per_fill_difference
+            shared["squared_per_pressure"] = law.velocity_squared_per_pressure
+            shared["pressure_per_fill"] = law.pressure_per_fill_difference
         else:
             _fill_tables(drive, shared[0])
         return cls(shared=shared, plant=np.zeros(1, dtype=PLANT))
 
 
 def _fill_tables(drive: Drive, shared: np.void) -> None:
-    """The flows with gas and a full tube, with gas and an empty one, and without gas, in a row."""
-    interval = node = 0
-    for flow, pressure, primed in (
-        (ON, drive.gas_pressure, True),
-        (DRY, drive.gas_pressure, False),
-        (OFF, 0.0, True),
-    ):
+    """The flows with gas and a full tube, with gas and an empty one, and without gas, in a row.
+
+    Without gas an empty tube has flows only where it `floods`.
+    """
+    interval, node, flows = 0, 0, [(drive.gas_pressure, True), (drive.gas_pressure, False), (0.0, True)]
+    if shared["floods"]:
+        flows.append((0.0, False))
+    for flow, (pressure, primed) in enumerate(flows):
         paths = FlowPaths.of(replace(drive, gas_pressure=pressure), primed=primed, most_changes=MOST_CHANGES)
         nodes, rows = paths.nodes.shape[1], slice(interval, interval + paths.sense.size)
         if node + nodes > PATH_NODES:
@@ -199,25 +202,32 @@ def gas_on(shared: Record, fill: float, wet: bool, time: float) -> tuple[float, 
         return after, False
     if wet:
         return _flow(shared, ON, fill, time)
-    start = _interval(shared, DRY, fill)
-    if shared.sense[start] == 0:
-        return fill, shared.holds[start] > 0
-    if shared.holds[start] > 0:
-        return _flow(shared, ON, fill, time)
-    # An unprimed tube spills until it is primed.
-    after, left = _follow(shared, start, fill, time)
-    end = _interval(shared, DRY, after)
-    if left > 0.0 and shared.sense[end] != 0 and shared.holds[end] > 0:
-        return _flow(shared, ON, after, left)
-    return after, False
+    return _spill(shared, DRY, ON, fill, time)
 
 
 @compiled
-def gas_off(shared: Record, fill: float, time: float) -> tuple[float, bool]:
-    """The same for a full tube without gas; `fill` is of the chamber that was driven last."""
-    if shared.linear:
+def gas_off(shared: Record, fill: float, wet: bool, time: float) -> tuple[float, bool]:
+    """The same without gas; `fill` is of the chamber that was driven last."""
+    if shared.linear or not (wet or shared.floods):
         return fill, False
-    return _flow(shared, OFF, fill, time)
+    if wet:
+        return _flow(shared, OFF, fill, time)
+    return _spill(shared, OFF_DRY, OFF, fill, time)
+
+
+@compiled
+def _spill(shared: Record, dry: int, primed: int, fill: float, time: float) -> tuple[float, bool]:
+    """An unprimed tube spills by one flow until it is primed, and goes on by another."""
+    start = _interval(shared, dry, fill)
+    if shared.sense[start] == 0:
+        return fill, shared.holds[start] > 0
+    if shared.holds[start] > 0:
+        return _flow(shared, primed, fill, time)
+    after, left = _follow(shared, start, fill, time)
+    end = _interval(shared, dry, after)
+    if left > 0.0 and shared.sense[end] != 0 and shared.holds[end] > 0:
+        return _flow(shared, primed, after, left)
+    return after, False
 
 
 @compiled

@@ -136,12 +136,10 @@ def _driving(plant: Record, at: tuple[float, float, float, float]) -> float:
     return float(at[0] - at[1] + at[2] - max(at[3], plant.port_pressure))
 
 
-@in_place
-def _allowed(plant: Record, at: tuple[float, float, float, float], primed: bool) -> bool:
-    """Without a crest liquid flows only while there is gas; back against it only in a primed tube."""
-    if plant.one_way:
-        return bool(at[0] > plant.gas_off)
-    return bool(plant.crest or at[0] > plant.gas_off or (at[1] > plant.gas_off and primed))
+@inlined
+def _allowed(plant: Record, at: tuple[float, float, float, float]) -> bool:
+    """Under a one-way law liquid leaves a chamber with gas in it, or one whose level passes the crest."""
+    return bool(not plant.one_way or at[0] > plant.gas_off or at[2] - plant.column_pressure > at[1])
 
 
 @inlined
@@ -158,7 +156,7 @@ def crest_margins(plant: Record, at: tuple[float, float, float, float]) -> tuple
 @in_place
 def can_flow(plant: Record, at: tuple[float, float, float, float], primed: bool) -> bool:
     """Whether liquid flows: port covered, driving pressure positive, crest passed."""
-    if not _allowed(plant, at, primed) or at[2] < plant.port_pressure or _driving(plant, at) <= 0.0:
+    if not _allowed(plant, at) or at[2] < plant.port_pressure or _driving(plant, at) <= 0.0:
         return False
     if not plant.crest:
         return True
@@ -168,12 +166,12 @@ def can_flow(plant: Record, at: tuple[float, float, float, float], primed: bool)
 
 @in_place
 def holds_at_rest(plant: Record, at: tuple[float, float, float, float], primed: bool) -> bool:
-    """Whether a column in which nothing flows is still there: an allowed one, or one in exact balance."""
+    """Whether a column in which nothing flows is still there: below a level, or in exact balance."""
+    covered = at[2] >= plant.port_pressure
     if plant.one_way or not primed:
         return False
     if not plant.crest:
-        return _allowed(plant, at, True)
-    covered = at[2] >= plant.port_pressure
+        return bool(covered)
     return bool(covered and _driving(plant, at) == 0.0 and crest_margins(plant, at)[0] > 0.0)
 
 
@@ -352,4 +350,4 @@ def crest_slopes(plant: Record, at: tuple[float, float, float, float]) -> tuple[
 @in_place
 def open_to_gas(plant: Record, at: tuple[float, float, float, float]) -> bool:
     """Whether its liquid leaves the upstream port open, or flow is ruled out without gas."""
-    return bool(at[2] < plant.port_pressure or not _allowed(plant, at, True))
+    return bool(at[2] < plant.port_pressure or not _allowed(plant, at))

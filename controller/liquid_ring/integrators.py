@@ -14,7 +14,14 @@ import numpy as np
 
 from ringbalance.controller.formulas import linear_course, piece_part, piece_rise
 from ringbalance.controller.liquid_ring.pair_path import FlowPaths, UntabulatedError
-from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer, checked_instants
+from ringbalance.controller.liquid_ring.transfer import (
+    Drive,
+    Event,
+    Integrator,
+    Transfer,
+    checked_instants,
+    floods,
+)
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.scene.arrays import FloatArray
 
@@ -26,7 +33,7 @@ _KEPT: Final = 16
 class LinearSquaredVelocity(Protocol):
     """A flow law with u^2 = a (p + b (x_A - x_C)), a full siphon while that and p are positive.
 
-    Otherwise it is blocked, with no column in the tube.
+    Otherwise it is blocked, with no column in the tube; one that lets liquid run back has no closed form.
     """
 
     @property
@@ -41,8 +48,9 @@ class LinearSquaredVelocity(Protocol):
 
 
 def integrator_of(law: FlowLaw) -> Integrator:
-    """The closed form when the law has one, else the quadrature."""
-    return closed_form if _has_closed_form(law) else quadrature
+    """The closed form when the law has one for all of its flows, else the quadrature."""
+    closed = _has_closed_form(law) and not floods(law, total=law.max_fill_ratio)
+    return closed_form if closed else quadrature
 
 
 def _has_closed_form(law: FlowLaw) -> bool:

@@ -68,9 +68,12 @@ class Column:
     """D_p, Pa."""
     crest: SiphonCrest[float] | None
     one_way: bool
-    """Whether liquid leaves only a chamber that has gas, as in the paper's Eq. 19."""
+    """Whether liquid leaves only a chamber that has gas, as in the paper's Eq. 19, or a level that passes the
+    crest."""
     gas_off: float
-    """Gauge, Pa, at or below which a chamber counts as without gas in a tube without a crest."""
+    """Gauge, Pa, at or below which a chamber counts as without gas under a one-way law."""
+    return_pressure: float = math.inf
+    """Of a one-way law: hydrostatic pressure of a vented chamber above which liquid leaves it, Pa."""
     gas_factor: float = 1.0
     """Gas pressure on the liquid over the one at the place of measurement."""
 
@@ -109,6 +112,7 @@ def _paper(law: PaperLaw, tube: Tube, gas_off: float) -> Column:
         crest=None,
         one_way=True,
         gas_off=gas_off,
+        return_pressure=math.inf if law.return_pressure is None else law.return_pressure,
     )
 
 
@@ -272,6 +276,8 @@ def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDAr
     for source, names in ((column, _OF_COLUMN), (column.crest, _OF_CREST), (dynamics, _OF_DYNAMICS)):
         for name in names if source is not None else ():
             plant[name] = getattr(source, name)
+    if column.crest is None:
+        plant["column_pressure"] = column.return_pressure
     plant["crest"] = column.crest is not None
     plant["hold_up"] = dynamics.tube_area * column.length / dynamics.chamber_volume
     if dynamics.lift is not None and column.crest is not None:

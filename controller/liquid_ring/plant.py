@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ringbalance.controller.formulas import NOTICEABLE
 from ringbalance.controller.liquid_ring.interval import longest_opening, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, PairState, Record, Switch
 from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL, opening_within
-from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer
+from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer, floods
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -85,6 +86,8 @@ class Advance:
     operations: tuple[Operation, ...]
     drift: float
     """Largest change of a fill ratio while a pair's gas was off."""
+    runs_back: tuple[bool, ...]
+    """Whether liquid of each pair still ran back, with its gas off, as the stretch ended."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,6 +104,11 @@ class LiquidRing:
     """Terms that the flow law does not know; None: none of them is modelled."""
     residual_fill: float = 0.0
     """Of a driven chamber, below which gas would enter its port; `permitted` keeps to it."""
+
+    @cached_property
+    def floods(self) -> bool:
+        """Whether liquid runs back with the gas off though its tube is not primed."""
+        return floods(self.model.flow, total=self.model.flow.max_fill_ratio)
 
     def permitted(self, state: DiscState, *, gas_times: Mapping[int, float]) -> dict[int, float]:
         """Valve-open times, s, shortened so that no driven chamber falls below its residual fill.
@@ -151,6 +159,7 @@ class LiquidRing:
             state=DiscState(pairs=tuple(path.state for path in paths)),
             operations=tuple(sorted(operations, key=lambda operation: operation.chamber)),
             drift=max(path.drift for path in paths),
+            runs_back=tuple(path.runs_back for path in paths),
         )
 
     def _pair(self, pair: PairState, index: int, valve: _Valve | None, instants: FloatArray) -> _Path:
@@ -180,13 +189,15 @@ class LiquidRing:
 
     def _gas_off(self, pair: PairState, instants: FloatArray) -> _Path:
         """A full tube lets the levels run back; one that does not hold its column empties at once."""
-        if instants.size == 0 or not pair.primed:
-            return _Path(state=pair, fill=np.full(instants.shape, pair.fill), operation=None, drift=0.0)
+        if instants.size == 0 or not (pair.primed or self.floods):
+            return _Path(state=pair, fill=np.full(instants.shape, pair.fill))
         first = pair.driven_first
         transfer = self.integrator(self._drive(pair, first=first, gas_pressure=0.0), instants)
         after = _moved(pair, transfer, first=first)
         fill = _first_fill(pair, transfer, first=first)
-        return _Path(state=after, fill=fill, operation=None, drift=abs(after.fill - pair.fill))
+        drift = abs(after.fill - pair.fill)
+        runs_back = drift > NOTICEABLE and (after.primed or self.floods)
+        return _Path(state=after, fill=fill, drift=drift, runs_back=runs_back)
 
     def _moving_pair(self, pair: PairState, index: int, valve: _Valve | None, instants: FloatArray) -> _Path:
         """Fill, velocity, gas and valves as one system; a command is added to what is under way."""
@@ -196,7 +207,14 @@ class LiquidRing:
         passage = pass_time(self.dynamics, begun, instants=instants)
         after = replace(begun, fill=passage.fill, primed=passage.primed, motion=passage.motion)
         operation = None if valve is None else self._operation(after, valve)
-        return _Path(state=after, fill=passage.fills, operation=operation, drift=passage.ran_back)
+        moves = passage.primed or passage.motion.velocity != 0
+        return _Path(
+            state=after,
+            fill=passage.fills,
+            operation=operation,
+            drift=passage.ran_back,
+            runs_back=moves and passage.ran_back > NOTICEABLE,
+        )
 
     def _commanded(self, pair: PairState, valve: _Valve, index: int) -> PairState:
         """The valve opens and closes a lag after its command."""
@@ -298,8 +316,9 @@ class _Path:
 
     state: PairState
     fill: FloatArray
-    operation: Operation | None
-    drift: float
+    operation: Operation | None = None
+    drift: float = 0.0
+    runs_back: bool = False
 
 
 def _run_dry(transfer: Transfer, before: float, duration: float) -> float:

@@ -28,14 +28,14 @@ _PLANT_REAL: Final = (
     "crest_end",  # fraction of the path to the end of the crest's arc, flow out of chamber 0
     "return_crest_end",  # the same for flow out of chamber 1
     "port_pressure",  # D_p, Pa
-    "column_pressure",  # D_m, Pa
+    "column_pressure",  # D_m, Pa; of a one-way law the level above which liquid leaves a vented chamber
     "vapour_pressure",  # gauge, Pa
     "released",  # as in `SiphonCrest`
     "froude_velocity",  # m/s
     "lift_straight",  # of `Lift`
     "lift_entrance",
     "hold_up",  # S L/V, fill ratio that the whole tube takes
-    "gas_off",  # gauge, Pa, at or below which a chamber counts as without gas in a tube without a crest
+    "gas_off",  # gauge, Pa, at or below which a chamber counts as without gas under a one-way law
     "gas_factor",  # gas pressure on the liquid over the one at the place of measurement
     "valve_lag",  # s
     "gas_pressure",  # of the supply, gauge, Pa
@@ -56,7 +56,7 @@ _PLANT_REAL: Final = (
 _PLANT_WHOLE: Final = (
     "crest",  # whether there is one
     "trapped",
-    "one_way",  # whether liquid leaves only a chamber that has gas, as in the paper's Eq. 19
+    "one_way",  # whether liquid leaves only a chamber with gas or a high level, as under the paper's Eq. 19
     "inertia",
     "lifts",  # whether an unprimed tube is filled up to the crest before liquid passes
     "line",  # whether valve and line take time to pass gas

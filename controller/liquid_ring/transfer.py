@@ -136,6 +136,16 @@ class Transfer:
     """Whether the tube holds a continuous column at the end, under the same gas pressure."""
 
 
+def floods(law: FlowLaw, *, total: float) -> bool:
+    """Whether liquid of a pair leaves its fullest chamber through an unprimed tube with the gas off.
+
+    So it does where the crest lies outside that chamber's level, and without a crest.
+    """
+    lowest = max(0.0, total - law.max_fill_ratio)
+    flow = law.evaluate(fill_ratio=lowest, opposite_fill_ratio=total - lowest, gas_pressure=0.0)
+    return float(flow.velocity) != 0.0
+
+
 Integrator = Callable[[Drive, FloatArray], Transfer]
 """Takes a drive and ascending instants (s from the start, shape (m,), the last one the duration)."""
 

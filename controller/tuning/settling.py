@@ -16,8 +16,9 @@ from ringbalance.controller.liquid_ring.plant import DiscState
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
-from ringbalance.controller.tuning.loop_factor import with_driving_gas
+from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_gas
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.reduced_model.operating.residual import Drawing, stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
@@ -57,6 +58,9 @@ class SettlingTimes:
     beyond_pressure: float = 0.0
     """The same with the fills to which the scene's gas drives the liquid."""
 
+    let_go: str = ""
+    """Why the tube lets the corrections go that these runs make; empty where it holds them."""
+
     def explained_by(self, fraction: float) -> bool:
         """Whether a fraction of the runs is most of those that do not settle."""
         return fraction > 0.0 and fraction >= (1.0 - self.settled.value) / 2.0
@@ -88,7 +92,9 @@ def settling_times(
     if found.quantiles["p95"] is not None:
         return found
     beyond, driven = _beyond_capacity(scene, model, widths, runs=found.runs)
-    return replace(found, beyond_capacity=beyond, beyond_pressure=driven)
+    largest = 2 * scene.disc.initial_fill - usable_fill(scene, model)
+    let_go = Holding.of(scene, fill_ratio=largest).warning if found.explained_by(found.drifted) else ""
+    return replace(found, beyond_capacity=beyond, beyond_pressure=driven, let_go=let_go)
 
 
 def many_runs(

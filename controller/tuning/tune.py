@@ -110,7 +110,7 @@ def tune(
     if best is not None:
         told("settling times ...")
         settling = settling_times(best.scene, model, known.widths, members=members, runs=runs, told=told)
-        if settling.quantiles["p95"] is None and not settling.out_of_capacity:
+        if settling.quantiles["p95"] is None and not (settling.out_of_capacity or settling.let_go):
             share = settling.settled.value
             found = search(scene, model, known, base=best, settled=share, told=told)
             if found.best is not best:
@@ -185,6 +185,8 @@ def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
 
 def _line_reaches(lines: tuple[LineAnswer, ...], *, settles: bool) -> bool | None:
     """Whether a given line can, which its runs show; of a default range: None when not all are sure to."""
+    if not lines[0].holds:
+        return settles
     above = [answer.above_limit for answer in lines]
     if not any(above):
         return True
@@ -293,21 +295,23 @@ def _status_of(
     reached = settling.quantiles["p95"]
     if reached is not None:
         return f"tuned{also}: 95 % of the runs settle within {reached:.3g} s"
+    share = (
+        f"{settling.told(settling.settled.value)} settle within the time limit of "
+        f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
+    )
+    if settling.let_go:
+        return f"{share}; {settling.let_go}"
     if not _valves_reach(scene, zone=zone, smallest=smallest) and not settling.out_of_capacity:
         return (
             f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "
             f"the vibration by {smallest * um:.4g} um, and up to {zone * um:.4g} um none transfers liquid: "
             f"{_ways_out(found)}"
         )
-    return _unsettled(scene, settling, also=also, found=found)
+    return _unsettled(scene, settling, share=share, found=found)
 
 
-def _unsettled(scene: Scene, settling: SettlingTimes, *, also: str, found: Search | None) -> str:
-    """Of runs that settle too seldom, by what explains them. Args: `also`: a change that is recommended."""
-    share = (
-        f"{settling.told(settling.settled.value)} settle within the time limit of "
-        f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
-    )
+def _unsettled(scene: Scene, settling: SettlingTimes, *, share: str, found: Search | None) -> str:
+    """Of runs that settle too seldom, by what explains them. Args: `share`: of them that settle, in words."""
     if settling.explained_by(settling.beyond_capacity):
         return (
             f"{share}; {settling.told(settling.beyond_capacity)} would need more moment than the disc "

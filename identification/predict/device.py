@@ -27,6 +27,7 @@ from ringbalance.reduced_model.chamber.range import mean_gravity
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
 from ringbalance.reduced_model.selection.tube_terms import tube_models
 from ringbalance.scene.arrays import FloatArray
@@ -69,6 +70,12 @@ def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
     """Of a primed tube at equal fills under the scene's gas, m/s; zero where it is blocked."""
     fill = scene.disc.initial_fill
     return abs(float(law.evaluate(fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True).velocity))
+
+
+def runs_back(scene: Scene, _: Observations) -> str:
+    """Why no injection leaves a change behind; empty where the tube holds at equal fills."""
+    warning = Holding.of(scene, fill_ratio=scene.disc.initial_fill).warning
+    return f"by this scene no injection leaves a change behind: {warning}" if warning else ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.predict.device import Device, Models
+from ringbalance.identification.predict.device import Device, Models, runs_back
 from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.models import Scene
@@ -119,4 +119,5 @@ INJECTION: Final = PredictedKind(
     noise_given=_noise_given,
     column=lambda _: "amplitude_after",
     informs=always("lambda_factor", "bore", "extra_loss"),
+    obstacle=runs_back,
 )

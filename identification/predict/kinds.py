@@ -15,7 +15,7 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.predict.device import Device, Models
+from ringbalance.identification.predict.device import Device, Models, runs_back
 from ringbalance.identification.predict.injections import INJECTION
 from ringbalance.identification.predict.positionings import POSITIONING
 from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
@@ -183,7 +183,10 @@ PREDICTED: Final[Mapping[str, PredictedKind]] = MappingProxyType(
         ),
         "injection": INJECTION,
         "transfer": PredictedKind.numbers(
-            _transferred_column, predict=_transferred, informs=always("bore", "extra_loss")
+            _transferred_column,
+            predict=_transferred,
+            informs=always("bore", "extra_loss"),
+            obstacle=runs_back,
         ),
         "flow": PredictedKind.numbers(
             lambda _: "flow_rate", predict=_flow_rates, informs=always("bore", "extra_loss")

@@ -99,5 +99,5 @@ def _moved(
 
 
 POSITIONING: Final = PredictedKind.numbers(
-    lambda _: "angle", predict=_predict, informs=_informs, too_long=_too_long
+    lambda _: "angle", predict=_predict, informs=_informs, obstacle=_too_long
 )

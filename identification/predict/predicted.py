@@ -34,8 +34,8 @@ class PredictedKind:
     free: Callable[[Observations], FloatArray] | None = None
     """Effect of unknowns that are no parameters, such as the vibration without trial weight, one column
     each."""
-    too_long: Callable[[Any, Observations], str] = _never
-    """Scene and observations to why predictions would take too long; empty where they do not."""
+    obstacle: Callable[[Any, Observations], str] = _never
+    """Scene and observations to why the one cannot be fitted to the other; empty where it can."""
 
     @classmethod
     def numbers(cls, column: Callable[[Observations], str], **declared: Any) -> PredictedKind:

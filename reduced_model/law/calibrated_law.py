@@ -129,19 +129,19 @@ class CalibratedLaw:
             port_pressure=self.path.port_pressure,
         )
 
+    def holds(self, fill_ratio: float) -> bool:
+        """Whether a chamber of that fill keeps it against a lower one with the gas off."""
+        return self.path.holds(max(float(self.wall_pressure(fill_ratio)), 0.0))
+
     def drive(self, asked: Conditions, *, reverse: bool) -> Drive:
         """What acts on the tube in one direction; `reverse`: out of the opposite chamber."""
         own, other = asked.fill_ratio, asked.opposite_fill_ratio
         ends = self.ends(fill_ratio=own, opposite_fill_ratio=other, gas_pressure=asked.gas_pressure)
-        allowed = np.ones_like(asked.primed)
-        if self.path.hump_pressure is None:
-            allowed = (asked.gas_pressure > 0) & (asked.primed | (not reverse))
         return Drive(
             ends=ends.reversed() if reverse else ends,
             upstream_uncertainty=self.hydrostatic_pressure_uncertainty(other if reverse else own),
             downstream_uncertainty=self.hydrostatic_pressure_uncertainty(own if reverse else other),
             primed=asked.primed,
-            allowed=allowed,
         )
 
     def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:

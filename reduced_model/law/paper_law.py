@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.reduced_model import paper
+from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, save_record
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 
@@ -46,8 +47,10 @@ class PaperMoment:
 class PaperLaw:
     """Eq. 19 as a flow law: u = sqrt(2/(rho (k+1)) [p0 + rho omega^2 V (x_A - x_C)/(B theta)]).
 
-    With the gas on and the bracket positive the tube is a full siphon; otherwise it is blocked.  The paper
-    states no uncertainty, so none is returned.  Between events du/dt = -2 omega^2 S/((k+1) B theta).
+    With the gas on and the bracket positive the tube is a full siphon; otherwise it is blocked, for the paper
+    has the column part with the gas off.  That takes a crest which holds the liquid: from a chamber whose
+    level is beyond `return_pressure` the same equation, reversed, lets it run back.  The paper states no
+    uncertainty, so none is returned.  Between events du/dt = -2 omega^2 S/((k+1) B theta).
 
     `table()` holds `velocity_squared_per_pressure` 2/(rho (k+1)), m^3/kg, and `pressure_per_fill_difference`
     rho omega^2 V/(B theta), Pa: u^2 = the first times (p0 + the second times (x_A - x_C)).
@@ -73,6 +76,9 @@ class PaperLaw:
     """Absolute, Pa."""
     moment: PaperMoment
     """The moment that goes with this law."""
+    return_pressure: float | None = None
+    """Hydrostatic pressure of a vented chamber above which liquid leaves it against a vented one, Pa; None:
+    never, as the paper has it."""
 
     @property
     def name(self) -> str:
@@ -97,7 +103,7 @@ class PaperLaw:
         gas_pressure: npt.ArrayLike,
         primed: npt.ArrayLike = False,
     ) -> Flow:
-        """Flow by Eq. 19; blocked at and below the stall pressure and with the gas off."""
+        """Flow by Eq. 19; at and below the stall pressure and with the gas off blocked, or reverse."""
         asked = Conditions.checked(
             max_fill_ratio=self.max_fill_ratio,
             ambient_pressure=self.ambient_pressure,
@@ -109,13 +115,27 @@ class PaperLaw:
         level = self.pressure_per_fill_difference * (asked.fill_ratio - asked.opposite_fill_ratio)
         squared = self.velocity_squared_per_pressure * (asked.gas_pressure + level)
         flows = (squared > 0) & (asked.gas_pressure > 0)
-        velocity = np.sqrt(np.where(flows, squared, 0.0))
+        returns = (squared < 0) & self._returns(asked)
+        velocity = np.where(flows | returns, np.sign(squared) * np.sqrt(np.abs(squared)), 0.0)
+        regime = np.where(flows, Regime.SIPHON, np.where(returns, Regime.REVERSE, Regime.BLOCKED))
         return Flow(
             velocity=velocity,
-            regime=np.where(flows, Regime.SIPHON, Regime.BLOCKED).astype(np.int64),
+            regime=regime.astype(np.int64),
             uncertainty=np.zeros_like(velocity),
-            primed=np.asarray(flows),
+            primed=np.asarray(flows | returns),
         )
+
+    def holds(self, fill_ratio: float) -> bool:
+        """Whether a chamber of that fill keeps it against a lower one with the gas off."""
+        level = self.pressure_per_fill_difference * fill_ratio
+        return self.return_pressure is None or level <= self.return_pressure
+
+    def _returns(self, asked: Conditions) -> BoolArray:
+        """Whether the opposite chamber's liquid passes the crest against the driven one's gas."""
+        if self.return_pressure is None:
+            return np.zeros_like(asked.primed)
+        level = self.pressure_per_fill_difference * asked.opposite_fill_ratio
+        return np.asarray(level - self.return_pressure > asked.gas_pressure)
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)
@@ -131,7 +151,9 @@ class PaperLaw:
 def paper_law(scene: AnyScene) -> PaperLaw:
     """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
 
-    The gas pressure counts as it is measured: Eq. 19 knows no gas column, and so not `gas.measured_at`.
+    The gas pressure counts as it is measured: Eq. 19 knows no gas column, and so not `gas.measured_at`.  What
+    the scene's tube lets run back with the gas off is the scene's, whatever the law: without a crest all of
+    it.
 
     Raises: SceneError: a balancer without liquid.
     Source: Eqs. 4 and 19; lambda = 72 mm.
@@ -154,6 +176,7 @@ def paper_law(scene: AnyScene) -> PaperLaw:
             density=scene.liquid.density,
             chamber_volume=volume,
         ),
+        return_pressure=tube_path(scene).return_pressure,
     )
 
 

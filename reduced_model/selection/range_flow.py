@@ -176,7 +176,6 @@ def range_flow(scene: Scene) -> RangeFlow:
             ends=ends,
             crest=crest,
             primed=False,
-            allowed=True,
             siphon=lambda pressure, flows: _velocities(scene, flows * pressure / rho, to_crest=False),
             separation=lambda pressure, flows: _velocities(scene, flows * pressure / rho, to_crest=True),
         ).separation_velocity

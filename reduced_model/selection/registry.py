@@ -208,7 +208,7 @@ def _sloshing(term: Term, scene: Scene, estimate: Contribution) -> Selection:
 
 def _crest(term: Term, scene: Scene, _: Contribution) -> Selection:
     if scene.tube.hump_radius is None:
-        return term.models[0], "Eq. 18 as it stands"
+        return term.models[0], "Eq. 18, which levels the chambers out while the gas is off"
     moved = float(chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2)) / 1e6
     threshold = f"vented or trapped moves the threshold by up to {moved:.3g} MPa"
     gas = "vapour" if scene.liquid.dissolved_gas == "none" else "vapour or released gas"

@@ -50,8 +50,6 @@ class Drive:
     """The same downstream."""
     primed: BoolArray
     """Whether the tube holds a continuous column beforehand."""
-    allowed: BoolArray
-    """False where flow in this direction is ruled out from the start."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +91,6 @@ class DirectedFlow:
             ends=drive.ends,
             crest=crest,
             primed=drive.primed,
-            allowed=drive.allowed,
             siphon=partial(velocity, heads.head),
             separation=separation,
         )

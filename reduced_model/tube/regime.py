@@ -178,7 +178,8 @@ class TubePath:
     port_pressure: float
     """rho omega^2 (R2^2 - r_p^2)/2, Pa."""
     hump_pressure: float | None
-    """rho omega^2 (R2^2 - r_m^2)/2, Pa; None: always a full siphon while the gas is on."""
+    """rho omega^2 (R2^2 - r_m^2)/2, Pa; None: no crest, the tube stays at the port's radius, under the levels
+    of both chambers, and is full whether the gas is on or off."""
     trapped: bool
     """Whether the gas over the siphon crest must be displaced through the downstream port."""
     vapour_pressure: float
@@ -200,6 +201,32 @@ class TubePath:
             released=self.released,
             froude_velocity=self.froude_velocity,
         )
+
+    @property
+    def return_pressure(self) -> float:
+        """Hydrostatic pressure of a vented chamber above which liquid leaves it against a vented one, Pa.
+
+        D_m + p_c, with the pressure p_c of a cavity: below, a full column over the crest parts.  Without a
+        crest nothing parts, and the chambers level out.
+        """
+        if self.crest is None:
+            return 0.0
+        still = TubeEnds(
+            upstream_gas=0.0,
+            downstream_gas=0.0,
+            upstream_hydrostatic=0.0,
+            downstream_hydrostatic=self.port_pressure,
+            port_pressure=self.port_pressure,
+        )
+        return -float(self.crest.separation_margin(still))
+
+    def holds(self, level: float) -> bool:
+        """Whether a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off."""
+        return self.crest is not None and level <= self.return_pressure
+
+    def holding_pressure(self, level: float) -> float:
+        """D_m of a crest from which on it lasts whatever the pressure of a cavity over the crest, Pa."""
+        return level - min(self.vapour_pressure, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -245,7 +272,6 @@ def column_flow(
     ends: TubeEnds[Pressure],
     crest: SiphonCrest[Pressure] | None,
     primed: Truth,
-    allowed: Truth,
     siphon: Callable[[Pressure, Truth], Pressure],
     separation: Callable[[Pressure, Truth], Pressure],
 ) -> ColumnFlow[Pressure]:
@@ -260,14 +286,12 @@ def column_flow(
         ends: pressures at the tube's ends.
         crest: None without one.
         primed: whether the tube holds a continuous column beforehand.
-        allowed: False where flow in this direction is ruled out from the start.
         siphon: velocity of the full siphon under a pressure, zero where the second argument is false.
         separation: velocity of the separated column under a pressure, likewise; not called without a crest.
     Source: Eqs. 13 to 18 of the liquid-ring paper, extended to the siphon crest.
     """
     driving = ends.driving_pressure()
-    can, margin = _flows(ends, driving, crest, primed)
-    flows = allowed & can
+    flows, margin = _flows(ends, driving, crest, primed)
     full = siphon(driving, flows)
     if crest is None:
         return ColumnFlow(
@@ -276,7 +300,7 @@ def column_flow(
             separation_velocity=full,
             spill_velocity=full,
             separated=full < full,
-            primed=flows | (primed & allowed),
+            primed=flows | (primed & ends.upstream_covered()),
         )
     spill = separation(margin, flows)
     cleared = crest.cleared(spill)

@@ -42,7 +42,7 @@ def worst_error(model: BalancerModel, *, pressure: float, total: float = 0.5, tr
         if on:
             fill, column = gas_on(shared, drive.fill, wet, time)
         else:
-            fill, column = gas_off(shared, drive.fill, time)
+            fill, column = gas_off(shared, drive.fill, True, time)
         worst = max(
             worst, abs(fill - exact), abs(float(plain.fill[-1]) - exact), float(column != plain.primed)
         )

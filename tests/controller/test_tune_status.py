@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from scipy.optimize import brentq
@@ -111,7 +112,7 @@ def test_gas_that_stalls_a_chamber_is_raised(scene: Scene) -> None:
     ],
 )
 def test_what_keeps_most_of_the_runs_from_settling_is_named(
-    scene: Scene, cause: dict[str, float], words: str
+    scene: Scene, cause: dict[str, Any], words: str
 ) -> None:
     half = Probability.counted(count=10, of=20)
     settling = SettlingTimes(runs=20, settled=half, quantiles={"p50": None, "p95": None}, **cause)

@@ -124,11 +124,19 @@ def test_straight_tube_stalls_without_a_jump(straight: CalibratedLaw) -> None:
     stall = float(straight.ends(fill_ratio=0.0).stall_pressure())
     offsets = np.array([-1e3, 0.0, 1e-3, 1e-1, 1e1])
     flow = straight.evaluate(fill_ratio=0.0, gas_pressure=stall + offsets)
-    assert list(flow.regime) == [Regime.BLOCKED, Regime.BLOCKED, *[Regime.SIPHON] * 3]
+    assert list(flow.regime) == [Regime.REVERSE, Regime.BLOCKED, *[Regime.SIPHON] * 3]
     assert np.all(np.diff(flow.velocity[2:]) > 0)
     assert flow.velocity[2] < 1e-5
-    off = straight.evaluate(fill_ratio=0.4, gas_pressure=[0.0, -1e4], primed=True)
-    assert np.all(off.regime == Regime.BLOCKED)
+
+
+@pytest.mark.parametrize("primed", [True, False])
+def test_straight_tube_levels_out_with_the_gas_off(straight: CalibratedLaw, primed: bool) -> None:
+    off = straight.evaluate(fill_ratio=[0.1, 0.25, 0.4], gas_pressure=0.0, primed=primed)
+    assert list(off.regime) == [Regime.REVERSE, Regime.BLOCKED, Regime.SIPHON]
+    # The levels alone drive what the same gas pressure drives between equal ones.
+    ends = straight.ends(fill_ratio=0.4)
+    alike = straight.evaluate(fill_ratio=0.25, gas_pressure=float(ends.driving_pressure()), primed=primed)
+    np.testing.assert_allclose(off.velocity, [-alike.velocity, 0.0, alike.velocity], rtol=1e-12)
 
 
 def test_hysteresis_a_running_column_needs_less_than_an_empty_tube(slow: CalibratedLaw) -> None:

@@ -34,7 +34,7 @@ def root(pressure: float, where: Truth) -> float:
 
 
 def flow_of(ends: TubeEnds[float], *, crest: SiphonCrest[float] | None, primed: bool) -> ColumnFlow[float]:
-    return column_flow(ends=ends, crest=crest, primed=primed, allowed=True, siphon=root, separation=root)
+    return column_flow(ends=ends, crest=crest, primed=primed, siphon=root, separation=root)
 
 
 def test_pressures_at_the_ends() -> None:
@@ -125,7 +125,6 @@ def test_arrays_agree_with_numbers(crest: SiphonCrest[float] | None) -> None:
         if crest is None
         else SiphonCrest(**{f.name: getattr(crest, f.name) for f in fields(crest)}),
         primed=primed,
-        allowed=True,
         siphon=roots,
         separation=roots,
     )

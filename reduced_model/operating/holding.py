@@ -1,0 +1,58 @@
+"""Whether a scene's tube holds a correction while the gas is off, and which siphon crest would."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ringbalance.mesh.geometry import surface_radius, wall_radius
+from ringbalance.reduced_model.law.building import column_pressure, tube_path
+from ringbalance.scene.models import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class Holding:
+    """What becomes of the fullest chamber's liquid with the gas off."""
+
+    holds: bool
+    """Whether it stays there, by `TubePath.holds`."""
+    hump_radius: float | None
+    """Of the scene's crest, m; None without one."""
+    largest_hump_radius: float | None
+    """Of a crest that holds it whatever the pressure of a cavity there, m; None: no crest does."""
+
+    @classmethod
+    def of(cls, scene: Scene, *, fill_ratio: float) -> Holding:
+        """By hydrostatics, gravity left out. Args: `fill_ratio`: the largest that runs reach."""
+        path, wall = tube_path(scene), wall_radius(disc=scene.disc)
+        fullest = float(surface_radius(disc=scene.disc, fill_ratio=fill_ratio))
+        level = column_pressure(scene=scene, radius=fullest)
+        pull = scene.liquid.density * scene.rotor.speed**2 / 2
+        square = wall**2 - path.holding_pressure(level) / pull if pull > 0 else 0.0
+        return cls(
+            holds=path.holds(level),
+            hump_radius=scene.tube.hump_radius,
+            largest_hump_radius=math.sqrt(square) if square > 0 else None,
+        )
+
+    @property
+    def warning(self) -> str:
+        """What a tube that does not hold means, and what to do; empty for one that does."""
+        if self.holds:
+            return ""
+        if self.hump_radius is None:
+            tube = "without a siphon crest the tube stays full and"
+        else:
+            tube = f"over a siphon crest at {_mm(self.hump_radius)} mm a full tube does not part: it"
+        cure = "raise rotor.speed: at this one no siphon crest holds it"
+        if self.largest_hump_radius is not None:
+            cure = f"give the tube a crest inside {_mm(self.largest_hump_radius)} mm (tube.hump_radius)"
+        return (
+            f"{tube} lets liquid of the fullest chamber run back while the gas is off, so no such correction "
+            f"lasts: {cure}"
+        )
+
+
+def _mm(radius: float) -> str:
+    """Rounded down to a tenth of a millimetre."""
+    return f"{math.floor(1e4 * radius * (1 + 1e-12)) / 10:g}"

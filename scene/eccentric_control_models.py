@@ -34,6 +34,7 @@ from ringbalance.scene.keys.fields import (
 Discretisation = Literal["exact", "euler"]
 FrictionCompensation = Literal["break_away", "none"]
 Strategy = Literal["whole", "locked"]
+CorrectionRule = Literal["measured", "trials"]
 
 _FINEST_POSITION = 1e-6
 _FINEST_VELOCITY = 1e-5
@@ -314,6 +315,14 @@ class Supervisor:
     imbalance_time: Annotated[PositiveTime, standard("60 s", "longest estimation of the imbalance")]
     friction_time: Annotated[PositiveTime, standard("60 s", "longest estimation of the friction")]
     positioning_time: Annotated[PositiveTime, standard("60 s", "longest move to the targets")]
+    correction: Annotated[
+        CorrectionRule,
+        standard(
+            "measured",
+            "of the targets after the check: by the measured vibration over the assumed influence of an "
+            "unbalance, with trials only where that does not help; or by trials alone, as the paper has it",
+        ),
+    ]
     fine_tuning_time: Annotated[PositiveTime, standard("600 s", "longest fine tuning")]
     target_error: Annotated[
         tuple[float, float],

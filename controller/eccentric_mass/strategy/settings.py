@@ -248,4 +248,5 @@ def _gates(scene: EccentricScene) -> Gates:
         move_time=_LONGEST_TRIAL_MOVE,
         moment=plant.moment,
         gap=scene.masses.arc_length / scene.masses.guide_radius,
+        by_trials=told.correction == "trials",
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.strategy.correction import Correction
 from ringbalance.controller.eccentric_mass.strategy.plan import (
@@ -16,15 +18,15 @@ from ringbalance.controller.eccentric_mass.strategy.targets import Tuning
 
 
 @compiled
-def setting_out(time: float, place: Pair) -> Progress:
+def setting_out(time: float) -> Progress:
     """Progress at the beginning of a move. Returns: Progress, with nothing arrived or averaged yet."""
-    return Progress(time, NOT_YET, place, time, NOT_YET, 0.0j, 0)
+    return Progress(time, NOT_YET, math.inf, time, NOT_YET, 0.0j, 0)
 
 
 @compiled
 def enter(plan: Plan, stage: int, time: float, cause: int, goal: Pair) -> Plan:
     """Begin a stage. Returns: The plan, with its tuning and findings."""
-    begin = setting_out(time, goal)
+    begin = setting_out(time)
     return Plan(stage, time, cause, goal, MOVING, begin, plan.correction, plan.tuning, plan.findings)
 
 
@@ -79,7 +81,7 @@ def with_hold(plan: Plan, hold: int) -> Plan:
 @compiled
 def with_trial(plan: Plan, time: float, tuning: Tuning, goal: Pair) -> Plan:
     """The plan that sets out to a trial of fine tuning."""
-    begin = setting_out(time, goal)
+    begin = setting_out(time)
     return Plan(
         plan.stage, plan.entered, plan.cause, goal, MOVING, begin, plan.correction, tuning, plan.findings
     )
@@ -120,31 +122,31 @@ def with_correction(plan: Plan, correction: Correction) -> Plan:
 @compiled
 def averaging_from(progress: Progress, begins: float) -> Progress:
     """Progress that begins its mean at a time, s."""
-    return Progress(progress.moving, progress.arrived, progress.place, progress.still, begins, 0.0j, 0)
+    return Progress(progress.moving, progress.arrived, progress.nearest, progress.nearer, begins, 0.0j, 0)
 
 
 @compiled
 def with_arrival(progress: Progress, arrived: float) -> Progress:
     """Progress with the time of arrival, s; NOT_YET."""
-    place, still = progress.place, progress.still
+    nearest, nearer = progress.nearest, progress.nearer
     return Progress(
-        progress.moving, arrived, place, still, progress.averaging, progress.total, progress.samples
+        progress.moving, arrived, nearest, nearer, progress.averaging, progress.total, progress.samples
     )
 
 
 @compiled
-def with_place(progress: Progress, place: Pair, since: float) -> Progress:
-    """Progress of masses that are about a place, rad, since a time, s."""
+def with_nearest(progress: Progress, nearest: float, since: float) -> Progress:
+    """Progress of masses that have come as near to their goal as this, rad, at a time, s."""
     moving, arrived = progress.moving, progress.arrived
-    return Progress(moving, arrived, place, since, progress.averaging, progress.total, progress.samples)
+    return Progress(moving, arrived, nearest, since, progress.averaging, progress.total, progress.samples)
 
 
 @compiled
 def with_sample(progress: Progress, position: complex) -> Progress:
     """Progress with one sample more in its mean."""
     total, samples = progress.total + position, progress.samples + 1
-    place, still = progress.place, progress.still
-    return Progress(progress.moving, progress.arrived, place, still, progress.averaging, total, samples)
+    nearest, nearer = progress.nearest, progress.nearer
+    return Progress(progress.moving, progress.arrived, nearest, nearer, progress.averaging, total, samples)
 
 
 @compiled

@@ -55,7 +55,8 @@ def correction_judged(old: Correction, residual: complex, margin: float, held: b
     Returns: The correction from the better place; half the share when the step did not help.
     """
     here, best = abs(residual), abs(old.residual)
-    if here < best - margin or (held and here <= best + margin):
+    better = here < best - margin or (held and here <= best + margin)
+    if better or old.share == 0:
         return Correction(old.goal, residual, old.aim, old.aim, old.goal, old.share, old.steps)
     half = 0.5 * old.share
     return Correction(old.place, old.residual, old.imbalance, old.imbalance, old.place, half, old.steps)
@@ -71,6 +72,12 @@ def correction_aim(old: Correction, influence: complex) -> complex:
 def correction_step(old: Correction, aim: complex, goal: tuple[float, float]) -> Correction:
     """One step from the best place. Returns: With its aim and goal."""
     return Correction(old.place, old.residual, old.imbalance, aim, goal, old.share, old.steps + 1)
+
+
+@compiled
+def correction_back(old: Correction) -> Correction:
+    """Back to the best place, where the next mean is the last. Returns: Correction with no share left."""
+    return Correction(old.place, old.residual, old.imbalance, old.imbalance, old.place, 0.0, old.steps)
 
 
 @compiled

@@ -81,6 +81,8 @@ class Gates(NamedTuple):
     lowest_speed: float
     arrival_angle: float
     arrival_rate: float
+    noticeable: float
+    """Least angle by which masses that are not held come nearer within a second, rad."""
     dwell: float
     """For which a mass must have arrived, s."""
     imbalance_time: float
@@ -151,10 +153,10 @@ class Progress(NamedTuple):
     """Since when the masses have been under way to the present goal, s."""
     arrived: float
     """Since when they have been there, s; NOT_YET."""
-    place: Pair
-    """Angles about which they have stayed since `still`, rad."""
-    still: float
-    """s."""
+    nearest: float
+    """Distance from the goal of the mass farther from it, rad, that was reached at `nearer`."""
+    nearer: float
+    """When the masses last came nearer by a noticeable angle, s."""
     averaging: float
     """From when on the vibration is averaged, s; NOT_YET while the masses move."""
     total: complex

@@ -16,8 +16,8 @@ from ringbalance.controller.eccentric_mass.strategy.changed_plan import (
     with_findings,
     with_goal,
     with_hold,
+    with_nearest,
     with_objective,
-    with_place,
     with_progress,
     with_sample,
     with_short,
@@ -26,7 +26,9 @@ from ringbalance.controller.eccentric_mass.strategy.changed_plan import (
     with_trial,
 )
 from ringbalance.controller.eccentric_mass.strategy.correction import (
+    Correction,
     correction_aim,
+    correction_back,
     correction_ends,
     correction_judged,
     correction_start,
@@ -66,7 +68,7 @@ _HOLDS_FOR_SURE: Final = 0.7
 STALLED_SHARE: Final = 0.5
 """Of the friction stage, beyond which its failure is blamed on the drive."""
 _STILL_TIME: Final = 1.0
-"""For which a mass must have stayed where it is, short of its goal, to count as held by friction, s."""
+"""For which masses must have come no nearer to their goal to count as held by friction, s."""
 
 
 @compiled
@@ -74,7 +76,7 @@ def first_plan(goal: Pair, time: float) -> Plan:
     """The plan before the first sample. Returns: Plan, waiting."""
     nothing = Findings(False, 0.0, math.inf, 0.0, 0, 0)
     tuning = tuning_start(goal[0], goal[1], math.inf, 1.0)
-    begin = setting_out(time, goal)
+    begin = setting_out(time)
     return Plan(0, time, 0, goal, MOVING, begin, correction_start(goal, 0.0j), tuning, nothing)
 
 
@@ -179,7 +181,7 @@ def _goal(gates: Gates, angle: Pair, imbalance: complex) -> tuple[Pair, bool, fl
 def _positioning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """Until the masses are at their targets, or friction holds them: the check tells what that leaves."""
     now = _arriving(gates, plan, facts, gates.arrival_angle)
-    if _there(gates, now, facts) or _held(now, facts):
+    if _there(gates, now, facts) or _held(gates, now, facts):
         return enter(now, CHECK, facts.time, NONE, now.goal)
     late = facts.time - now.entered >= gates.positioning_time
     return enter(now, FAILED, facts.time, NOT_ARRIVED, facts.angle) if late else now
@@ -198,33 +200,45 @@ def _check(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     now = _sampled(now, facts)
     if not _averaged(gates, now, facts):
         return now
-    held = now.findings.short > gates.tuning_near
-    before, mean = now.correction, now.progress.total / now.progress.samples
-    judged = correction_judged(before, mean, gates.margin, held)
-    told = _judged(with_correction(now, judged), abs(judged.residual))
-    if gates.by_trials or facts.influence == 0 or correction_ends(judged, gates.margin):
-        return _decided(gates, told, facts)
-    aim = correction_aim(judged, facts.influence)
-    goal, saturated, residual = _goal(gates, _without_error(gates, judged.place), aim)
-    if _distance(goal, judged.place) <= gates.tuning_near:
-        return _decided(gates, told, facts)
-    found = with_targets(told.findings, saturated, residual)
-    begun = with_correction(with_findings(told, found), correction_step(judged, aim, goal))
-    return enter(begun, CORRECTION, facts.time, NONE, goal)
+    return _corrected(gates, now, now.progress.total / now.progress.samples, facts)
+
+
+@compiled
+def _corrected(gates: Gates, plan: Plan, mean: complex, facts: Facts) -> Plan:
+    """Go on to better targets while that helps, back to the best place, or on to what comes after."""
+    held = plan.findings.short > gates.tuning_near
+    best = correction_judged(plan.correction, mean, gates.margin, held)
+    now = _judged(with_correction(plan, best), abs(best.residual))
+    enough = held and abs(mean) <= gates.limit
+    over = enough or gates.by_trials or facts.influence == 0 or correction_ends(best, gates.margin)
+    if not over:
+        aim = correction_aim(best, facts.influence)
+        goal, saturated, residual = _goal(gates, _without_error(gates, best.place), aim)
+        if _distance(goal, best.place) > gates.tuning_near:
+            now = with_findings(now, with_targets(now.findings, saturated, residual))
+            return _set_out(now, correction_step(best, aim, goal), facts)
+    if best.residual != mean and not enough:
+        return _set_out(now, correction_back(best), facts)
+    return _decided(gates, _judged(now, abs(mean)), facts)
+
+
+@compiled
+def _set_out(plan: Plan, correction: Correction, facts: Facts) -> Plan:
+    """Begin the move of a correction."""
+    return enter(with_correction(plan, correction), CORRECTION, facts.time, NONE, correction.goal)
 
 
 @compiled
 def _decided(gates: Gates, plan: Plan, facts: Facts) -> Plan:
-    """After the last correction: content with the best place, or what is left to do from there."""
-    best, objective = plan.correction.place, plan.findings.objective
-    if objective <= gates.limit:
-        return enter(plan, REST, facts.time, BALANCED, best)
+    """After the last correction: content with this place, or what is left to do from here."""
+    if plan.findings.objective <= gates.limit:
+        return with_hold(enter(plan, REST, facts.time, BALANCED, plan.goal), plan.hold)
     if plan.findings.saturated:
-        return enter(plan, REST, facts.time, SATURATED, best)
+        return with_hold(enter(plan, REST, facts.time, SATURATED, plan.goal), plan.hold)
     if plan.findings.short > gates.arrival_angle:
         return enter(plan, FAILED, facts.time, NOT_ARRIVED, facts.angle)
-    first = tuning_start(best[0], best[1], objective, gates.tuning_step)
-    return _try(gates, enter(plan, FINE_TUNING, facts.time, NONE, best), first, facts)
+    first = tuning_start(plan.goal[0], plan.goal[1], plan.findings.objective, gates.tuning_step)
+    return _try(gates, enter(plan, FINE_TUNING, facts.time, NONE, plan.goal), first, facts)
 
 
 @compiled
@@ -315,8 +329,9 @@ def _arriving(gates: Gates, plan: Plan, facts: Facts, closeness: float) -> Plan:
         there = there and close and abs(facts.rate[i]) <= gates.arrival_rate
     since = facts.time if plan.progress.arrived == NOT_YET else plan.progress.arrived
     now = with_arrival(plan.progress, since if there else NOT_YET)
-    stays = _distance(facts.angle, now.place) <= gates.tuning_near
-    return with_progress(plan, now if stays else with_place(now, facts.angle, facts.time))
+    distance = _distance(facts.angle, plan.goal)
+    nearer = distance < now.nearest - gates.noticeable
+    return with_progress(plan, with_nearest(now, distance, facts.time) if nearer else now)
 
 
 @compiled
@@ -325,16 +340,17 @@ def _there(gates: Gates, plan: Plan, facts: Facts) -> bool:
 
 
 @compiled
-def _held(plan: Plan, facts: Facts) -> bool:
-    """Whether friction holds the masses where they are."""
-    return facts.time - plan.progress.still >= _STILL_TIME
+def _held(gates: Gates, plan: Plan, facts: Facts) -> bool:
+    """Whether friction holds the masses: slow, and for a while no nearer to their goal."""
+    slow = max(abs(facts.rate[0]), abs(facts.rate[1])) <= gates.arrival_rate
+    return slow and facts.time - plan.progress.nearer >= _STILL_TIME
 
 
 @compiled
 def _over(gates: Gates, plan: Plan, facts: Facts) -> bool:
     """Whether a move has come to its end, at its goal or short of it."""
     late = facts.time - plan.progress.moving >= gates.move_time
-    return late or _there(gates, plan, facts) or _held(plan, facts)
+    return late or _there(gates, plan, facts) or _held(gates, plan, facts)
 
 
 @compiled

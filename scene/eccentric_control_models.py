@@ -112,6 +112,39 @@ class ImbalanceFilter:
             "of the rotor's equations: by the matrix exponential, or by one Euler step as the paper has it",
         ),
     ]
+    initial_position: Annotated[
+        PositiveLength,
+        derived(
+            "2 m_b r_b / M, the balancing capacity over the whole mass",
+            "standard deviation of each coordinate before the first update",
+            "masses.mass",
+            "masses.guide_radius",
+            "rotor.mass",
+            rule=_capacity_travel,
+        ),
+    ]
+    initial_velocity: Annotated[
+        PositiveVelocity,
+        derived(
+            "initial_position times the critical speed",
+            "standard deviation of each velocity before the first update",
+            "imbalance_filter.initial_position",
+            "rotor.stiffness",
+            "rotor.mass",
+            "masses.mass",
+            rule=_critical_velocity,
+        ),
+    ]
+    initial_unbalance: Annotated[
+        PositiveUnbalance,
+        derived(
+            "2 m_b r_b, the balancing capacity",
+            "standard deviation of each component of the unbalance before the first update",
+            "masses.mass",
+            "masses.guide_radius",
+            rule=_capacity,
+        ),
+    ]
     position_noise: Annotated[
         PositiveLength,
         derived(
@@ -155,39 +188,6 @@ class ImbalanceFilter:
             "rotor.mass",
             "masses.mass",
             rule=_unbalance_walk,
-        ),
-    ]
-    initial_position: Annotated[
-        PositiveLength,
-        derived(
-            "2 m_b r_b / M, the balancing capacity over the whole mass",
-            "standard deviation of each coordinate before the first update",
-            "masses.mass",
-            "masses.guide_radius",
-            "rotor.mass",
-            rule=_capacity_travel,
-        ),
-    ]
-    initial_velocity: Annotated[
-        PositiveVelocity,
-        derived(
-            "initial_position times the critical speed",
-            "standard deviation of each velocity before the first update",
-            "imbalance_filter.initial_position",
-            "rotor.stiffness",
-            "rotor.mass",
-            "masses.mass",
-            rule=_critical_velocity,
-        ),
-    ]
-    initial_unbalance: Annotated[
-        PositiveUnbalance,
-        derived(
-            "2 m_b r_b, the balancing capacity",
-            "standard deviation of each component of the unbalance before the first update",
-            "masses.mass",
-            "masses.guide_radius",
-            rule=_capacity,
         ),
     ]
     gate: Annotated[

@@ -209,7 +209,7 @@ def _corrected(gates: Gates, plan: Plan, mean: complex, facts: Facts) -> Plan:
     held = plan.findings.short > gates.tuning_near
     best = correction_judged(plan.correction, mean, gates.margin, held)
     now = _judged(with_correction(plan, best), abs(best.residual))
-    enough = held and abs(mean) <= gates.limit
+    enough = plan.findings.short > gates.arrival_angle and abs(mean) <= gates.limit
     over = enough or gates.by_trials or facts.influence == 0 or correction_ends(best, gates.margin)
     if not over:
         aim = correction_aim(best, facts.influence)

@@ -51,14 +51,14 @@ def correction_judged(old: Correction, residual: complex, margin: float, held: b
     """Compare a mean vibration with that of staying at the best place so far.
 
     Args: `held`: whether friction held a mass short of its goal. Where nothing got worse a further step adds
-    to the goal until the mass breaks away.
+    to the goal, so that the mass breaks away.
     Returns: The correction from the better place; half the share when the step did not help.
     """
-    here, best = abs(residual), abs(old.residual)
-    better = here < best - margin or (held and here <= best + margin)
-    if better or old.share == 0:
+    here, best, half = abs(residual), abs(old.residual), 0.5 * old.share
+    if here < best - margin or old.share == 0:
         return Correction(old.goal, residual, old.aim, old.aim, old.goal, old.share, old.steps)
-    half = 0.5 * old.share
+    if held and here <= best + margin:
+        return Correction(old.goal, residual, old.aim, old.aim, old.goal, half, old.steps)
     return Correction(old.place, old.residual, old.imbalance, old.imbalance, old.place, half, old.steps)
 
 

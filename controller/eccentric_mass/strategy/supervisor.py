@@ -209,13 +209,16 @@ def _corrected(gates: Gates, plan: Plan, mean: complex, facts: Facts) -> Plan:
     held = plan.findings.short > gates.tuning_near
     best = correction_judged(plan.correction, mean, gates.margin, held)
     now = _judged(with_correction(plan, best), abs(best.residual))
-    enough = plan.findings.short > gates.arrival_angle and abs(mean) <= gates.limit
+    far = plan.findings.short > gates.arrival_angle
+    enough = far and abs(mean) <= gates.limit
     over = enough or gates.by_trials or facts.influence == 0 or correction_ends(best, gates.margin)
     if not over:
         aim = correction_aim(best, facts.influence)
         goal, saturated, residual = _goal(gates, _without_error(gates, best.place), aim)
         if _distance(goal, best.place) > gates.tuning_near:
-            now = with_findings(now, with_targets(now.findings, saturated, residual))
+            # Where friction keeps the masses far off, the aim goes beyond the imbalance to pull them free.
+            if not far:
+                now = with_findings(now, with_targets(now.findings, saturated, residual))
             return _set_out(now, correction_step(best, aim, goal), facts)
     if best.residual != mean and not enough:
         return _set_out(now, correction_back(best), facts)

@@ -37,7 +37,7 @@ def names(run: EccentricRun) -> list[str]:
 
 @pytest.mark.parametrize("name", BUNDLED)
 def test_built_machines_settle(name: str) -> None:
-    """Without the correction the first two leave the limit on the run-up; the third never left positioning."""
+    """Without the correction two leave the limit on the run-up, and the third never left positioning."""
     for number in (900, 914):
         run = built(bundled(name), number)
         assert run.settled
@@ -52,7 +52,7 @@ def test_nine_of_ten_built_machines_settle(name: str) -> None:
 
 
 def test_a_step_leaves_what_the_wrong_influence_leaves() -> None:
-    """|1 - alpha_true/alpha|, here with a stiffness 3 % off; masses come to rest within a tenth of a degree."""
+    """|1 - alpha_true/alpha|, with a stiffness 3 % off; masses come to rest within a tenth of a degree."""
     paper = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=45.0)
     told = StrategySettings.of(paper)
     plant = changed(paper, "rotor", stiffness=1.03 * paper.rotor.stiffness)

@@ -112,7 +112,10 @@ def test_half_widths_are_in_the_document() -> None:
 def test_a_comparison_gives_a_machine_the_same_filter_in_either_place() -> None:
     """The liquid ring's rotor and the masses' own are the same one, to the digits of the scene file."""
     masses = bundled("driven_masses_small")
-    first, second = own_scene(masses), OneRotor.of(load_scene(bundled_scene("liquid_ring_paper"))).scene(masses)
+    first, second = (
+        own_scene(masses),
+        OneRotor.of(load_scene(bundled_scene("liquid_ring_paper"))).scene(masses),
+    )
     one, other = eccentric_scene(first), eccentric_scene(second)
     for table in ("imbalance_filter", "sensor"):
         for name in ("position_noise", "velocity_noise"):

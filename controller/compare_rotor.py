@@ -113,13 +113,11 @@ def _driven_rotor(scene: EccentricScene) -> OneRotor:
 def own_scene(scene: AnyScene) -> AnyScene:
     """Make a scene ready to balance its own rotor in a comparison.
 
-    A liquid ring's scene stays as it is; eccentric masses run at the constant speed at which their strategy
-    starts, opposite each other, and in the rotor's steady vibration before they start.
+    A liquid ring's scene stays as it is; eccentric masses run as on any other rotor: at the constant speed at
+    which their strategy starts, opposite each other, in the rotor's steady vibration before they start, and
+    with the noise that both balancers have.
     """
-    if isinstance(scene, Scene):
-        return scene
-    speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
-    return _steady_start(scene, speed)
+    return scene if isinstance(scene, Scene) else _driven_on(_driven_rotor(scene), scene)
 
 
 def _liquid_on(rotor: OneRotor, scene: Scene) -> Scene:
@@ -173,12 +171,18 @@ def _driven_on(rotor: OneRotor, scene: EccentricScene) -> EccentricScene:
     )
     velocity_noise = rotor.noise * rotor.speed
     believed = scene.imbalance_filter
+    assumed = max(rotor.noise, _FINEST_SHARE * rotor.limit)
+    louder = assumed / believed.position_noise
+    stiffer = found.stiffness / before.stiffness
+    heavier = whole / (before.mass + 2 * masses.mass)
     filtered = replace(
         believed,
-        position_noise=max(rotor.noise, _FINEST_SHARE * rotor.limit),
-        velocity_noise=max(velocity_noise, _FINEST_SHARE * rotor.limit * rotor.speed),
+        position_noise=assumed,
+        velocity_noise=assumed * rotor.speed,
+        velocity_walk=believed.velocity_walk * louder * stiffer / heavier,
+        unbalance_walk=believed.unbalance_walk * louder * heavier,
         assumed_mass=believed.assumed_mass * (found.mass / before.mass),
-        assumed_stiffness=believed.assumed_stiffness * (found.stiffness / before.stiffness),
+        assumed_stiffness=believed.assumed_stiffness * stiffer,
         assumed_damping=_rescaled(believed.assumed_damping, before.damping, found.damping),
     )
     told = replace(

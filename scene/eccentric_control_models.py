@@ -34,10 +34,16 @@ from ringbalance.scene.keys.fields import (
 Discretisation = Literal["exact", "euler"]
 FrictionCompensation = Literal["break_away", "none"]
 Strategy = Literal["whole", "locked"]
+CorrectionRule = Literal["measured", "trials"]
 
-_FINEST_POSITION = 1e-6
-_FINEST_VELOCITY = 1e-5
+_FINEST = 1e-5
+"""Noise that a filter assumes of exact sensors, as a share of what it expects to see at first."""
 _FINEST_RATE = 1e-3
+_UNBALANCE_MEMORY = 0.01
+"""Walk of the unbalance within 1 s, as a share of what the noise of 1 s leaves unknown far above the critical
+speed: the filter averages over 100 s, longer than an estimation takes."""
+_VELOCITY_MEMORY = 0.03
+"""The same of the velocity's walk; its share is largest at the critical speed, where damping divides it."""
 _LONGEST_WAIT = 30.0
 
 
@@ -56,6 +62,21 @@ def _critical_velocity(travel: float, stiffness: float, rotor: float, mass: floa
     return travel * math.sqrt(stiffness / (rotor + 2 * mass))
 
 
+def _assumed_noise(noise: float, expected: float) -> float:
+    """Standard deviation that the filter assumes of a sensor: never so small that nothing else counts."""
+    return max(noise, _FINEST * expected)
+
+
+def _velocity_walk(noise: float, step: float, stiffness: float, rotor: float, mass: float) -> float:
+    """W_c^2 times the displacement that a second of samples leaves unknown, m/s in 1 s."""
+    return _VELOCITY_MEMORY * stiffness / (rotor + 2 * mass) * noise * math.sqrt(step)
+
+
+def _unbalance_walk(noise: float, step: float, rotor: float, mass: float) -> float:
+    """The whole mass times the displacement that a second of samples leaves unknown, kg m in 1 s."""
+    return _UNBALANCE_MEMORY * (rotor + 2 * mass) * noise * math.sqrt(step)
+
+
 def _settling(damping: float, rotor: float, mass: float) -> float:
     """Eight time constants of the free whirl, at most half a minute, s."""
     whole = 2 * (rotor + 2 * mass)
@@ -67,6 +88,11 @@ def _two_turns(profile: Sequence[Any]) -> float:
     speeds = [abs(corner.speed) for corner in profile]
     fastest = speeds[0] or max(speeds) if speeds else 0.0
     return 4 * math.pi / fastest if fastest else 1.0
+
+
+def _friction_walk(radius: float) -> float:
+    """Of a friction arm within 1 s, m."""
+    return 4e-5 * radius
 
 
 def _amplitude_limit(mass: float, radius: float, rotor: float, noise: float) -> float:
@@ -86,32 +112,6 @@ class ImbalanceFilter:
             "of the rotor's equations: by the matrix exponential, or by one Euler step as the paper has it",
         ),
     ]
-    position_noise: Annotated[
-        PositiveLength,
-        derived(
-            "position_noise of [sensor], at least 1 um",
-            "standard deviation that the filter assumes",
-            "sensor.position_noise",
-            rule=partial(max, _FINEST_POSITION),
-        ),
-    ]
-    velocity_noise: Annotated[
-        PositiveVelocity,
-        derived(
-            "velocity_noise of [sensor], at least 10 um/s",
-            "standard deviation that the filter assumes",
-            "sensor.velocity_noise",
-            rule=partial(max, _FINEST_VELOCITY),
-        ),
-    ]
-    velocity_walk: Annotated[
-        Velocity,
-        standard(
-            "0.1 mm/s",
-            "random walk of the rotor's velocity, from forces that are not in the model, within 1 s",
-        ),
-    ]
-    unbalance_walk: Annotated[Unbalance, standard("1 g*mm", "random walk of the unbalance within 1 s")]
     initial_position: Annotated[
         PositiveLength,
         derived(
@@ -143,6 +143,51 @@ class ImbalanceFilter:
             "masses.mass",
             "masses.guide_radius",
             rule=_capacity,
+        ),
+    ]
+    position_noise: Annotated[
+        PositiveLength,
+        derived(
+            "position_noise of [sensor], at least 1e-5 initial_position",
+            "standard deviation that the filter assumes",
+            "sensor.position_noise",
+            "imbalance_filter.initial_position",
+            rule=_assumed_noise,
+        ),
+    ]
+    velocity_noise: Annotated[
+        PositiveVelocity,
+        derived(
+            "velocity_noise of [sensor], at least 1e-5 initial_velocity",
+            "standard deviation that the filter assumes",
+            "sensor.velocity_noise",
+            "imbalance_filter.initial_velocity",
+            rule=_assumed_noise,
+        ),
+    ]
+    velocity_walk: Annotated[
+        Velocity,
+        derived(
+            "0.03 W_c^2 position_noise sqrt(step / 1 s), W_c the critical speed",
+            "random walk of the rotor's velocity, from forces that are not in the model, within 1 s",
+            "imbalance_filter.position_noise",
+            "imbalance_filter.step",
+            "rotor.stiffness",
+            "rotor.mass",
+            "masses.mass",
+            rule=_velocity_walk,
+        ),
+    ]
+    unbalance_walk: Annotated[
+        Unbalance,
+        derived(
+            "0.01 M position_noise sqrt(step / 1 s)",
+            "random walk of the unbalance within 1 s",
+            "imbalance_filter.position_noise",
+            "imbalance_filter.step",
+            "rotor.mass",
+            "masses.mass",
+            rule=_unbalance_walk,
         ),
     ]
     gate: Annotated[
@@ -183,7 +228,15 @@ class FrictionFilter:
         ),
     ]
     rate_walk: Annotated[Rate, standard("0.01 rad/s", "random walk of the speed of a mass within 1 s")]
-    friction_walk: Annotated[Length, standard("0.01 mm", "random walk of the friction arm within 1 s")]
+    friction_walk: Annotated[
+        Length,
+        derived(
+            "4e-5 guide_radius",
+            "random walk of the friction arm within 1 s",
+            "masses.guide_radius",
+            rule=_friction_walk,
+        ),
+    ]
     initial_rate: Annotated[
         PositiveRate,
         derived(
@@ -314,6 +367,14 @@ class Supervisor:
     imbalance_time: Annotated[PositiveTime, standard("60 s", "longest estimation of the imbalance")]
     friction_time: Annotated[PositiveTime, standard("60 s", "longest estimation of the friction")]
     positioning_time: Annotated[PositiveTime, standard("60 s", "longest move to the targets")]
+    correction: Annotated[
+        CorrectionRule,
+        standard(
+            "measured",
+            "of the targets after the check: by the measured vibration over the assumed influence of an "
+            "unbalance, with trials only where that does not help; or by trials alone, as the paper has it",
+        ),
+    ]
     fine_tuning_time: Annotated[PositiveTime, standard("600 s", "longest fine tuning")]
     target_error: Annotated[
         tuple[float, float],

@@ -16,6 +16,7 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.run_status import length_text
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.platform.terminal import two_columns
+from ringbalance.scene.uncertain import NORMAL_95
 
 _MOST_ROWS: Final = 2500
 """Instants in the document; a run has a hundred times as many."""
@@ -58,6 +59,8 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
         "estimates": {
             "imbalance_kg_m": run.estimates.imbalance[kept].T.tolist(),
             "imbalance_covariance": run.estimates.imbalance_covariance[kept].tolist(),
+            "imbalance_rotor_covariance": run.rotor_covariance.tolist(),
+            "imbalance_half_width_kg_m": (NORMAL_95 * np.sqrt(np.diag(run.imbalance_covariance))).tolist(),
             "friction_arm_m": run.estimates.friction_arm[kept].T.tolist(),
             "friction_variance": run.estimates.friction_variance[kept].T.tolist(),
         },
@@ -151,9 +154,9 @@ def _summary(run: EccentricRun) -> Table:
 
 def _imbalance(run: EccentricRun) -> str:
     x, y = run.estimates.imbalance[-1]
-    standard_deviation = math.sqrt(float(np.max(np.linalg.eigvalsh(run.estimates.imbalance_covariance[-1]))))
+    deviation = math.sqrt(float(np.max(np.linalg.eigvalsh(run.imbalance_covariance))))
     phase = _degrees(math.atan2(y, x))
-    return f"{math.hypot(x, y):.4g} kg m at {phase} deg, standard deviation {standard_deviation:.2g} kg m"
+    return f"{math.hypot(x, y):.4g} kg m at {phase} deg, standard deviation {deviation:.2g} kg m"
 
 
 def _friction(run: EccentricRun) -> str:

@@ -104,8 +104,11 @@ def _friction_allowed(scene: EccentricScene, *, arm: float, speed: float) -> flo
     return max(share, torque / (track_model(scene).moment * speed**2)) if speed != 0 else math.inf
 
 
-def found_beforehand(scene: EccentricScene) -> tuple[str, ...]:
-    """Loops that are unstable, drives too weak and gates that cannot be reached, each with what would do."""
+def found_beforehand(scene: EccentricScene, *, friction_known: bool = False) -> tuple[str, ...]:
+    """Loops that are unstable, drives too weak and gates that cannot be reached, each with what would do.
+
+    Args: `friction_known`: a run has shown that the drives are strong enough for the friction stage.
+    """
     if scene.supervisor.strategy == "locked":
         return ()
     gains = RecommendedGains.of(scene)
@@ -118,7 +121,7 @@ def found_beforehand(scene: EccentricScene) -> tuple[str, ...]:
     ]
     speed = scene.rotor.speed_profile[0].speed
     if speed != 0:
-        found += _weak_drive(scene) + _gates(scene, speed)
+        found += ([] if friction_known else _weak_drive(scene)) + _gates(scene, speed)
     return tuple(found)
 
 
@@ -213,6 +216,8 @@ def remedies_of(facts: RunFacts) -> tuple[Remedy, ...]:
     if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
         return ()
     own = _REMEDIES[outcome](facts) if outcome in _REMEDIES else ()
+    if facts.by_euler:
+        own = (_remedy(facts.scene, ("imbalance_filter.discretisation", "exact")), *own)
     gains = None if outcome is EccentricOutcome.TIME_LIMIT else _gain_remedy(facts.scene)
     return (gains, *own) if gains else own
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.estimation.rotor_uncertainty import rotor_covariance
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, check_substeps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation, found_beforehand, remedies_of
@@ -56,7 +57,7 @@ def simulate_eccentric(
         settled=settled,
         settling_time=facts.settling_time if settled else None,
         status=facts.status(remedies),
-        warnings=(*found_beforehand(scene), *facts.warnings),
+        warnings=(*found_beforehand(scene, friction_known=facts.friction_known), *facts.warnings),
         remedies=remedies,
         innovation=innovation,
         limit=scene.supervisor.limit,
@@ -70,6 +71,7 @@ def simulate_eccentric(
         drive_off=record.hold == RELEASED,
         energy=record.energy,
         estimates=record,
+        rotor_covariance=_rotor_covariance(scene, record, speed),
         stages=_stages(record.stage, time),
         targets=_targets(scene, record),
         unbalanced_amplitude=_unbalanced(scene, float(speed[-1])),
@@ -117,7 +119,16 @@ def _facts(
         least_gap=float(np.min(_separations(angles))),
         euler_limit=float(believed_whirl(scene).euler_step_limit(angular_velocity=fastest)),
         predicted=expected_deviation(scene, speed=slowest) if cause is Cause.IMBALANCE_UNCERTAIN else 0.0,
+        friction_known=bool(np.any(record.stage == int(Stage.POSITIONING))),
     )
+
+
+def _rotor_covariance(scene: EccentricScene, record: Record, speed: FloatArray) -> FloatArray:
+    estimating = np.flatnonzero(record.stage == int(Stage.IMBALANCE))
+    if estimating.size == 0:
+        return np.zeros((2, 2))
+    imbalance = complex(*record.imbalance[-1])
+    return rotor_covariance(scene, imbalance=imbalance, speed=float(speed[estimating[-1]]))
 
 
 def _left(record: Record, amplitude: FloatArray, limit: float) -> int | None:

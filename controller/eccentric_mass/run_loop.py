@@ -93,7 +93,7 @@ def recorded(
     """
     samples = scene.samples
     if scene.supervisor.strategy == "locked":
-        return _locked(scene, _empty_record(samples), progress), Findings(False, 0.0, np.inf, 0, 0), None
+        return _locked(scene, _empty_record(samples), progress), Findings(False, 0.0, np.inf, 0.0, 0, 0), None
     numbers = np.random.default_rng(scene.run.seed if seed is None else seed)
     return _driven(scene, settings, numbers.standard_normal((samples, NOISES)), progress)
 

@@ -100,7 +100,9 @@ class EccentricRun:
     energy: FloatArray
     """Electrical, taken from the supply since the start, J, shape (n,)."""
     estimates: Record
-    """Those of the filters are constant outside their stages."""
+    """Those of the filters are constant outside their stages; their covariances are of the noise alone."""
+    rotor_covariance: FloatArray
+    """Of the estimated imbalance, from what the scene states of rotor and masses, kg^2 m^2, shape (2, 2)."""
     stages: tuple[StageSpan, ...]
     targets: Targets | None
     """For the imbalance as it was estimated; None when it never came to that."""
@@ -116,6 +118,11 @@ class EccentricRun:
     def phase(self) -> FloatArray:
         """Of the true vibration in the rotor's frame, rad within (-pi, pi], shape (n,)."""
         return np.asarray(np.angle(self.whirl), dtype=np.float64)
+
+    @property
+    def imbalance_covariance(self) -> FloatArray:
+        """Of the imbalance as estimated at the end, from noise and rotor, kg^2 m^2, shape (2, 2)."""
+        return np.asarray(self.estimates.imbalance_covariance[-1] + self.rotor_covariance)
 
     @property
     def final_amplitude(self) -> float:

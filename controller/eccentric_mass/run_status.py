@@ -60,6 +60,8 @@ class RunFacts:
     """Longest step of the paper's transition at the highest speed of the estimation, s."""
     predicted: float
     """Standard deviation of the imbalance to be expected after the longest estimation, kg m."""
+    friction_known: bool
+    """Whether the friction stage came to its end: then its drives have done what they are there for."""
 
     @cached_property
     def outcome(self) -> EccentricOutcome:
@@ -73,6 +75,13 @@ class RunFacts:
             return EccentricOutcome.SETTLED
         cause = _cause(self)
         return EccentricOutcome.TIME_LIMIT if cause is Cause.NONE else EccentricOutcome(cause.name.lower())
+
+    @property
+    def by_euler(self) -> bool:
+        """Whether the filter is wrong, or says so, with the Euler transition: the cause to remove first."""
+        told = self.scene.imbalance_filter
+        unlike = self.innovation is not None and self.innovation > _WRONG_MODEL
+        return told.discretisation == "euler" and (unlike or told.step > self.euler_limit)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -105,11 +114,9 @@ def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
     unlike = facts.innovation is not None and facts.innovation > _WRONG_MODEL
     share = findings.stalled / max(findings.driven, 1)
     gap = scene.masses.arc_length / scene.masses.guide_radius
-    euler = scene.imbalance_filter.discretisation == "euler"
-    step = scene.imbalance_filter.step
     return [
         (
-            share > _NOTICEABLE_STALL,
+            share > _NOTICEABLE_STALL and not facts.friction_known,
             f"a drive nearly stalled during {100 * share:.3g} % of the friction stage: raise "
             "friction_filter.drive_speed or speed_gain, or motor.maximum_voltage",
         ),
@@ -118,7 +125,13 @@ def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
             f"a motor voltage was at motor.maximum_voltage for {facts.saturation:.3g} s",
         ),
         (
-            unlike,
+            facts.by_euler,
+            f"the Euler transition of the imbalance filter is too coarse for imbalance_filter.step (its "
+            f"stability limit here is {facts.euler_limit:.3g} s, and the estimate errs before that): "
+            'set imbalance_filter.discretisation = "exact"',
+        ),
+        (
+            unlike and not facts.by_euler,
             f"the mean square of the imbalance filter's innovations is {facts.innovation or 0:.3g} times "
             "what its model expects: check imbalance_filter.assumed_stiffness, assumed_damping and "
             "assumed_mass, and the noise that it assumes",
@@ -131,11 +144,6 @@ def _warnings(facts: RunFacts) -> list[tuple[bool, str]]:
             facts.least_gap < gap,
             f"the masses came within {math.degrees(facts.least_gap):.3g} deg of each other, less than their "
             f"own {math.degrees(gap):.3g} deg: the run continues as if they could pass",
-        ),
-        (
-            euler and step > facts.euler_limit,
-            f"imbalance_filter.step is beyond the stability limit of the Euler transition, "
-            f'{facts.euler_limit:.3g} s at this speed: set discretisation = "exact"',
         ),
     ]
 

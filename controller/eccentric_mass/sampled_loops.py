@@ -25,8 +25,9 @@ GAIN_MARGIN: Final = 2.0
 _TORQUE_MARGIN: Final = 1.5
 """Of the speed control at standstill over the friction of the scene, at the recommended drive speed."""
 _SMALL: Final = 1e-4
-_HALVINGS: Final = 60
-_DECADES: Final = 30.0
+_HALVINGS: Final = 50
+_FARTHEST: Final = 1e9
+"""Times or below the scene's own value that a limit is looked for; a gain that nothing limits ends there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,8 +127,8 @@ def _regulator(scene: EccentricScene) -> _SampledLoop:
         value=weight,
         unit="",
         poles=poles(weight, scene.lqr.step, 1.0),
-        gain_margin=_largest(lambda factor: _inside(poles(weight, scene.lqr.step, factor))),
-        recommended=_largest(lambda q: _inside(poles(q, scene.lqr.step, GAIN_MARGIN))),
+        gain_margin=_largest(lambda factor: _inside(poles(weight, scene.lqr.step, factor)), 1.0),
+        recommended=_largest(lambda q: _inside(poles(q, scene.lqr.step, GAIN_MARGIN)), weight),
         recommended_step=_step(scene, lambda step: _inside(poles(weight, step, GAIN_MARGIN))),
     )
 
@@ -145,8 +146,8 @@ def _speed(scene: EccentricScene) -> _SampledLoop:
         value=gain,
         unit="V*s/rad",
         poles=poles(gain, scene.lqr.step),
-        gain_margin=_largest(lambda factor: _inside(poles(factor * gain, scene.lqr.step))),
-        recommended=_largest(lambda value: _inside(poles(GAIN_MARGIN * value, scene.lqr.step))),
+        gain_margin=_largest(lambda factor: _inside(poles(factor * gain, scene.lqr.step)), 1.0),
+        recommended=_largest(lambda value: _inside(poles(GAIN_MARGIN * value, scene.lqr.step)), gain),
         recommended_step=_step(scene, lambda step: _inside(poles(GAIN_MARGIN * gain, step))),
     )
 
@@ -166,9 +167,12 @@ def _pair(scene: EccentricScene) -> _SampledLoop:
         unit="V/rad",
         poles=poles(told.pair_gain, told.speed_gain, scene.lqr.step),
         gain_margin=_largest(
-            lambda factor: _inside(poles(factor * told.pair_gain, told.speed_gain, scene.lqr.step))
+            lambda factor: _inside(poles(factor * told.pair_gain, told.speed_gain, scene.lqr.step)), 1.0
         ),
-        recommended=_largest(lambda pair: _inside(poles(GAIN_MARGIN * pair, slower, scene.lqr.step))),
+        recommended=_largest(
+            lambda pair: _inside(poles(GAIN_MARGIN * pair, slower, scene.lqr.step)),
+            told.pair_gain or slower,
+        ),
         recommended_step=_step(
             scene,
             lambda step: _inside(poles(GAIN_MARGIN * told.pair_gain, GAIN_MARGIN * told.speed_gain, step)),
@@ -216,13 +220,20 @@ def _inside(poles: ComplexArray) -> bool:
 
 
 def _step(scene: EccentricScene, stable: Callable[[float], bool]) -> float:
-    return scene.lqr.step if stable(scene.lqr.step) else min(_largest(stable), scene.lqr.step)
+    return scene.lqr.step if stable(scene.lqr.step) else _largest(stable, scene.lqr.step)
 
 
-def _largest(stable: Callable[[float], bool]) -> float:
-    """Largest value that is stable, in case all smaller ones are as well."""
-    low, high = -_DECADES, _DECADES
+def _largest(stable: Callable[[float], bool], start: float) -> float:
+    """Largest value that is stable, in case all smaller ones are as well.
+
+    Doubled or halved from `start` up to the limit, and bisected there: far below it a slow pole rounds to
+    one, and a search among such values would end anywhere.
+    """
+    low, factor = start, 2.0 if stable(start) else 0.5
+    while start / _FARTHEST < low < start * _FARTHEST and stable(factor * low) == (factor > 1):
+        low *= factor
+    low, high = (low, 2 * low) if factor > 1 else (0.5 * low, low)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if stable(10.0**middle) else (low, middle)
-    return float(10.0**low)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low

@@ -154,7 +154,7 @@ def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
         ),
         Requirement("settling time", "s", _AT_MOST, until, why, run.settling_time),
         Requirement(
-            "standard deviation of the imbalance",
+            "standard deviation of the imbalance, from noise",
             "kg m",
             _AT_MOST,
             gate * plant.unbalance,

@@ -259,6 +259,7 @@ def _estimate_table(estimates: Record, truth: Record) -> Table:
     """Final estimates with their 95 % half-widths beside the true values, errors in standard deviations."""
     true = truth["unbalance_kg_m"] * np.array([math.cos(truth["phase_rad"]), math.sin(truth["phase_rad"])])
     covariance = np.asarray(estimates["imbalance_covariance"][-1])
+    covariance = covariance + np.asarray(estimates["imbalance_rotor_covariance"])
     last = [row[-1] for row in estimates["imbalance_kg_m"]]
     arms, variances = ([row[-1] for row in estimates[key]] for key in ("friction_arm_m", "friction_variance"))
     plant = truth["friction_arm_m"]
@@ -279,7 +280,8 @@ def _estimate_table(estimates: Record, truth: Record) -> Table:
 
     return Table(
         caption="Estimates at the end of the run with their 95 % half-widths, and the plant’s values. The "
-        "error is in standard deviations.",
+        "imbalance’s hold the filter’s noise and what the scene states of rotor and masses. The error is in "
+        "standard deviations.",
         heads=("Quantity", "Estimate", "In the plant", "Error"),
         rows=[cells(*entry) for entry in entries],
     )

@@ -124,7 +124,8 @@ def test_defaults_that_follow_from_other_values(least_document: dict[str, Any], 
     assert believed.initial_position == pytest.approx(capacity / whole)
     assert believed.initial_velocity == pytest.approx(capacity / whole * math.sqrt(1000 / whole))
     assert (believed.assumed_mass, believed.assumed_stiffness, believed.assumed_damping) == (5, 1000, 10)
-    assert (believed.position_noise, believed.velocity_noise) == (1e-6, 1e-5)
+    assert believed.position_noise == pytest.approx(1e-5 * believed.initial_position)
+    assert believed.velocity_noise == pytest.approx(1e-5 * believed.initial_velocity)
     assert believed.step == scene.friction_filter.step == scene.lqr.step == scene.sensor.step == 1e-3
     assert scene.friction_filter.initial_friction == pytest.approx(0.023)
     assert scene.fine_tuning.wait == pytest.approx(16 * whole / 10)

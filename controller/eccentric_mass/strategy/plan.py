@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 from ringbalance.controller.eccentric_mass.estimation.friction_filter import FrictionEstimate
 from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import ImbalanceEstimate
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import FilterMatrices
+from ringbalance.controller.eccentric_mass.strategy.correction import Correction
 from ringbalance.controller.eccentric_mass.strategy.targets import Tuning
 from ringbalance.scene.arrays import FloatArray
 
@@ -35,17 +36,19 @@ class Stage(IntEnum):
     """(C): the masses go to their targets."""
     CHECK = 4
     """(D): the drives rest, the vibration is averaged."""
-    FINE_TUNING = 5
+    CORRECTION = 5
+    """The masses go to targets that the averaged vibration has corrected; a check follows."""
+    FINE_TUNING = 6
     """(E): by trial."""
-    REST = 6
+    REST = 7
     """(F): nothing more to do."""
-    FAILED = 7
+    FAILED = 8
     """Nothing more that can be done; the masses are held where they are."""
 
 
 STAGE_NAMES: Final = (
     *("waiting", "imbalance estimation", "friction estimation", "positioning"),
-    *("check", "fine tuning", "rest", "failed"),
+    *("check", "correction", "fine tuning", "rest", "failed"),
 )
 """In the order of `Stage`."""
 
@@ -78,6 +81,8 @@ class Gates(NamedTuple):
     lowest_speed: float
     arrival_angle: float
     arrival_rate: float
+    noticeable: float
+    """Least angle by which masses that are not held come nearer within a second, rad."""
     dwell: float
     """For which a mass must have arrived, s."""
     imbalance_time: float
@@ -103,7 +108,7 @@ class Gates(NamedTuple):
     wait: float
     average: float
     margin: float
-    """By which a trial must be better, m."""
+    """By which a trial or a correction must be better, m."""
     move_time: float
     """Longest move of one trial, s."""
     moment: float
@@ -111,6 +116,8 @@ class Gates(NamedTuple):
     gap: float
     """Angle that one mass takes up, rad."""
     target_error: Pair
+    by_trials: bool
+    """Whether the masses are tuned by trials alone, as in the paper."""
 
 
 class Facts(NamedTuple):
@@ -131,8 +138,8 @@ class Facts(NamedTuple):
     imbalance: complex
     deviation: float
     """Standard deviation of the imbalance, kg m."""
-    reach: float
-    """Steady amplitude per imbalance, m/(kg m)."""
+    influence: complex
+    """alpha, steady vibration per imbalance at this speed as configured, m/(kg m)."""
     arm: Pair
     arm_deviation: Pair
     load: float
@@ -146,6 +153,10 @@ class Progress(NamedTuple):
     """Since when the masses have been under way to the present goal, s."""
     arrived: float
     """Since when they have been there, s; NOT_YET."""
+    nearest: float
+    """Distance from the goal of the mass farther from it, rad, that was reached at `nearer`."""
+    nearer: float
+    """When the masses last came nearer by a noticeable angle, s."""
     averaging: float
     """From when on the vibration is averaged, s; NOT_YET while the masses move."""
     total: complex
@@ -163,6 +174,8 @@ class Findings(NamedTuple):
     """Imbalance that the targets leave, kg m."""
     objective: float
     """Mean amplitude at the place that the masses have or go to, m; infinite before the first mean."""
+    short: float
+    """Largest distance from its goal at which friction was left to hold a mass after the last move, rad."""
     driven: int
     """Samples of the friction stage, without its beginning."""
     stalled: int
@@ -180,6 +193,7 @@ class Plan(NamedTuple):
     hold: int
     """MOVING, RELEASED or HELD."""
     progress: Progress
+    correction: Correction
     tuning: Tuning
     findings: Findings
 

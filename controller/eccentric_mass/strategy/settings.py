@@ -24,6 +24,8 @@ _DECAYS = 2.0
 """Decay times of the rotor that the imbalance is estimated for at least."""
 _LONGEST_ESTIMATE = 0.5
 """Share of the estimation's time limit that this may take at most."""
+_NOTICEABLE = 0.25
+"""Share of the arrival angle."""
 _LEAST_DRIVE_TIME = 1.0
 """Of the friction stage, s: long against the drive's own time constants."""
 _LONGEST_TRIAL_MOVE = 10.0
@@ -232,6 +234,7 @@ def _gates(scene: EccentricScene) -> Gates:
     averaged = max(tuning.average / scene.sensor.step, 1.0)
     return Gates(
         **{name: getattr(told, name) for name in _SUPERVISOR_KEYS},
+        noticeable=max(_NOTICEABLE * told.arrival_angle, 2 * law.near),
         dwell=_DWELL_TIME,
         imbalance_gate=scene.imbalance_filter.gate,
         friction_gate=scene.friction_filter.gate,
@@ -248,4 +251,5 @@ def _gates(scene: EccentricScene) -> Gates:
         move_time=_LONGEST_TRIAL_MOVE,
         moment=plant.moment,
         gap=scene.masses.arc_length / scene.masses.guide_radius,
+        by_trials=told.correction == "trials",
     )

@@ -281,7 +281,7 @@ def _facts(
         smoothed.rate,
         beliefs.imbalance,
         beliefs.deviation,
-        w * w / abs(stiffness),
+        w * w / stiffness,
         (one.arm, two.arm),
         deviation,
         load,

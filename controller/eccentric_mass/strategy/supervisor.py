@@ -1,4 +1,4 @@
-"""The order of the stages: estimate, drive round, go, look, tune by trial, rest; and when each is left."""
+"""The order of the stages: estimate, drive round, go, look, correct, rest; and when each is left."""
 
 from __future__ import annotations
 
@@ -7,6 +7,33 @@ import math
 from typing import Final
 
 from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.eccentric_mass.strategy.changed_plan import (
+    averaging_from,
+    enter,
+    setting_out,
+    with_arrival,
+    with_correction,
+    with_findings,
+    with_goal,
+    with_hold,
+    with_nearest,
+    with_objective,
+    with_progress,
+    with_sample,
+    with_short,
+    with_stall,
+    with_targets,
+    with_trial,
+)
+from ringbalance.controller.eccentric_mass.strategy.correction import (
+    Correction,
+    correction_aim,
+    correction_back,
+    correction_ends,
+    correction_judged,
+    correction_start,
+    correction_step,
+)
 from ringbalance.controller.eccentric_mass.strategy.plan import (
     HELD,
     MOVING,
@@ -18,7 +45,6 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
     Gates,
     Pair,
     Plan,
-    Progress,
     Stage,
 )
 from ringbalance.controller.eccentric_mass.strategy.targets import (
@@ -32,7 +58,7 @@ from ringbalance.controller.eccentric_mass.strategy.targets import (
 )
 
 # Plain numbers: the compiler takes enumerations, but not as fast.
-WAITING, IMBALANCE, FRICTION, POSITIONING, CHECK, FINE_TUNING, REST, FAILED = map(int, Stage)
+WAITING, IMBALANCE, FRICTION, POSITIONING, CHECK, CORRECTION, FINE_TUNING, REST, FAILED = map(int, Stage)
 _CAUSES: Final = tuple(map(int, Cause))
 NONE, BALANCED, SATURATED, RESIDUAL, TUNING_TIME, SPEED_CHANGED, TOO_SLOW, SPEED_NOT_CONSTANT = _CAUSES[:8]
 IMBALANCE_UNCERTAIN, FRICTION_UNCERTAIN, STALLED, NOT_ARRIVED, LOCKED, MASSES_MOVE = _CAUSES[8:]
@@ -41,20 +67,17 @@ _HOLDS_FOR_SURE: Final = 0.7
 """Share of the friction known to be there that the drives may be switched off on."""
 STALLED_SHARE: Final = 0.5
 """Of the friction stage, beyond which its failure is blamed on the drive."""
+_STILL_TIME: Final = 1.0
+"""For which masses must have come no nearer to their goal to count as held by friction, s."""
 
 
 @compiled
 def first_plan(goal: Pair, time: float) -> Plan:
     """The plan before the first sample. Returns: Plan, waiting."""
-    nothing = Findings(False, 0.0, math.inf, 0, 0)
+    nothing = Findings(False, 0.0, math.inf, 0.0, 0, 0)
     tuning = tuning_start(goal[0], goal[1], math.inf, 1.0)
-    return Plan(0, time, 0, goal, MOVING, _setting_out(time), tuning, nothing)
-
-
-@compiled
-def _setting_out(time: float) -> Progress:
-    """Progress at the beginning of a move. Returns: Progress, with nothing arrived or averaged yet."""
-    return Progress(time, NOT_YET, NOT_YET, 0.0j, 0)
+    begin = setting_out(time)
+    return Plan(0, time, 0, goal, MOVING, begin, correction_start(goal, 0.0j), tuning, nothing)
 
 
 @compiled
@@ -65,7 +88,7 @@ def supervise(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """
     if plan.stage == WAITING:
         begins = facts.time >= gates.start
-        return _enter(plan, IMBALANCE, facts.time, NONE, plan.goal) if begins else plan
+        return enter(plan, IMBALANCE, facts.time, NONE, plan.goal) if begins else plan
     if plan.stage == IMBALANCE:
         return _imbalance(gates, plan, facts)
     if plan.stage == FRICTION:
@@ -74,6 +97,8 @@ def supervise(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         return _positioning(gates, plan, facts)
     if plan.stage == CHECK:
         return _check(gates, plan, facts)
+    if plan.stage == CORRECTION:
+        return _correction(gates, plan, facts)
     if plan.stage == FINE_TUNING:
         return _fine_tuning(gates, plan, facts)
     return _rest(gates, plan, facts)
@@ -83,9 +108,9 @@ def supervise(gates: Gates, plan: Plan, facts: Facts) -> Plan:
 def _imbalance(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """Until the imbalance is known relative to itself, or so well that it makes no difference."""
     known = facts.deviation <= gates.imbalance_gate * abs(facts.imbalance)
-    settled = 2 * facts.deviation * facts.reach <= 0.1 * gates.limit
+    settled = 2 * facts.deviation * abs(facts.influence) <= 0.1 * gates.limit
     if facts.visible and (known or settled) and facts.time - plan.entered >= gates.least_estimate:
-        return _enter(plan, FRICTION, facts.time, NONE, facts.angle)
+        return enter(plan, FRICTION, facts.time, NONE, facts.angle)
     if facts.time - plan.entered < gates.imbalance_time:
         return plan
     cause = IMBALANCE_UNCERTAIN
@@ -95,7 +120,7 @@ def _imbalance(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         cause = SPEED_NOT_CONSTANT
     elif not facts.visible:
         cause = MASSES_MOVE
-    return _enter(plan, FAILED, facts.time, cause, facts.angle)
+    return enter(plan, FAILED, facts.time, cause, facts.angle)
 
 
 @compiled
@@ -116,7 +141,7 @@ def _friction(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         return now
     stalled = now.findings.stalled > STALLED_SHARE * now.findings.driven
     cause = STALLED if stalled else FRICTION_UNCERTAIN
-    return _enter(now, FAILED, facts.time, cause, facts.angle)
+    return enter(now, FAILED, facts.time, cause, facts.angle)
 
 
 @compiled
@@ -125,55 +150,123 @@ def _watched(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     if facts.time - plan.entered < 0.5 * gates.least_drive:
         return plan
     slow = min(abs(facts.rate[0]), abs(facts.rate[1])) < gates.stall_rate
-    return _with_findings(plan, _with_stall(plan.findings, slow))
+    return with_findings(plan, with_stall(plan.findings, slow))
 
 
 @compiled
 def _towards(gates: Gates, plan: Plan, facts: Facts) -> Plan:
-    """Targets for the estimated imbalance, and who goes where."""
-    phase = cmath.phase(facts.imbalance)
-    targets = target_angles(abs(facts.imbalance), phase, gates.moment, gates.gap)
-    travel = assign(facts.angle[0], facts.angle[1], targets.first, targets.second)
+    """Go to the targets for the estimated imbalance."""
+    goal, saturated, residual = _goal(gates, facts.angle, facts.imbalance)
+    now = with_findings(plan, with_targets(plan.findings, saturated, residual))
+    now = with_correction(now, correction_start(goal, facts.imbalance))
+    return enter(now, POSITIONING, facts.time, NONE, goal)
+
+
+@compiled
+def _goal(gates: Gates, angle: Pair, imbalance: complex) -> tuple[Pair, bool, float]:
+    """Targets for an imbalance, and who goes where from these angles.
+
+    Returns: Goal, whether it is saturated, and the imbalance that it leaves, kg m.
+    """
+    targets = target_angles(abs(imbalance), cmath.phase(imbalance), gates.moment, gates.gap)
+    travel = assign(angle[0], angle[1], targets.first, targets.second)
     goal = (
-        facts.angle[0] + travel.first + gates.target_error[0],
-        facts.angle[1] + travel.second + gates.target_error[1],
+        angle[0] + travel.first + gates.target_error[0],
+        angle[1] + travel.second + gates.target_error[1],
     )
-    found = _with_targets(plan.findings, targets.saturated, targets.residual)
-    return _enter(_with_findings(plan, found), POSITIONING, facts.time, NONE, goal)
+    return goal, targets.saturated, targets.residual
 
 
 @compiled
 def _positioning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Until the masses are at their targets, or friction holds them: the check tells what that leaves."""
     now = _arriving(gates, plan, facts, gates.arrival_angle)
-    if _there(gates, now, facts):
-        found = _enter(now, CHECK, facts.time, NONE, now.goal)
-        return _with_progress(found, _averaging_from(found.progress, facts.time + gates.wait))
+    if _there(gates, now, facts) or _held(gates, now, facts):
+        return enter(now, CHECK, facts.time, NONE, now.goal)
     late = facts.time - now.entered >= gates.positioning_time
-    return _enter(now, FAILED, facts.time, NOT_ARRIVED, facts.angle) if late else now
+    return enter(now, FAILED, facts.time, NOT_ARRIVED, facts.angle) if late else now
 
 
 @compiled
 def _check(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Average the vibration once the masses are left to friction, and correct the targets by it."""
     if not facts.constant:
-        return _enter(plan, REST, facts.time, SPEED_CHANGED, plan.goal)
-    now = _sampled(_rest(gates, plan, facts), facts)
+        return _cut_short(gates, plan, facts)
+    now = _rest(gates, plan, facts)
+    if now.hold == MOVING:
+        return now
+    if now.progress.averaging == NOT_YET:
+        now = with_progress(now, averaging_from(now.progress, facts.time + gates.wait))
+    now = _sampled(now, facts)
     if not _averaged(gates, now, facts):
         return now
-    told = _judged(now, _mean(now))
-    if told.findings.objective <= gates.limit:
-        return _enter(told, REST, facts.time, BALANCED, now.goal)
-    if told.findings.saturated:
-        return _enter(told, REST, facts.time, SATURATED, now.goal)
-    first = tuning_start(now.goal[0], now.goal[1], told.findings.objective, gates.tuning_step)
-    return _try(gates, _enter(told, FINE_TUNING, facts.time, NONE, now.goal), first, facts)
+    return _corrected(gates, now, now.progress.total / now.progress.samples, facts)
+
+
+@compiled
+def _corrected(gates: Gates, plan: Plan, mean: complex, facts: Facts) -> Plan:
+    """Go on to better targets while that helps, back to the best place, or on to what comes after."""
+    held = plan.findings.short > gates.tuning_near
+    best = correction_judged(plan.correction, mean, gates.margin, held)
+    now = _judged(with_correction(plan, best), abs(best.residual))
+    far = plan.findings.short > gates.arrival_angle
+    enough = far and abs(mean) <= gates.limit
+    over = enough or gates.by_trials or facts.influence == 0 or correction_ends(best, gates.margin)
+    if not over:
+        aim = correction_aim(best, facts.influence)
+        goal, saturated, residual = _goal(gates, _without_error(gates, best.place), aim)
+        if _distance(goal, best.place) > gates.tuning_near:
+            # Where friction keeps the masses far off, the aim goes beyond the imbalance to pull them free.
+            if not far:
+                now = with_findings(now, with_targets(now.findings, saturated, residual))
+            return _set_out(now, correction_step(best, aim, goal), facts)
+    if best.residual != mean and not enough:
+        return _set_out(now, correction_back(best), facts)
+    return _decided(gates, _judged(now, abs(mean)), facts)
+
+
+@compiled
+def _set_out(plan: Plan, correction: Correction, facts: Facts) -> Plan:
+    """Begin the move of a correction."""
+    return enter(with_correction(plan, correction), CORRECTION, facts.time, NONE, correction.goal)
+
+
+@compiled
+def _decided(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """After the last correction: content with this place, or what is left to do from here."""
+    if plan.findings.objective <= gates.limit:
+        return with_hold(enter(plan, REST, facts.time, BALANCED, plan.goal), plan.hold)
+    if plan.findings.saturated:
+        return with_hold(enter(plan, REST, facts.time, SATURATED, plan.goal), plan.hold)
+    if plan.findings.short > gates.arrival_angle:
+        return enter(plan, FAILED, facts.time, NOT_ARRIVED, facts.angle)
+    first = tuning_start(plan.goal[0], plan.goal[1], plan.findings.objective, gates.tuning_step)
+    return _try(gates, enter(plan, FINE_TUNING, facts.time, NONE, plan.goal), first, facts)
+
+
+@compiled
+def _cut_short(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """The speed has changed during a check or a correction: the best place so far is kept."""
+    content = abs(plan.correction.residual) <= gates.limit
+    cause = BALANCED if content else SPEED_CHANGED
+    return enter(plan, REST, facts.time, cause, plan.correction.place)
+
+
+@compiled
+def _correction(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Until the masses are at the corrected targets, or where friction leaves them."""
+    if not facts.constant:
+        return _cut_short(gates, plan, facts)
+    now = _arriving(gates, plan, facts, gates.tuning_near)
+    return enter(now, CHECK, facts.time, NONE, now.goal) if _over(gates, now, facts) else now
 
 
 @compiled
 def _fine_tuning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     if not facts.constant:
-        return _enter(plan, REST, facts.time, SPEED_CHANGED, plan.tuning.base)
+        return enter(plan, REST, facts.time, SPEED_CHANGED, plan.tuning.base)
     if facts.time - plan.entered >= gates.fine_tuning_time:
-        return _enter(plan, REST, facts.time, TUNING_TIME, plan.tuning.base)
+        return enter(plan, REST, facts.time, TUNING_TIME, plan.tuning.base)
     if plan.progress.averaging == NOT_YET:
         return _moving(gates, plan, facts)
     now = _sampled(plan, facts)
@@ -182,7 +275,7 @@ def _fine_tuning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     tuning = tuning_next(now.tuning, _mean(now), gates.margin, gates.tuning_stop)
     told = _judged(now, tuning.best)
     if tuning.best <= gates.limit:
-        return _enter(told, REST, facts.time, BALANCED, tuning.base)
+        return enter(told, REST, facts.time, BALANCED, tuning.base)
     return _try(gates, told, tuning, facts)
 
 
@@ -190,10 +283,9 @@ def _fine_tuning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
 def _moving(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """A trial counts from where friction leaves the masses, even if not quite where they should be."""
     now = _arriving(gates, plan, facts, max(0.1 * plan.tuning.step, gates.tuning_near))
-    late = facts.time - now.progress.moving >= gates.move_time
-    if not late and not _there(gates, now, facts):
+    if not _over(gates, now, facts):
         return now
-    return _with_progress(now, _averaging_from(now.progress, facts.time + gates.wait))
+    return with_progress(now, averaging_from(now.progress, facts.time + gates.wait))
 
 
 @compiled
@@ -205,8 +297,8 @@ def _try(gates: Gates, plan: Plan, tuning: Tuning, facts: Facts) -> Plan:
         chosen = tuning_next(chosen, math.inf, gates.margin, gates.tuning_stop)
         place = tuning_place(chosen)
     if chosen.done:
-        return _enter(plan, REST, facts.time, RESIDUAL, chosen.base)
-    return _with_trial(plan, facts.time, chosen, place)
+        return enter(plan, REST, facts.time, RESIDUAL, chosen.base)
+    return with_trial(plan, facts.time, chosen, place)
 
 
 @compiled
@@ -214,14 +306,22 @@ def _rest(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """Bring the masses home; then the drives rest while friction holds for sure, or hold from then on."""
     now = _arriving(gates, plan, facts, gates.tuning_near)
     hold = now.hold
-    if hold == MOVING and (_there(gates, now, facts) or facts.time - now.progress.moving >= gates.move_time):
-        hold = RELEASED
+    if hold == MOVING and _over(gates, now, facts):
+        hold, now = RELEASED, _left_there(gates, now, facts)
     astray = False
     for i in range(2):
         astray = astray or abs(facts.angle[i] - now.goal[i]) > 2 * gates.arrival_angle
     if hold == RELEASED and (astray or facts.load > _HOLDS_FOR_SURE):
         hold = HELD
-    return _with_hold(now, hold)
+    return with_hold(now, hold)
+
+
+@compiled
+def _left_there(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+    """Where friction has the masses is their place from now on, if that is far short of their goal."""
+    short = _distance(facts.angle, plan.goal)
+    now = with_findings(plan, with_short(plan.findings, short))
+    return with_goal(now, facts.angle) if short > gates.arrival_angle else now
 
 
 @compiled
@@ -231,7 +331,10 @@ def _arriving(gates: Gates, plan: Plan, facts: Facts, closeness: float) -> Plan:
         close = abs(facts.angle[i] - plan.goal[i]) <= closeness
         there = there and close and abs(facts.rate[i]) <= gates.arrival_rate
     since = facts.time if plan.progress.arrived == NOT_YET else plan.progress.arrived
-    return _with_progress(plan, _with_arrival(plan.progress, since if there else NOT_YET))
+    now = with_arrival(plan.progress, since if there else NOT_YET)
+    distance = _distance(facts.angle, plan.goal)
+    nearer = distance < now.nearest - gates.noticeable
+    return with_progress(plan, with_nearest(now, distance, facts.time) if nearer else now)
 
 
 @compiled
@@ -240,11 +343,37 @@ def _there(gates: Gates, plan: Plan, facts: Facts) -> bool:
 
 
 @compiled
+def _held(gates: Gates, plan: Plan, facts: Facts) -> bool:
+    """Whether friction holds the masses: slow, and for a while no nearer to their goal."""
+    slow = max(abs(facts.rate[0]), abs(facts.rate[1])) <= gates.arrival_rate
+    return slow and facts.time - plan.progress.nearer >= _STILL_TIME
+
+
+@compiled
+def _over(gates: Gates, plan: Plan, facts: Facts) -> bool:
+    """Whether a move has come to its end, at its goal or short of it."""
+    late = facts.time - plan.progress.moving >= gates.move_time
+    return late or _there(gates, plan, facts) or _held(gates, plan, facts)
+
+
+@compiled
+def _distance(one: Pair, other: Pair) -> float:
+    """Larger distance of both masses between two places, rad."""
+    return max(abs(one[0] - other[0]), abs(one[1] - other[1]))
+
+
+@compiled
+def _without_error(gates: Gates, place: Pair) -> Pair:
+    """Targets of a goal, without the error that the scene adds to them, rad."""
+    return place[0] - gates.target_error[0], place[1] - gates.target_error[1]
+
+
+@compiled
 def _sampled(plan: Plan, facts: Facts) -> Plan:
     """The mean is of the rotor-fixed vector: noise averages out of it, but not out of amplitudes."""
     if facts.time < plan.progress.averaging:
         return plan
-    return _with_progress(plan, _with_sample(plan.progress, facts.position))
+    return with_progress(plan, with_sample(plan.progress, facts.position))
 
 
 @compiled
@@ -259,81 +388,4 @@ def _mean(plan: Plan) -> float:
 
 @compiled
 def _judged(plan: Plan, objective: float) -> Plan:
-    return _with_findings(plan, _with_objective(plan.findings, objective))
-
-
-# Numba builds tuples by position alone: each is rebuilt here and nowhere else.
-
-
-@compiled
-def _enter(plan: Plan, stage: int, time: float, cause: int, goal: Pair) -> Plan:
-    """Begin a stage. Returns: The plan, with its tuning and findings."""
-    return Plan(stage, time, cause, goal, MOVING, _setting_out(time), plan.tuning, plan.findings)
-
-
-@compiled
-def _with_progress(plan: Plan, progress: Progress) -> Plan:
-    """The plan, farther on in its move or its mean."""
-    return Plan(
-        plan.stage, plan.entered, plan.cause, plan.goal, plan.hold, progress, plan.tuning, plan.findings
-    )
-
-
-@compiled
-def _with_findings(plan: Plan, findings: Findings) -> Plan:
-    """The plan with what a stage leaves behind."""
-    return Plan(
-        plan.stage, plan.entered, plan.cause, plan.goal, plan.hold, plan.progress, plan.tuning, findings
-    )
-
-
-@compiled
-def _with_hold(plan: Plan, hold: int) -> Plan:
-    """The plan with its drives moving, released or holding."""
-    return Plan(
-        plan.stage, plan.entered, plan.cause, plan.goal, hold, plan.progress, plan.tuning, plan.findings
-    )
-
-
-@compiled
-def _with_trial(plan: Plan, time: float, tuning: Tuning, goal: Pair) -> Plan:
-    """The plan that sets out to a trial of fine tuning."""
-    return Plan(plan.stage, plan.entered, plan.cause, goal, MOVING, _setting_out(time), tuning, plan.findings)
-
-
-@compiled
-def _averaging_from(progress: Progress, begins: float) -> Progress:
-    """Progress that begins its mean at a time, s."""
-    return Progress(progress.moving, progress.arrived, begins, 0.0j, 0)
-
-
-@compiled
-def _with_arrival(progress: Progress, arrived: float) -> Progress:
-    """Progress with the time of arrival, s; NOT_YET."""
-    return Progress(progress.moving, arrived, progress.averaging, progress.total, progress.samples)
-
-
-@compiled
-def _with_sample(progress: Progress, position: complex) -> Progress:
-    """Progress with one sample more in its mean."""
-    total, samples = progress.total + position, progress.samples + 1
-    return Progress(progress.moving, progress.arrived, progress.averaging, total, samples)
-
-
-@compiled
-def _with_stall(findings: Findings, stalled: bool) -> Findings:
-    """Findings with one sample more of the friction stage."""
-    more = findings.stalled + (1 if stalled else 0)
-    return Findings(findings.saturated, findings.residual, findings.objective, findings.driven + 1, more)
-
-
-@compiled
-def _with_targets(findings: Findings, saturated: bool, residual: float) -> Findings:
-    """Findings with what the targets leave, kg m."""
-    return Findings(saturated, residual, findings.objective, findings.driven, findings.stalled)
-
-
-@compiled
-def _with_objective(findings: Findings, objective: float) -> Findings:
-    """Findings with the mean amplitude at the present place, m."""
-    return Findings(findings.saturated, findings.residual, objective, findings.driven, findings.stalled)
+    return with_findings(plan, with_objective(plan.findings, objective))

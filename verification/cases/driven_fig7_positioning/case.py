@@ -71,9 +71,10 @@ class BalancingFigure:
 
     @classmethod
     def eight(cls, scene: EccentricScene, *, time_limit: float = 400.0) -> BalancingFigure:
-        """The same with masses that stop 10 degrees beside their targets, then fine tuning: Fig. 8."""
+        """The same with masses that stop 10 degrees beside their targets, then trials alone: Fig. 8."""
         level = at_constant_speed(scene, time_limit=time_limit)
-        return _balanced(changed(level, "supervisor", target_error=(_PAPER_ERROR, _PAPER_ERROR)))
+        error = (_PAPER_ERROR, _PAPER_ERROR)
+        return _balanced(changed(level, "supervisor", target_error=error, correction="trials"))
 
     def amplitudes(self, *, until: float = math.inf) -> Series:
         """Amplitude over time of every run."""

@@ -45,6 +45,8 @@ TUBE_INPUTS: Final = (
 _CREEPING: Final = 0.2
 _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
+_LARGEST_ERROR: Final = 0.5
+"""Of k, by one cause."""
 DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of what development adds, over rotation's extra friction on one developing length.
 
@@ -112,21 +114,28 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     e(Re) = (U/1.96) (n cos ln Re + m sin ln Re) of each cause, n and m its two parts: a random function of
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
     a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
-    measured smooth tubes have.
+    measured smooth tubes have.  U of one cause counts for half of k at most: a simpler model may be off by far
+    more at velocities that the scene never has, and no error makes a loss a gain.
     """
     if not tube.models.errors:
         return state
     parts, terms, bends = model_parts(tube=tube, state=state), dict(state.terms), state.bends
+    angle = np.log(state.reynolds)
     for cause, even, odd in tube.models.errors:
         if cause not in parts:
             continue
-        angle = np.log(state.reynolds)
-        error = parts[cause] / NORMAL_95 * (even * np.cos(angle) + odd * np.sin(angle))
+        width = _limited(parts[cause], _LARGEST_ERROR * state.k)
+        error = width / NORMAL_95 * (even * np.cos(angle) + odd * np.sin(angle))
         term = "decree" if "decree" in terms else MODEL_CAUSES[cause]
         if term == "bends":
             bends = tuple(k * (1 + error / terms[term]) for k in bends)
         terms[term] = terms[term] + error
     return replace(state, terms=terms, bends=bends)
+
+
+def _limited(width: FloatArray, largest: FloatArray) -> FloatArray:
+    """A half-width that stays below another one, and is unchanged while it is small against that."""
+    return np.asarray(width * (1 + (width / largest) ** 4) ** -0.25)
 
 
 def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:

@@ -1,15 +1,15 @@
 """How much of what a file measured the fit explains, and how much it calls noise.
 
-An estimated noise takes whatever the prediction leaves over, so that a prediction which has nothing to do with
-the data leaves residuals without any pattern.  The share explained of a file is
+An estimated noise takes whatever the prediction leaves over, so that one which has nothing to do with the
+data leaves residuals without any pattern.  The share explained of a file is
 
     1 - (|e|^2/(n - h))/(|P y|^2/(n - m)),
 
 y what was measured, e the residuals, h what parameters and held inputs take up of the n numbers, P the
-projection off the m columns of the null hypothesis "no effect": one mean, and unknowns that are no parameters.
-Below a half the noise is larger than the effect.  The file fails then, unless the noise is stated (the size of
-the residuals is tested against it) or twice as large as the effect that the scene predicts: of repetitions of
-one measurement, or of too weak ones, no share is to be expected.
+projection off the m columns of the null hypothesis "no effect": a mean, and unknowns that are no parameters.
+Below a half the noise is larger than the effect.  The file fails then, unless the noise is stated (the size
+of the residuals is tested against it) or twice as large as the effect that the scene predicts: of repetitions
+of one measurement, or of too weak ones, no share is to be expected.
 Source: adjusted coefficient of determination.
 """
 

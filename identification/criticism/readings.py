@@ -9,10 +9,10 @@ restricted to what parameters, held inputs and free unknowns leave (A their slop
 estimated anew, y' what was measured as the other reading has it.  The other reading is fitted linearly from
 the scene, so that it loses a little by curvature; the given one from its optimum.  Both know that lambda
 follows from the geometry: without that, peak to peak in one file is a lambda of two.
-A reading is named from a factor of `DECISIVE` on: with some thirty readings and one file in a hundred that is
+A reading is named from a gain of `DECISIVE` on: with some thirty readings, and one file in a hundred that is
 read wrongly, odds of a hundred to one are left for it.
-Source: restricted likelihood, Harville, J. Am. Stat. Assoc. 72 (1977) 320; slopes of held inputs in proportion
-to the prediction are ours.
+Source: restricted likelihood, Harville, J. Am. Stat. Assoc. 72 (1977) 320; slopes of held inputs in
+proportion to the prediction are ours.
 """
 
 from __future__ import annotations
@@ -155,7 +155,8 @@ class _Comparison:
             np.concatenate([r.block.whiten @ r.slopes for r in rows]),
             np.concatenate([r.block.whiten @ r.held for r in rows]),
         ).deviance()
-        return (self.given - found) / 2 + jacobian
+        gain = (self.given - found) / 2 + jacobian
+        return gain if math.isfinite(gain) else None
 
     def _changed(self, kind: _Kind, rows: _Rows) -> _Rows | None:
         problem = self.problem
@@ -322,9 +323,7 @@ def _lettered(observations: Observations, scene: Scene | None) -> Observations |
 def _amplitudes(factor: float) -> Change:
     def change(observations: Observations, _: Scene | None) -> Observations | None:
         columns = {n: factor * v for n, v in observations.columns.items() if n.startswith("amplitude")}
-        widths = {
-            n: factor * v if n in columns else v for n, v in observations.uncertainty.items()
-        }
+        widths = {n: factor * v if n in columns else v for n, v in observations.uncertainty.items()}
         return replace(_with(observations, **columns), uncertainty=widths) if columns else None
 
     return change
@@ -360,9 +359,7 @@ _KINDS: Final[Mapping[str, _Kind]] = {
     "weights_turned": _Kind(
         words="angles of the trial weights against the rotation", change=_turned("angle"), settings=True
     ),
-    "chambers_turned": _Kind(
-        words="chambers lettered against the rotation", change=_lettered, settings=True
-    ),
+    "chambers_turned": _Kind(words="chambers lettered against the rotation", change=_lettered, settings=True),
     "amplitudes_halved": _Kind(
         words="amplitudes half as large, such as peak to peak stated as zero to peak",
         change=_amplitudes(0.5),

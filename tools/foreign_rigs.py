@@ -248,29 +248,35 @@ def _gas_time(designed: Device, random: np.random.Generator) -> float:
 
 
 def _transfers(designed: Device, device: Device, random: np.random.Generator) -> str:
-    rows, noise = [], random.uniform(0.005, 0.02)
+    settings, masses = [], []
     for _ in range(8):
-        fill, gauge = (
-            round(random.uniform(0.2, 0.42), 3),
-            round(designed.pressure * random.uniform(1, 1.2), -3),
-        )
+        fill = round(random.uniform(0.2, 0.42), 3)
+        gauge = round(designed.pressure * random.uniform(1, 1.2), -3)
         time = _gas_time(designed, random)
-        mass = device.density * device.volume * injected(device, fill, gauge, time)
-        seen = 1e3 * mass * (1 + noise * random.standard_normal())
-        rows.append(f"{fill},{1e-6 * gauge:.4f},{1e3 * time:.1f},{seen:.2f}")
-    return _text("transfer", "fill_ratio,pressure [MPa],gas_time [ms],mass [g]", rows)
+        settings.append(f"{fill},{1e-6 * gauge:.4f},{1e3 * time:.1f}")
+        masses.append(1e3 * device.density * device.volume * injected(device, fill, gauge, time))
+    head = "fill_ratio,pressure [MPa],gas_time [ms],mass [g]"
+    return _text("transfer", head, _shown(settings, masses, random))
 
 
 def _flows(_: Device, device: Device, random: np.random.Generator) -> str:
     """Between two reservoirs at rest."""
-    still, rows, noise = replace(device, speed=0.0), [], random.uniform(0.005, 0.02)
-    for pressure in np.geomspace(3e4, 6e5, 8):
+    still = replace(device, speed=0.0)
+    settings, rates = [], []
+    for pressure in np.geomspace(3e4, 6e5, 8).tolist():
         u = 1.0
         for _round in range(60):
             u = (u + math.sqrt(2 * pressure / device.density / still.loss(u))) / 2
-        seen = 1e6 * u * device.area * (1 + noise * random.standard_normal())
-        rows.append(f"{1e-3 * pressure:.2f},{seen:.2f}")
-    return _text("flow", "pressure_difference [kPa],flow_rate [ml/s]", rows)
+        settings.append(f"{1e-3 * pressure:.2f}")
+        rates.append(1e6 * u * device.area)
+    return _text("flow", "pressure_difference [kPa],flow_rate [ml/s]", _shown(settings, rates, random))
+
+
+def _shown(settings: Sequence[str], values: Sequence[float], random: np.random.Generator) -> list[str]:
+    """Rows with what an instrument shows, whose noise is the same over its range."""
+    noise = random.uniform(0.005, 0.02) * math.sqrt(np.mean(np.square(values)))
+    seen = np.asarray(values) + noise * random.standard_normal(len(values))
+    return [f"{row},{value:.2f}" for row, value in zip(settings, seen.tolist(), strict=True)]
 
 
 _RECORDS: Final = {

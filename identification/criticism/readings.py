@@ -87,7 +87,7 @@ def other_readings(best: Optimum) -> tuple[Reading, ...]:
         key=lambda each: -each[0],
     )
     return tuple(
-        _reading(compare.problem, code, chosen, gain, named=place == 0 and gain >= DECISIVE)
+        _reading(compare.problem, code, chosen, gain, named=bool(place == 0 and gain >= DECISIVE))
         for place, (gain, code, chosen) in enumerate(gains)
     )
 
@@ -95,7 +95,8 @@ def other_readings(best: Optimum) -> tuple[Reading, ...]:
 def _reading(problem: Problem, code: str, chosen: Sequence[int], gain: float, *, named: bool) -> Reading:
     files = tuple(problem.blocks[i].observations.file for i in chosen)
     names = " and ".join(Path(file).name for file in files)
-    text = f"{names}: {_KINDS[code].words} would fit decisively better (log likelihood higher by {gain:.3g})"
+    verdict = "would fit decisively better: " if named else ""
+    text = f"{names}: {_KINDS[code].words} {verdict}({gain:+.3g} of the log likelihood)"
     return Reading(code=code, files=files, gain=gain, named=named, text=text)
 
 

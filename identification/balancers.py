@@ -15,7 +15,7 @@ from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
-from ringbalance.physics.tube.uncertainty import MODEL_CAUSES
+from ringbalance.physics.tube.uncertainty import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
@@ -39,17 +39,19 @@ _OF_FLOW: Final = {
 }
 _OF_LOSS: Final = {
     f"model: {cause}, {part}": (cause, even, 1.0 - even)
-    for cause in MODEL_CAUSES
+    for cause in (*MODEL_CAUSES, *BUILT_CAUSES)
     for part, even in (("even", 1.0), ("odd", 0.0))
 }
 MODEL_ERRORS: Final = {**_OF_FLOW, **_OF_LOSS}
 """One standard deviation of each error of a scene's models, by name: inputs of a fit, held and uncertain.
 
-Each cause of k's uncertainty is a random function of Re, of two parts (`with_errors`).  What clears the crest
-and the pressure of the cavity there are known within the spans of `reduced_model.tube.regime`.  The start of
-the flow has no measurements to compare with: the column's inertia, a valve that does not open as fast as it
-closes, and to which side liquid runs that stands on the crest when the gas is shut, up to half of the tube.
-The time L/2u in which the flow passes that half is taken for their expanded uncertainty (95 %).
+Each cause of k's uncertainty is a random function of Re, of two parts (`with_errors`): those of the
+correlations, and those of a tube as it was built, which give the shape of k(u) freedom of its own. What
+clears the crest and the pressure of the cavity there are known within the spans of
+`reduced_model.tube.regime`. The start of the flow has no measurements to compare with: the column's inertia,
+a valve that does not open as fast as it closes, and to which side liquid runs that stands on the crest when
+the gas is shut, up to half of the tube. The time L/2u in which the flow passes that half is taken for their
+expanded uncertainty (95 %).
 """
 
 

@@ -75,10 +75,13 @@ def _criticism(told: Review) -> dict[str, Any]:
         for each in told.laws
     ]
     return {
-        "describes": told.criticism.describes,
-        "text": told.criticism.text,
+        "describes": told.describes,
+        "text": told.text,
         "findings": findings,
         "laws": laws,
+        "explained": [asdict(each) for each in told.explained],
+        "readings": [asdict(each) for each in told.readings],
+        "ranges": [asdict(each) for each in told.ranges],
     }
 
 
@@ -161,7 +164,7 @@ def fit_view(
 
 
 def _review(told: Review) -> Iterator[Text]:
-    yield Text(_sentence(told.criticism.text), "" if told.criticism.describes else "bold red")
+    yield Text(_sentence(told.text), "" if told.describes else "bold red")
     for outcome, text in summaries(told.laws):
         yield Text(_sentence(text), "yellow" if outcome == "other" else "")
 

@@ -11,8 +11,11 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.identification.criticism.explained import Explained, shares_explained
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.patterns import Criticism, LinearFit
+from ringbalance.identification.criticism.ranges import OutOfRange, out_of_range
+from ringbalance.identification.criticism.readings import Reading, other_readings
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.likelihood import Block, Problem
@@ -54,24 +57,55 @@ class Review:
     criticism: Criticism
     laws: tuple[LawComparison, ...]
     """The fitted law against others; empty where no data depend on one."""
+    explained: tuple[Explained, ...] = ()
+    """Of each file, what the fit explains of it."""
+    readings: tuple[Reading, ...] = ()
+    """Other readings of the files, the likeliest first."""
+    ranges: tuple[OutOfRange, ...] = ()
+    """Columns far from what the scene has."""
+
+    @property
+    def _read_wrongly(self) -> tuple[str, ...]:
+        """What speaks against the files as they stand, each in one sentence."""
+        named = [each.text for each in self.readings if each.named]
+        unexplained = [each.text for each in self.explained if each.fails]
+        return (*named, *unexplained, *(each.text for each in self.ranges))
+
+    @property
+    def describes(self) -> bool:
+        """Whether the fit describes the data, as they are read."""
+        return self.criticism.describes and not self._read_wrongly
 
     @property
     def holds(self) -> bool:
         """Whether the fit describes the data, and no other law does so better."""
-        return self.criticism.describes and all(each.outcome != "other" for each in self.laws)
+        return self.describes and all(each.outcome != "other" for each in self.laws)
+
+    @property
+    def text(self) -> str:
+        """The verdict on the fit; residuals without a pattern say nothing of data that are read wrongly."""
+        if not self._read_wrongly:
+            return self.criticism.text
+        patterns = [] if self.criticism.describes else [self.criticism.text]
+        return "the fit does not describe the data as they are read: " + "; ".join(
+            [*self._read_wrongly, *patterns]
+        )
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """All that is to be said, the verdict on the fit first."""
-        return (self.criticism.text, *(each.text for each in self.laws))
+        return (self.text, *(each.text for each in self.laws))
 
     @classmethod
     def of(cls, result: FitResult) -> Review:
-        """Test the residuals of a fit and compare its law with others."""
-        found = _at_solution(result)
+        """Test the residuals of a fit, read its data otherwise, and compare its law with others."""
+        found, best = _at_solution(result), result.optimum
         return cls(
             criticism=Criticism.of(found.fit, found.covariates),
             laws=tuple(_comparisons(result, found)),
+            explained=shares_explained(best),
+            readings=other_readings(best),
+            ranges=out_of_range(best.residuals.problem),
         )
 
 

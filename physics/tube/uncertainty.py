@@ -32,6 +32,20 @@ MODEL_CAUSES: Final[Mapping[str, str]] = {
     SIMPLER: "extra",
 }
 """Causes of `model_parts`, each with the term of k that its error changes."""
+BUILT_CAUSES: Final[Mapping[str, tuple[str, float]]] = {
+    "friction as built": ("friction", 0.04),
+    "rotation as built": ("rotation", 0.4),
+    "entrance as built": ("entrance", 0.2),
+    "bends as built": ("bends", 0.4),
+}
+"""Of a tube as it was built: the term that differs from the correlation's, and by what share of it (95 %).
+
+Correlations are for straight round tubes and clean edges.  A tube that follows the circle of the crest has a
+secondary flow of its own, not small against that of rotation; a bore out of round changes f by some percent;
+an edge broken by 2 % of the bore takes a fifth off K; handbooks give K of one bend with a spread of half of
+it. For parameters that are fitted to a tube that was built; the uncertainty of k for a design has none of
+them.
+"""
 TUBE_INPUTS: Final = (
     "bore",
     "length",
@@ -42,9 +56,12 @@ TUBE_INPUTS: Final = (
     "speed",
 )
 """Quantities of a scene that k depends on."""
+_BUILT_TERMS: Final = {cause: term for cause, (term, _) in BUILT_CAUSES.items()}
 _CREEPING: Final = 0.2
 _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
+_LARGEST_ERROR: Final = 0.5
+"""Of k, by one cause."""
 DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of what development adds, over rotation's extra friction on one developing length.
 
@@ -112,21 +129,38 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     e(Re) = (U/1.96) (n cos ln Re + m sin ln Re) of each cause, n and m its two parts: a random function of
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
     a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
-    measured smooth tubes have.
+    measured smooth tubes have.  U of one cause counts for half of k at most: a simpler model may be off by
+    far more at velocities that the scene never has, and no error makes a loss a gain.
     """
     if not tube.models.errors:
         return state
-    parts, terms, bends = model_parts(tube=tube, state=state), dict(state.terms), state.bends
+    parts, terms, bends = _all_parts(tube, state), dict(state.terms), state.bends
+    angle = np.log(state.reynolds)
     for cause, even, odd in tube.models.errors:
         if cause not in parts:
             continue
-        angle = np.log(state.reynolds)
-        error = parts[cause] / NORMAL_95 * (even * np.cos(angle) + odd * np.sin(angle))
-        term = "decree" if "decree" in terms else MODEL_CAUSES[cause]
+        width = _limited(parts[cause], _LARGEST_ERROR * state.k)
+        error = width / NORMAL_95 * (even * np.cos(angle) + odd * np.sin(angle))
+        term = "decree" if "decree" in terms else (MODEL_CAUSES | _BUILT_TERMS)[cause]
         if term == "bends":
             bends = tuple(k * (1 + error / terms[term]) for k in bends)
         terms[term] = terms[term] + error
     return replace(state, terms=terms, bends=bends)
+
+
+def _all_parts(tube: Tube, state: TubeState) -> Mapping[str, FloatArray]:
+    """Half-widths of k by its models, and by what differs in a tube that was built."""
+    built = {
+        cause: share * np.abs(state.terms[term])
+        for cause, (term, share) in BUILT_CAUSES.items()
+        if term in state.terms
+    }
+    return model_parts(tube=tube, state=state) | built
+
+
+def _limited(width: FloatArray, largest: FloatArray) -> FloatArray:
+    """A half-width that stays below another one, and is unchanged while it is small against that."""
+    return np.asarray(width * (1 + (width / largest) ** 4) ** -0.25)
 
 
 def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:

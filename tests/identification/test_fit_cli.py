@@ -308,7 +308,7 @@ def test_a_wrong_convention_of_amplitudes_shows_in_lambda(run: Run, tmp_path: Pa
     wrong.write_text(head + "series\n" + "\n".join(doubled) + "\n", encoding="utf-8")
     words = ("--parameters", "lambda_factor", "--save", target)
     code, out, err = run(PAPER, wrong, *words)
-    assert code == 0, err
+    assert code == 1, err
     assert "lambda_factor: lambda follows from the geometry" in " ".join(out.split())
     assert any(each.about == "value" for each in load_scene(target).measured.findings)
     code, out, err = run(PAPER, EXAMPLES["injection"], *words)

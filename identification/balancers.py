@@ -17,6 +17,7 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import MODEL_CAUSES
 from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene
+from ringbalance.scene.joint import with_model_error
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
@@ -189,11 +190,3 @@ def _eccentric_shifted(scene: EccentricScene, name: str, change: float) -> Eccen
 def model_errors(scene: Scene) -> tuple[str, ...]:
     """Names of those that a scene has: a prescribed k has no model."""
     return tuple(MODEL_ERRORS if scene.tube.drag_coefficient is None else _OF_FLOW)
-
-
-def with_model_error(scene: Scene, name: str, change: float) -> Scene:
-    """The scene with one error of its models larger. Args: `change`: in standard deviations."""
-    cause, even, odd = MODEL_ERRORS[name]
-    models = scene.tube.models
-    errors = (*models.errors, (cause, change * even, change * odd))
-    return replace(scene, tube=replace(scene.tube, models=replace(models, errors=errors)))

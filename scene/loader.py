@@ -23,6 +23,7 @@ from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import ShownOrigin
 from ringbalance.scene.rules import shape, working
 from ringbalance.scene.rules.check import failed_checks
+from ringbalance.scene.rules.fitted import fitted_faults
 
 _LARGEST_FILE = 2**20
 _DECIDE_NOTHING = ("requirement.", "measured.", "rotor.mass", "liquid.source")
@@ -56,7 +57,7 @@ def scene_from(*, content: bytes, file: str) -> AnyScene:
     document = _document(content, file)
     read = _read_liquid_ring if _kind(document) == "liquid_ring" else _read_eccentric_mass
     reading, found = read(document, file=file)
-    found = (*found, *_origin_faults(reading, found))
+    found = (*found, *_origin_faults(reading, found), *fitted_faults(reading))
     if found:
         raise SceneError(_sorted(found, reading.schema))
     parts: dict[str, Any] = {

@@ -80,6 +80,10 @@ class CalibratedLaw:
     gas_factor: float = 1.0
     """Gas pressure on the liquid over the one at the place of measurement, which all arguments are."""
 
+    variants: tuple[CalibratedLaw, ...] = ()
+    """Laws without uncertainties of a device that is lower, then higher, by the expanded uncertainty (95 %)
+    along each direction of the inputs that were fitted together; `inputs` and the rest have the others."""
+
     @property
     def density(self) -> float:
         return self.path.density
@@ -145,13 +149,15 @@ class CalibratedLaw:
         )
 
     def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:
-        return DirectedFlow.of(
+        flow = DirectedFlow.of(
             path=self.path,
             heads=self.heads,
             hump_head=self.heads.to_crest(reverse=reverse),
             inputs=self.inputs,
             drive=self.drive(asked, reverse=reverse),
         )
+        sides = [variant._directed(asked, reverse=reverse) for variant in self.variants]
+        return flow.widened(sides[::2], sides[1::2])
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)

@@ -98,11 +98,12 @@ def _values(scene: AnyScene) -> dict[str, float]:
 def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, AnyScene]:
     """The scene with one of these lower and higher by a change, SI, as far as a device can have it."""
     # Errors of models are nearly linear, and there are many of them.
-    low = scene if name in MODEL_ERRORS else _changed(scene, name, -change)
-    return low, _changed(scene, name, change)
+    low = scene if name in MODEL_ERRORS else changed(scene, name, -change)
+    return low, changed(scene, name, change)
 
 
-def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:
+def changed(scene: AnyScene, name: str, change: float) -> AnyScene:
+    """The scene with one uncertain quantity changed, SI, or an error of a model, in standard deviations."""
     if not isinstance(scene, Scene):
         return _eccentric_shifted(scene, name, change)
     if name in MODEL_ERRORS:
@@ -113,7 +114,7 @@ def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:
 def _nearby(scene: AnyScene, name: str) -> AnyScene:
     """The scene with one of its quantities a little lower, or a little above zero."""
     value = _values(scene)[name]
-    return _changed(scene, name, -_LITTLE * abs(value) if value else _LITTLE)
+    return changed(scene, name, -_LITTLE * abs(value) if value else _LITTLE)
 
 
 def _exact_for(scene: AnyScene, fitted: Sequence[str]) -> list[str]:

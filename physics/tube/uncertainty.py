@@ -163,7 +163,7 @@ def input_parts(scene: Scene, *, k_of: Callable[[Scene], FloatArray], k: FloatAr
     """Expanded uncertainties (95 %) of k by what the scene leaves uncertain.
 
     Args: `k_of`: k for the scene with another value.
-    Returns: Half-width of k by input, each the shape of `k`; "input: fitted" of all that were fitted together.
+    Returns: Half-width of k by input, each the shape of `k`; "input: fitted" of all fitted together.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity.
     """
     effects = {

@@ -238,7 +238,7 @@ def _crest_part(law: CalibratedLaw, point: OperatingPoint, state: DirectedState,
     crest = law.path.crest
     if crest is None or point.cavitation_margin is None or point.cavity_pressure is None:
         return 0.0
-    low, high = (float(bound) for bound in crest.cavity_bounds(state.ends))
+    low, high = (float(bound) for bound in crest.possible_cavity(state.ends))
     gas = max(float(crest.gas_pressure(state.ends)), high)
     pressure = point.hump_pressure or 0.0
     full = point.cavity_pressure + point.cavitation_margin
@@ -253,6 +253,7 @@ def _law_without_inputs(scene: Scene, calibration: _Calibrated) -> CalibratedLaw
         law,
         heads=law.heads.without_inputs(scene=scene, velocity=point.loss_velocity or 1.0),
         inputs=DriveUncertainty(),
+        variants=(),
         wall_pressure_uncertainty=chamber.wall_pressure.uncertainty_table(
             inputs=np.zeros_like(chamber.fill_ratio)
         ),

@@ -20,7 +20,7 @@ from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.joint import FITTED, direction_sides, independent_half_widths
+from ringbalance.scene.joint import FITTED, direction_sides, fitted_causes, independent_half_widths
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.uncertain import NORMAL_95
@@ -144,6 +144,7 @@ def tube_path(scene: Scene) -> TubePath:
     froude = 1 + CLEARING_UNCERTAINTY * error(CLEARING_ERROR) / NORMAL_95
     # With dissolved gas both ends of what the cavity's pressure may be are in its uncertainty.
     released = min(max(RELEASED * (1 + error(CAVITY_ERROR) / NORMAL_95), 0.0), 1.0)
+    fitted = fitted_causes(scene)
     return TubePath(
         density=scene.liquid.density,
         port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
@@ -152,6 +153,8 @@ def tube_path(scene: Scene) -> TubePath:
         vapour_pressure=scene.liquid.vapour_pressure - vented_pressure(scene),
         released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
         froude_velocity=froude * abs(scene.rotor.speed) * math.sqrt((hump or 0.0) * scene.tube.bore),
+        cavity_fitted=CAVITY_ERROR in fitted,
+        clearing_fitted=CLEARING_ERROR in fitted,
     )
 
 

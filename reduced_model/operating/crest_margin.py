@@ -51,7 +51,7 @@ class DirectedState:
         crest, head = law.path.crest, law.heads.to_crest(reverse=self.reverse)
         if crest is None or head is None:
             return None, None
-        driving, (low, high) = np.asarray(self.ends.driving_pressure()), crest.cavity_bounds(self.ends)
+        driving, (low, high) = np.asarray(self.ends.driving_pressure()), crest.possible_cavity(self.ends)
         margin, width = siphon_margin(
             path=law.path,
             heads=law.heads,

@@ -15,7 +15,6 @@ import numpy as np
 from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
 from ringbalance.reduced_model.tube.regime import (
-    CLEARING,
     ColumnFlow,
     SiphonCrest,
     Truth,
@@ -259,11 +258,11 @@ def _separation_margins(
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest separation margin that the cavity's pressure and the gas over the crest allow, Pa.
 
-    Args: `spill`: `ColumnFlow.spill_velocity`; within `CLEARING` the gas may be there or gone.
+    Args: `spill`: `ColumnFlow.spill_velocity`; between `clearing_velocities` the gas may be there or gone.
     """
-    low, high = crest.cavity_bounds(ends)
+    low, high = crest.possible_cavity(ends)
     gas = np.maximum(crest.gas_pressure(ends), high)
-    slowest, fastest = (number * crest.froude_velocity for number in CLEARING)
+    slowest, fastest = crest.clearing_velocities
     rest = crest.resting_pressure(ends)
     highest = np.where(~primed & (spill < fastest), gas, high)
     lowest = np.where(~primed & (spill < slowest), gas, low)

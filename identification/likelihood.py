@@ -284,10 +284,15 @@ class Residuals:
 
     def held_values(self, t: FloatArray) -> FloatArray:
         """Likeliest n of the held inputs at t, in their standard deviations."""
+        return self.linear_values(t)[1]
+
+    def linear_values(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Likeliest b and n at t."""
         left = self.scale * (self.problem.measured - self.problem.at(t))
         full = np.concatenate([left, -self.pulled])
         found = np.linalg.lstsq(self.linear, full, rcond=1e-10)[0]
-        return np.asarray(self.pulled + found[found.size - self.pulled.size :])
+        count = found.size - self.pulled.size
+        return found[:count], self.pulled + found[count:]
 
 
 def basis_of(columns: FloatArray) -> FloatArray:

@@ -48,6 +48,7 @@ def _figure(found: AgainstFit, place: int) -> Drawing:
         for part in np.unique(found.component).tolist():
             _points(axes, found, part, factor)
         axes.set(xlim=(low, high), ylim=(low, high))
+        axes.set_yticks([tick for tick in axes.get_xticks() if low <= tick <= high])
         axes.annotate(
             f"slope {slope}",
             (0.97, 0.05),

@@ -26,7 +26,7 @@ from ringbalance.scene.tube_models import LARGEST_ERROR
 from ringbalance.scene.uncertain import NORMAL_95
 
 _ROUNDS: Final = 4
-_CLOSE: Final = 0.02
+_CLOSE: Final = 0.1
 """Standard deviations of a measured number by which a prediction with all pulls may miss the linear one."""
 _UNKNOWN: Final = 0.5
 """Standard deviation, in t, at most of what nothing is known of: a scene states no interval beyond zero."""

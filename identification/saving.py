@@ -10,6 +10,7 @@ import os
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
+from itertools import combinations
 from pathlib import Path, PurePath
 from typing import Any, Final
 
@@ -30,6 +31,8 @@ from ringbalance.scene.uncertain import SHAPE
 
 _RISE_DIGITS: Final = 4
 _NO_UNIT: Final = "1"
+_TOGETHER: Final = 0.5
+"""Correlation from which two errors are said to go together."""
 _LONGEST: Final = 200
 """Characters of a finding, as of any text of a scene file."""
 _ANY_SIGN: Final = ("lag_angle", "phase")
@@ -67,6 +70,7 @@ def save_result(
         ),
         *(MeasuredFinding(about="value", text=_short(each)) for each in result.pulled),
         *(MeasuredFinding(about="combination", text=_combination(each)) for each in result.combinations),
+        *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
     ]
     fitted = [each for each in result.parameters if each.name not in START]
     together = joint_entries(result)
@@ -87,6 +91,14 @@ def _found_from(text: str, *, folder: Path, to: Path) -> str:
 
 def _combination(found: Combination) -> str:
     return f"the data identify {found.text} within {100 * found.relative_uncertainty:.2g} %"
+
+
+def _correlations(result: FitResult) -> Iterator[str]:
+    names = [each.name for each in result.parameters]
+    for i, j in combinations(range(len(names)), 2):
+        value = float(result.correlations[i, j])
+        if abs(value) > _TOGETHER:
+            yield f"the errors of {names[i]} and {names[j]} go together (correlation {value:.2f})"
 
 
 def _short(text: str) -> str:

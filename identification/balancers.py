@@ -17,6 +17,7 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene
+from ringbalance.scene.joint import with_model_error
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
@@ -99,11 +100,12 @@ def _values(scene: AnyScene) -> dict[str, float]:
 def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, AnyScene]:
     """The scene with one of these lower and higher by a change, SI, as far as a device can have it."""
     # Errors of models are nearly linear, and there are many of them.
-    low = scene if name in MODEL_ERRORS else _changed(scene, name, -change)
-    return low, _changed(scene, name, change)
+    low = scene if name in MODEL_ERRORS else changed(scene, name, -change)
+    return low, changed(scene, name, change)
 
 
-def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:
+def changed(scene: AnyScene, name: str, change: float) -> AnyScene:
+    """The scene with one uncertain quantity changed, SI, or an error of a model, in standard deviations."""
     if not isinstance(scene, Scene):
         return _eccentric_shifted(scene, name, change)
     if name in MODEL_ERRORS:
@@ -114,7 +116,7 @@ def _changed(scene: AnyScene, name: str, change: float) -> AnyScene:
 def _nearby(scene: AnyScene, name: str) -> AnyScene:
     """The scene with one of its quantities a little lower, or a little above zero."""
     value = _values(scene)[name]
-    return _changed(scene, name, -_LITTLE * abs(value) if value else _LITTLE)
+    return changed(scene, name, -_LITTLE * abs(value) if value else _LITTLE)
 
 
 def _exact_for(scene: AnyScene, fitted: Sequence[str]) -> list[str]:
@@ -191,11 +193,3 @@ def _eccentric_shifted(scene: EccentricScene, name: str, change: float) -> Eccen
 def model_errors(scene: Scene) -> tuple[str, ...]:
     """Names of those that a scene has: a prescribed k has no model."""
     return tuple(MODEL_ERRORS if scene.tube.drag_coefficient is None else _OF_FLOW)
-
-
-def with_model_error(scene: Scene, name: str, change: float) -> Scene:
-    """The scene with one error of its models larger. Args: `change`: in standard deviations."""
-    cause, even, odd = MODEL_ERRORS[name]
-    models = scene.tube.models
-    errors = (*models.errors, (cause, change * even, change * odd))
-    return replace(scene, tube=replace(scene.tube, models=replace(models, errors=errors)))

@@ -1,19 +1,20 @@
-"""The command `ringbalance fit`."""
+"""The work of the command `ringbalance fit`, which draws too: `reports.fit_cli`."""
 
 from __future__ import annotations
 
 import json as json_format
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.kinds import template as template_of
 from ringbalance.identification.data.reading import read_observations
 from ringbalance.identification.documents import fit_document, fit_view
 from ringbalance.identification.fitting import Loss, problem_of
 from ringbalance.identification.fitting import fit as fit_scene
 from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
+from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
 from ringbalance.scene.faults import SceneError, did_you_mean
 from ringbalance.scene.loader import read_scene
@@ -27,69 +28,48 @@ _USAGE = (
 )
 
 
-def fit(
-    scene: Path | None = None,
-    *data: Path,
-    parameters: str | None = None,
-    loss: Loss = "linear",
-    next: str | None = None,
-    save: Path | None = None,
-    json: bool = False,
-    template: str | None = None,
-) -> int:
-    """Fit parameters of a built disc to measurements, with intervals and what the data identify.
+@dataclass(frozen=True, kw_only=True)
+class FitRequest:
+    """What `ringbalance fit` is asked for, see `reports.fit_cli.fit`."""
 
-    Args:
-        scene: the scene file of the disc as it was designed.
-        data: files of measurements (docs/fit.md), one kind in each.
-        parameters: names with commas between, such as "bore,extra_loss"; default those that the kinds of data
-            tell most about.
-        loss: "soft_l1" counts outliers less, and says which rows they are.
-        next: the parameter for which to say what to measure next; default the one that the data identify
-            least.
-        save: also write the fitted scene to this file, for all other commands.
-        json: print one JSON document instead of tables.
-        template: print an empty file of measurements of this kind, with explanations, and do nothing else.
+    parameters: str | None
+    loss: Loss
+    next: str | None
+    save: Path | None
+    json: bool
 
-    Returns:
-        Exit code: 1 when the fit does not describe the data, or another law does so better.
 
-    Raises:
-        SceneError: a scene, a file of measurements or a parameter that cannot be used.
-        OSError: the fitted scene cannot be written.
-    """
-    if template is not None:
-        print(template_of(template), end="")
-        return DONE
+def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tuple[int, FitResult]:
+    """Fit, print and save. Returns: Exit code, and what was found. Raises: SceneError, OSError."""
     if scene is None or not data:
         raise _usage("command line", f"{'SCENE' if scene is None else 'DATA'} is missing")
-    if save is not None:
-        _keep_inputs(save, (scene, *data))
-        check_file(save)
+    if asked.save is not None:
+        keep_inputs(asked.save, (scene, *data))
+        check_file(asked.save)
     if scene.suffix.lower() == ".csv":
         raise _usage(str(scene), "this looks like a file of measurements, and the scene comes first")
     given, text = read_scene(scene)
     observations = read_observations(data, scene=given)
-    names = None if parameters is None else _names(parameters)
+    names = None if asked.parameters is None else _names(asked.parameters)
     try:
         fitted = [each.name for each in problem_of(given, observations, names).parameters]
-        chosen = _fitted_name(next, fitted)
+        chosen = _fitted_name(asked.next, fitted)
         with activity("fit", "several starts, profiles of the likelihood ..."):
-            result = fit_scene(given, data=observations, parameters=names, loss=loss)
+            result = fit_scene(given, data=observations, parameters=names, loss=asked.loss)
     except FitError as error:
         raise SceneError.of_file(given.file, str(error)) from error
     told, following = Review.of(result), next_measurement(result, chosen)
-    if json:
+    if asked.json:
         document = fit_document(result, data=observations, told=told, following=following)
         print(json_format.dumps(document, allow_nan=False))
     else:
         results_console().print(fit_view(result, data=observations, told=told, following=following))
-    if save is not None:
+    if asked.save is not None:
         save_result(
-            save, text=text, result=result, data=observations, folder=scene.parent, said=told.sentences
+            asked.save, text=text, result=result, data=observations, folder=scene.parent, said=told.sentences
         )
-        messages_console().print(f"fitted scene written to {save}", highlight=False, soft_wrap=True)
-    return DONE if told.holds else FAILED
+        messages_console().print(f"fitted scene written to {asked.save}", highlight=False, soft_wrap=True)
+    return (DONE if told.holds else FAILED), result
 
 
 def _fitted_name(name: str | None, fitted: Sequence[str]) -> str | None:
@@ -99,8 +79,8 @@ def _fitted_name(name: str | None, fitted: Sequence[str]) -> str | None:
     return name
 
 
-def _keep_inputs(save: Path, inputs: Sequence[Path]) -> None:
-    """Raises: SceneError: the fitted scene would take the place of what it was fitted from."""
+def keep_inputs(save: Path, inputs: Sequence[Path]) -> None:
+    """Raises: SceneError: a file that is written would take the place of one that is read."""
     for each in inputs:
         if save.exists() and each.exists() and save.samefile(each):
             problem = "the fitted scene would replace a file that is read here"

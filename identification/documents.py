@@ -13,6 +13,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.identification.against_fit import against_fit
 from ringbalance.identification.balancers import MODEL_ERRORS, exact_inputs
 from ringbalance.identification.criticism.law_comparison import summaries
 from ringbalance.identification.criticism.review import Review
@@ -41,6 +42,15 @@ def fit_document(
         "correlations": {"names": names, "matrix": result.correlations.tolist()},
         "noise": [_noise(each) for each in result.noise],
         "residuals": [_residuals(each) for each in result.residuals],
+        "data_over_fit": [
+            {
+                "kind": each.kind,
+                "column": each.column,
+                "slope": each.slope,
+                "slope_uncertainty": each.slope_uncertainty,
+            }
+            for each in against_fit(result)
+        ],
         "held": dict(result.held),
         "pulls": dict(result.pulls),
         "exact": exact_inputs(result),

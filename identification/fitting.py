@@ -12,6 +12,7 @@ from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
 from ringbalance.identification.intervals import Profile, covariance, profiles
+from ringbalance.identification.joint import about_pulls, joint_of, scene_as_fitted
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import FitError, Parameter
@@ -51,7 +52,7 @@ def fit(
     counts = np.linalg.norm(first.residuals.scale[:, None] * effects, axis=0) > _NO_EFFECT
     best = optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first)
     kept = {name: sd for (name, sd), one in zip(held.items(), counts, strict=True) if one}
-    return _result(best, kept, loss)
+    return _result(about_pulls(best, kept, scene=scene, loss=loss), kept, loss)
 
 
 def problem_of(
@@ -94,7 +95,8 @@ def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
         starts=best.starts,
         evaluations=problem.evaluations,
         log_likelihood=_log_likelihood(best),
-        scene=problem.scene_at(best.t),
+        scene=scene_as_fitted(best, held),
+        joint=joint_of(best, held),
         optimum=best,
     )
 

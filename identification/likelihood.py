@@ -3,13 +3,13 @@
 With y the measured numbers, f(t) their prediction, L L' the covariance that the data state (up to a factor
 s^2 for each group whose noise is estimated), the model is
 
-    y = f(t) + B b + J n + s L e,   e, n independent standard normal,
+    y = f(t) + B b + J (n - n0) + s L e,   e, n independent standard normal,
 
 b unknowns that are no parameters (the vibration without trial weight), n the uncertain inputs of the scene
-that are held, each in units of its standard deviation with effect J.  b and n are linear and eliminated by
-projection, so minus two log likelihood is, but for constants,
+that are held, each in units of its standard deviation, with effect J at n0, zero at first.  b and n are
+linear and eliminated by projection, so minus two log likelihood is, but for constants,
 
-    |(1 - Q Q') [L^-1 (y - f(t))/s; 0]|^2 + sum ((x - x0)/sigma_x)^2 + 2 sum ln s,
+    |(1 - Q Q') [L^-1 (y - f(t))/s; -n0]|^2 + sum ((x - x0)/sigma_x)^2 + 2 sum ln s,
 
 Q an orthonormal base of [[L^-1 B/s, L^-1 J/s], [0, 1]]; each prior counts once.
 Source: variable projection, Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
@@ -231,6 +231,8 @@ class Residuals:
     """L^-1 J, shape (n, held inputs)."""
     weights: FloatArray
     """Of a robust loss, on squares, shape (n,); ones without."""
+    pulled: FloatArray
+    """n at which the problem's scene and J stand, shape (held inputs,); zero where it is as stated."""
 
     @cached_property
     def scale(self) -> FloatArray:
@@ -257,13 +259,16 @@ class Residuals:
         """Of numbers of the data, without what b and n can take up, shape (n + held, ...)."""
         scaled = self.scale[:, None] * columns if columns.ndim == 2 else self.scale * columns
         below = np.zeros((self.held.shape[1], *columns.shape[1:]))
-        full = np.concatenate([scaled, below])
+        return self._without_linear(np.concatenate([scaled, below]))
+
+    def _without_linear(self, full: FloatArray) -> FloatArray:
         return np.asarray(full - self.base @ (self.base.T @ full))
 
     def at(self, t: FloatArray, *, predicted: FloatArray | None = None) -> FloatArray:
         """Residuals and priors."""
         found = self.problem.at(t) if predicted is None else predicted
-        return np.concatenate([self.projected(self.problem.measured - found), self.problem.priors(t)])
+        full = np.concatenate([self.scale * (self.problem.measured - found), -self.pulled])
+        return np.concatenate([self._without_linear(full), self.problem.priors(t)])
 
     def slopes(self, t: FloatArray, of_prediction: FloatArray) -> FloatArray:
         """d(residuals)/dt. Args: `of_prediction`: d(L^-1 f)/dt."""
@@ -279,11 +284,15 @@ class Residuals:
 
     def held_values(self, t: FloatArray) -> FloatArray:
         """Likeliest n of the held inputs at t, in their standard deviations."""
+        return self.linear_values(t)[1]
+
+    def linear_values(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Likeliest b and n at t."""
         left = self.scale * (self.problem.measured - self.problem.at(t))
-        count = self.held.shape[1]
-        full = np.concatenate([left, np.zeros(count)])
+        full = np.concatenate([left, -self.pulled])
         found = np.linalg.lstsq(self.linear, full, rcond=1e-10)[0]
-        return np.asarray(found[found.size - count :])
+        count = found.size - self.pulled.size
+        return found[:count], self.pulled + found[count:]
 
 
 def basis_of(columns: FloatArray) -> FloatArray:

@@ -97,7 +97,9 @@ def optimum(
     """
     noise = _first_noise(problem) if before is None else before.residuals.noise
     weights = np.ones(problem.measured.size) if before is None else before.residuals.weights
-    residuals = Residuals(problem=problem, noise=noise, held=held, weights=weights)
+    same = before is not None and before.residuals.held.shape == held.shape
+    pulled = before.residuals.pulled if before is not None and same else np.zeros(held.shape[1])
+    residuals = Residuals(problem=problem, noise=noise, held=held, weights=weights, pulled=pulled)
     t = _from_starts(residuals, starts) if before is None else before.t
     of_prediction = problem.slopes(t)
     for _ in range(_ROUNDS):

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
+
 from ringbalance.identification.identifiability import Combination, Verdict
 from ringbalance.identification.intervals import Profile
 from ringbalance.identification.optimisation import Optimum
@@ -74,8 +76,13 @@ class FittedParameter:
     @property
     def path(self) -> str:
         """Place in the scene, such as "tube.bore"."""
-        table = UNCERTAIN_QUANTITIES.get(self.name)
-        return self.name if table is None else f"{table}.{self.name}"
+        return path_of(self.name)
+
+
+def path_of(name: str) -> str:
+    """Place in the scene of what fits name "bore"; of eccentric masses the name is one."""
+    table = UNCERTAIN_QUANTITIES.get(name)
+    return name if table is None else f"{table}.{name}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +96,23 @@ class Noise:
     estimated: bool
     freedom: float | None
     """Degrees of freedom behind an estimate."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Joint:
+    """Normal distribution of fitted parameters and held inputs."""
+
+    names: tuple[str, ...]
+    """Of the parameters, then of the held inputs, as the fit names them."""
+    values: FloatArray
+    """SI; of an error of a model in its standard deviations."""
+    covariance: FloatArray
+    """Of these, shape (n, n)."""
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,7 +152,9 @@ class FitResult:
     log_likelihood: float
     """Of the data at the optimum, priors and held inputs with it, but for constants."""
     scene: Any
-    """With the fitted values."""
+    """With the fitted values, the values to which held inputs are pulled, and corrected models."""
+    joint: Joint
+    """Parameters and held inputs together."""
     optimum: Optimum
     """For criticism and for the choice of the next measurement."""
 

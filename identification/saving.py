@@ -1,17 +1,15 @@
 """A fitted scene as a file: the scene with what was measured in the place of what was supposed.
 
-Each value has its own interval in the file; how the errors of two values go together is not kept. Commands
-take them as independent, which is too wide for a combination that the data identify better than its parts,
-such as lambda^2/(k + 1), and too narrow for one of parts that err together; a finding names the combinations.
+It holds every value as fitted: parameters, the held inputs where the data pull them, and what corrects the
+models of the tube; and, in [fitted], how uncertain all of these are together.
 """
 
 from __future__ import annotations
 
 import os
-import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
 from itertools import combinations
 from pathlib import Path, PurePath
 from typing import Any, Final
@@ -20,20 +18,18 @@ from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, FittedParameter
-from ringbalance.scene import deferred
-from ringbalance.scene.describe import usual_unit
-from ringbalance.scene.keys.fields import Reader
-from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
+from ringbalance.identification.saved_joint import JointEntry, joint_entries, put_joint
+from ringbalance.identification.saved_places import Place, place_of
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.loader import scene_from
+from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import MeasuredFile, MeasuredFinding
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.toml_writing import toml_bytes
-from ringbalance.scene.units import DIMENSIONS, format_quantity, unit_of
+from ringbalance.scene.uncertain import SHAPE
 
-_DIGITS: Final = 9
-"""Of a saved number: far more than any fit has, so that saving changes nothing."""
 _RISE_DIGITS: Final = 4
-_ENTRY: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d)\])?")
 _NO_UNIT: Final = "1"
 _TOGETHER: Final = 0.5
 """Correlation from which two errors are said to go together."""
@@ -77,7 +73,10 @@ def save_result(
         *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
     ]
     fitted = [each for each in result.parameters if each.name not in START]
-    return _save_fitted(path, text=text, fitted=fitted, files=files, findings=findings)
+    together = joint_entries(result)
+    return _save_fitted(
+        path, text=text, fitted=fitted, files=files, findings=findings, joint=together, scene=result.scene
+    )
 
 
 def _found_from(text: str, *, folder: Path, to: Path) -> str:
@@ -99,10 +98,7 @@ def _correlations(result: FitResult) -> Iterator[str]:
     for i, j in combinations(range(len(names)), 2):
         value = float(result.correlations[i, j])
         if abs(value) > _TOGETHER:
-            yield (
-                f"the errors of {names[i]} and {names[j]} go together (correlation {value:.2f}); a scene "
-                "states each by itself"
-            )
+            yield f"the errors of {names[i]} and {names[j]} go together (correlation {value:.2f})"
 
 
 def _short(text: str) -> str:
@@ -117,17 +113,35 @@ def _save_fitted(
     fitted: Sequence[FittedParameter],
     files: Sequence[MeasuredFile],
     findings: Sequence[MeasuredFinding] = (),
+    joint: Sequence[JointEntry] = (),
+    scene: AnyScene | None = None,
 ) -> Path:
     """Write a scene with fitted values, their uncertainties and origins; whole or not at all.
 
     Every key of the scene stays, its comments do not.
-    Args: `text`: of the scene file that was fitted.
+    Held inputs stay as stated where their fitted values make no scene, such as a wall inside the port.
+    Args: `text`: of the scene file that was fitted. `joint`: what was fitted together. `scene`: as fitted.
     Raises: SceneError: the fitted values make no scene, such as a crest outside the port. OSError: the file
         cannot be written.
     """
-    content = _fitted_scene(text, fitted=fitted, files=files, findings=findings)
-    scene_from(content=content, file=str(path))
-    return write_whole(path, content.decode())
+    held = list(joint)
+    while True:
+        content = _fitted_scene(
+            text, fitted=fitted, files=files, findings=findings, joint=joint, pulled=held, scene=scene
+        )
+        try:
+            scene_from(content=content, file=str(path))
+        except SceneError as error:
+            wrong = {fault.key for fault in error.faults}
+            for suspected in (wrong, set(SHAPE), {each.key for each in held}):
+                left = [each for each in held if each.key not in suspected]
+                if len(left) < len(held):
+                    held = left
+                    break
+            else:
+                raise
+        else:
+            return write_whole(path, content.decode())
 
 
 def _fitted_scene(
@@ -136,10 +150,14 @@ def _fitted_scene(
     fitted: Sequence[FittedParameter],
     files: Sequence[MeasuredFile],
     findings: Sequence[MeasuredFinding] = (),
+    joint: Sequence[JointEntry] = (),
+    pulled: Sequence[JointEntry] = (),
+    scene: AnyScene | None = None,
 ) -> bytes:
-    """The bytes of that scene, not yet tried."""
+    """The bytes of that scene, not yet tried. Args: `pulled`: those of `joint` whose values are written."""
     document: dict[str, Any] = tomllib.loads(text)
-    placed = [(_place(each.path, document), each) for each in fitted]
+    put_joint(document, joint, pulled, scene)
+    placed = [(place_of(each.path, document), each) for each in fitted]
     for place, each in placed:
         _put_value(document, place, each)
     cut = tuple(_put_widths(document, placed))
@@ -151,81 +169,16 @@ def _fitted_scene(
     return toml_bytes(document)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Place:
-    """Where a value stands in a scene file, and how it is written there."""
-
-    table: str
-    key: str
-    entry: int | None
-    """Of a list; None for a single value."""
-    by_table: bool
-    """Whether [uncertainty] has a table for each table."""
-    dimension: str | None
-    unit: str
-    """Empty for a number without unit."""
-
-    def written(self, value: float) -> str | float:
-        """A value as it stands in the file."""
-        number = self.number(value)
-        return number if self.dimension is None else f"{number!r} {self.unit}"
-
-    def number(self, value: float) -> float:
-        """A value, SI, in the unit."""
-        if self.dimension is None:
-            return float(f"{value:.{_DIGITS}g}")
-        return float(format_quantity(value, self.dimension, self.unit, digits=_DIGITS).split(" ")[0])
-
-
-def _place(path: str, document: Mapping[str, Any]) -> _Place:
-    eccentric = document.get("balancer") == "eccentric_mass"
-    schema: Schema = deferred.ECCENTRIC_MASS if eccentric else LIQUID_RING
-    match = _ENTRY.fullmatch(path)
-    if match is None or match[1] not in schema.tables or match[2] not in schema.tables[match[1]].keys:
-        raise ValueError(f"a scene file has no value {path!r}")
-    table, key, entry = match.groups()
-    takes = schema.key_at((table, key)).takes
-    dimension = takes.dimension if isinstance(takes, Reader) else None
-    here = document.get(table, {}).get(key)
-    return _Place(
-        table=table,
-        key=key,
-        entry=None if entry is None else int(entry),
-        by_table=eccentric,
-        dimension=dimension,
-        unit=_unit(here, path, dimension),
-    )
-
-
-def _unit(here: object, path: str, dimension: str | None) -> str:
-    """The unit that the file has there, else the one in which such a value is described, else the SI unit."""
-    if dimension is None:
-        return ""
-    one = here[0] if isinstance(here, list) and here else here
-    return (
-        (unit_of(one) if isinstance(one, str) else "")
-        or usual_unit(path)
-        or next(iter(DIMENSIONS[dimension].units))
-    )
-
-
-def _put_value(document: dict[str, Any], place: _Place, fitted: FittedParameter) -> None:
-    value = place.written(fitted.value)
-    content = document.setdefault(place.table, {})
-    if place.entry is not None:
-        both = list(content.get(place.key) or [place.written(0.0)] * 2)
-        both[place.entry] = value
-        content[place.key] = both
-    else:
-        content[place.key] = value
-    content.setdefault(ORIGIN, {})[place.key] = fitted.origin
+def _put_value(document: dict[str, Any], place: Place, fitted: FittedParameter) -> None:
+    place.put(document, fitted.value)
+    document[place.table].setdefault(ORIGIN, {})[place.key] = fitted.origin
 
 
 def _put_widths(
-    document: dict[str, Any], placed: Iterable[tuple[_Place, FittedParameter]]
+    document: dict[str, Any], placed: Iterable[tuple[Place, FittedParameter]]
 ) -> Iterator[MeasuredFinding]:
     """Write the uncertainties; entries of a list share the largest. Yields: What a scene cannot state."""
-    by_key: dict[tuple[str, str], list[tuple[_Place, FittedParameter]]] = {}
+    by_key: dict[tuple[str, str], list[tuple[Place, FittedParameter]]] = {}
     for place, one in placed:
         by_key.setdefault((place.table, place.key), []).append((place, one))
     for group in by_key.values():
@@ -246,7 +199,7 @@ def _put_widths(
             yield MeasuredFinding(about="uncertainty", text=_CUT.format(each[0].path))
 
 
-def _record(place: _Place, fitted: FittedParameter) -> dict[str, Any]:
+def _record(place: Place, fitted: FittedParameter) -> dict[str, Any]:
     """One quantity of [measured]; ends that there are not are left out."""
     known = fitted.before_interval or (None, None)
     numbers = {

@@ -18,8 +18,9 @@ from ringbalance.reduced_model.operating.crest_margin import DirectedState
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
+from ringbalance.scene.joint import combined, input_sides
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths, shifted
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 UNITS: Final = {
     "chamber_volume": "m^3",
@@ -60,7 +61,8 @@ class Budget:
     model: float
     """Correlations, terms that are left out or have no model, and what over the crest cannot be told."""
     inputs: Mapping[str, float]
-    """By path in the scene file, such as "tube.bore"; those without any effect are not listed."""
+    """By path in the scene file, such as "tube.bore", "fitted" for all that were fitted together; those
+    without any effect are not listed."""
 
     @property
     def input(self) -> float:
@@ -155,9 +157,11 @@ def budgets(*, scene: Scene, calibration: _Calibrated) -> Mapping[str, Budget]:
             numerical=numerical,
             model=model,
             inputs={
-                path: change[name]
-                for path, change in effects.items()
-                if change.get(name, 0.0) > _NEGLIGIBLE * abs(value)
+                path: change
+                for path, change in combined(
+                    {path: each[name] for path, each in effects.items() if name in each}
+                ).items()
+                if change > _NEGLIGIBLE * abs(value)
             },
         )
         for name, (value, numerical, model) in parts.items()
@@ -239,7 +243,7 @@ def _crest_part(law: CalibratedLaw, point: OperatingPoint, state: DirectedState,
     crest = law.path.crest
     if crest is None or point.cavitation_margin is None or point.cavity_pressure is None:
         return 0.0
-    low, high = (float(bound) for bound in crest.cavity_bounds(state.ends))
+    low, high = (float(bound) for bound in crest.possible_cavity(state.ends))
     gas = max(float(crest.gas_pressure(state.ends)), high)
     pressure = point.hump_pressure or 0.0
     full = point.cavity_pressure + point.cavitation_margin
@@ -254,6 +258,7 @@ def _law_without_inputs(scene: Scene, calibration: _Calibrated) -> CalibratedLaw
         law,
         heads=law.heads.without_inputs(scene=scene, velocity=point.loss_velocity or 1.0),
         inputs=DriveUncertainty(),
+        variants=(),
         hydrostatic_pressure_uncertainty=chamber.hydrostatic_pressure.uncertainty_table(
             inputs=np.zeros_like(chamber.fill_ratio)
         ),
@@ -261,25 +266,24 @@ def _law_without_inputs(scene: Scene, calibration: _Calibrated) -> CalibratedLaw
 
 
 def _input_effects(scene: Scene, calibration: _Calibrated) -> dict[str, dict[str, float]]:
-    """Larger change of every quantity to either side, by the input's path in the scene."""
+    """Larger change of every quantity to either side, by the input's path in the scene, or by direction."""
     near = calibration.operating_point.loss_velocity or 1.0
     here = device_of(scene, near=near, near_fill=calibration.residual.fill_ratio)
     values, found = here.values(), {}
-    for quantity, width in half_widths(scene).items():
-        sides = [_moved(here, quantity, change).values() for change in (-width, width)]
-        found[f"{UNCERTAIN_QUANTITIES[quantity]}.{quantity}"] = {
-            name: max(abs(side[name] - value) for side in sides if name in side)
-            for name, value in values.items()
-            if any(name in side for side in sides)
+    for name, both in input_sides(scene).items():
+        sides = [_moved(here, name, side).values() for side in both]
+        table = UNCERTAIN_QUANTITIES.get(name)
+        found[name if table is None else f"{table}.{name}"] = {
+            quantity: max(abs(side[quantity] - value) for side in sides if quantity in side)
+            for quantity, value in values.items()
+            if any(quantity in side for side in sides)
         }
     return found
 
 
-def _moved(device: Device, quantity: str, change: float) -> Device:
-    scene = shifted(scene=device.scene, quantity=quantity, change=change)
+def _moved(device: Device, name: str, scene: Scene) -> Device:
+    """The device of a scene that one input, or a direction of fitted ones, makes differ."""
+    fixed = name in UNCERTAIN_QUANTITIES and name not in HEAD_INPUTS
     return device_of(
-        scene,
-        near=device.near,
-        near_fill=device.near_fill,
-        heads=None if quantity in HEAD_INPUTS else device.heads,
+        scene, near=device.near, near_fill=device.near_fill, heads=device.heads if fixed else None
     )

@@ -11,6 +11,7 @@ from markupsafe import Markup, escape
 
 from ringbalance.reduced_model.budget import believed
 from ringbalance.reports.numbers import shown
+from ringbalance.scene.joint import FITTED
 
 _GREEK: Final = {
     "alpha": "α",
@@ -81,6 +82,8 @@ def typeset(text: str) -> str:
 
 def key_words(path: str) -> str:
     """The key of a path in the scene file as a reader knows it, such as "siphon crest radius"."""
+    if path == FITTED:
+        return "fitted inputs"
     return path.rpartition(".")[2].replace("_", " ").replace("hump", "siphon crest")
 
 
@@ -113,6 +116,8 @@ def named_with_origin(evidence: Mapping[str, Any], path: str) -> str:
 
 def input_name(path: str) -> str:
     """The name of an input that a path in the scene file stands for, such as "bore of the tube"."""
+    if path == FITTED:
+        return "what was fitted together"
     table, _, key = path.partition(".")
     owner = _OWNERS.get(table, table.replace("_", " "))
     if not key or path.startswith(_ALONE) or owner in key_words(path).split():

@@ -72,8 +72,8 @@ def simulate(
         SceneError: a scene, a law or an option that cannot be used.
         OSError: a file that cannot be written.
     """
-    _check_output("--csv", csv, ".csv")
-    _check_output("--plot", plot, ".svg")
+    check_output("--csv", csv, ".csv")
+    check_output("--plot", plot, ".svg")
     told = _with_seed(with_tolerance(load_scene(scene), tolerance=tolerance, models=models), seed)
     checked_law(told, law)
     outputs = _Outputs(json=json, csv=csv, plot=plot)
@@ -83,7 +83,8 @@ def simulate(
     return SETTLED if settled else NOT_SETTLED
 
 
-def _check_output(option: str, path: Path | None, ending: str) -> None:
+def check_output(option: str, path: Path | None, ending: str) -> None:
+    """Raises: SceneError: a file name with another ending. OSError: the file cannot be written."""
     if path is None:
         return
     if path.suffix.lower() != ending:

@@ -43,7 +43,7 @@ COMMANDS = {
         "Recommended gain, its margins, and the settling times under it.",
     ),
     "fit": (
-        "ringbalance.identification.cli:fit",
+        "ringbalance.reports.fit_cli:fit",
         "Parameters of a built disc from measurements, with intervals and what the data identify.",
     ),
     "verify": (

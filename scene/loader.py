@@ -22,6 +22,7 @@ from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import ShownOrigin
 from ringbalance.scene.rules import shape, validity, working
 from ringbalance.scene.rules.check import failed_checks
+from ringbalance.scene.rules.fitted import fitted_faults
 from ringbalance.scene.toml_reading import read_toml
 
 _LARGEST_FILE = 2**20
@@ -61,7 +62,7 @@ def scene_from(*, content: bytes, file: str, folder: Path | None = None) -> AnyS
         reading, found = _read_liquid_ring(document, file=file, folder=folder)
     else:
         reading, found = _read_eccentric_mass(document, file=file)
-    found = (*found, *_origin_faults(reading, found))
+    found = (*found, *_origin_faults(reading, found), *fitted_faults(reading))
     if found:
         raise SceneError(_sorted(found, reading.schema))
     parts: dict[str, Any] = {

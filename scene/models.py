@@ -31,7 +31,7 @@ from ringbalance.scene.keys.fields import (
 )
 from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.tube_models import FINEST_MODELS, TubeModels
+from ringbalance.scene.tube_models import FINEST_MODELS, ModelError, TubeModels
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -284,6 +284,15 @@ class Tube:
         UNCERTAIN,
         Shown("factor on the draw-down depth"),
     ] = 1.0
+    model_errors: Annotated[
+        tuple[ModelError, ...],
+        standard(
+            [],
+            "corrections of the tube's models, in standard deviations of each model's stated uncertainty; "
+            "`ringbalance fit` writes them",
+        ),
+        Listed('[{ cause = "friction correlation", even = 0.4, odd = -0.1 }, ...]'),
+    ] = ()
     models: TubeModels = FINEST_MODELS
     """Of its loss; no key."""
 
@@ -291,6 +300,10 @@ class Tube:
     def area(self) -> float:
         """S, m^2."""
         return math.pi / 4 * self.bore**2
+
+    def model_error(self, cause: str) -> float:
+        """First part of a cause's errors together, in standard deviations."""
+        return sum(each.even for each in self.model_errors if each.cause == cause)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
 from ringbalance.scene.keys.fields import Bounds, OneLine, number, numbers, whole
 from ringbalance.scene.loop_models import RunSettings
@@ -110,6 +111,8 @@ class SceneFile:
     defaulted: tuple[str, ...] = ()
     """Paths such as "rotor.lag_angle" whose value is a default, because the file does not give it."""
     measured: Measured = field(default_factory=Measured)
+    fitted: Fitted = field(default_factory=Fitted)
+    """Joint distribution of the inputs that were fitted together."""
     origins: tuple[tuple[str, ShownOrigin], ...] = ()
     """Origin of each key by path; empty for a scene that was not read from a file."""
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Annotated, Final, Literal, cast, get_args
+
+from ringbalance.scene.keys.declaration import needed, standard
+from ringbalance.scene.keys.fields import Bounds, number
 
 LEFT_OUT: Final = "left out"
 CORRELATION: Final = "correlation"
@@ -26,17 +30,54 @@ class TubeModels:
     """Left out: their arcs as straight tube; by correlation: as if all flow were turbulent."""
     ends: Fidelity = FINEST
     """Left out: no entrance loss, alpha = 1; by correlation: as if all flow were turbulent."""
-    errors: tuple[tuple[str, float, float], ...] = ()
-    """Errors of the models themselves, supposed or drawn: cause, and two parts in standard deviations, of
-    which the second belongs to k alone; see `physics.tube.uncertainty.with_errors`."""
-
-    def error(self, cause: str) -> float:
-        """First part of a cause's errors together."""
-        return sum(first for name, first, _ in self.errors if name == cause)
 
 
+FINEST_MODELS: Final = TubeModels()
 CLEARING_ERROR: Final = "clearing of the crest"
 CAVITY_ERROR: Final = "pressure of the cavity"
 START_ERROR: Final = "start of the flow"
-"""Causes of `TubeModels.errors` beside those of k."""
-FINEST_MODELS: Final = TubeModels()
+"""Causes of `ModelError` beside those of k."""
+ErrorCause = Literal[
+    "friction correlation",
+    "rotation model",
+    "rotation entry",
+    "ends",
+    "bends",
+    "left out",
+    "clearing of the crest",
+    "pressure of the cavity",
+    "start of the flow",
+]
+"""What a model may be off by: those of k, as `physics.tube.uncertainty.MODEL_CAUSES`, and those above."""
+ERROR_NAME: Final = re.compile(r"model: ([^,]+)(?:, (even|odd))?")
+"""Name of one standard deviation of a cause's even part, where none is named, or of its odd part."""
+LARGEST_ERROR: Final = 2.5
+"""Standard deviations that an error is moved to at most: beyond, a head may fall with the velocity."""
+Deviations = Annotated[float, number(Bounds(at_least=-100, at_most=100))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelError:
+    """Error of a model itself, supposed, drawn or fitted, in standard deviations of its stated uncertainty.
+
+    What the parts do stands with `physics.tube.uncertainty.with_errors`; of a cause beside k the first alone
+    counts.
+    """
+
+    cause: Annotated[ErrorCause, needed("model that is off")]
+    even: Annotated[
+        Deviations, standard(0.0, "part n of k's error (U/1.96) (n cos ln Re + m sin ln Re), or the error")
+    ] = 0.0
+    odd: Annotated[Deviations, standard(0.0, "part m of k's error")] = 0.0
+
+    @classmethod
+    def named(cls, name: str, size: float) -> ModelError:
+        """An error by the name that fits and [fitted] give it, such as "model: ends, even".
+
+        Args: `size`: in standard deviations. Raises: ValueError: there is no such error.
+        """
+        match = ERROR_NAME.fullmatch(name)
+        if match is None or match[1] not in get_args(ErrorCause):
+            raise ValueError(f"{name!r} names no error of a model")
+        cause = cast(ErrorCause, match[1])
+        return cls(cause=cause, odd=size) if match[2] == "odd" else cls(cause=cause, even=size)

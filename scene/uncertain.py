@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -75,8 +76,8 @@ def with_value(*, scene: Scene, quantity: str, value: float) -> Scene:
 
 
 def half_widths(scene: Scene) -> Mapping[str, float]:
-    """Absolute expanded uncertainties (95 %) of a scene's inputs; the liquid's own where the scene states
-    none.
+    """Absolute expanded uncertainties (95 %) of a scene's inputs, each by itself; the liquid's own where the
+    scene states none, and those of the joint distribution where it has the input.
     Returns: SI half-width by quantity; only those above zero.
     """
     liquid = scene.liquid
@@ -90,6 +91,8 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
         value = nominal_value(scene=scene, quantity=stated.quantity)
         if value is not None:
             found[stated.quantity] = stated.absolute(value)
+    fitted = zip(scene.fitted.quantities, scene.fitted.deviations.tolist(), strict=True)
+    found |= {each.key: NORMAL_95 * size for each, size in fitted if each.key in UNCERTAIN_QUANTITIES}
     return {name: width for name, width in found.items() if width > 0}
 
 
@@ -158,11 +161,27 @@ def _table_of(quantity: str) -> str:
 
 
 def eccentric_drawn(scene: EccentricScene, random: np.random.Generator) -> EccentricScene:
-    """The scene with every stated input drawn: relative ones log-normal, so that none changes its sign."""
+    """The scene with every stated input drawn: relative ones log-normal, so that none changes its sign.
+
+    Those that were fitted together are drawn together, positive ones by their logarithms.
+    """
+    together = {each.quantity for each in scene.fitted.quantities}
     for uncertain in scene.uncertainty:
+        if any(name.split("[")[0] == uncertain.quantity for name in together):
+            continue
         move = _drawn(uncertain, random.standard_normal() / NORMAL_95)
         scene = eccentric_moved(scene, uncertain.quantity, move)
+    for each, change in zip(scene.fitted.quantities, scene.fitted.drawn(random).tolist(), strict=True):
+        scene = eccentric_moved(scene, each.quantity, partial(_by, change, each.unit in _ANGLES))
     return scene
+
+
+_ANGLES: Final = ("rad", "mrad", "deg")
+
+
+def _by(change: float, linear: bool, value: float) -> float:
+    """Args: `linear`: whether the quantity may have any sign."""
+    return value + change if linear or value <= 0 else value * math.exp(change / value)
 
 
 def _drawn(uncertain: InputUncertainty, part: float) -> Callable[[float], float]:

@@ -168,6 +168,14 @@ def format_quantity(value: float, dimension: str, unit: str, *, digits: int = 6)
     return f"{number:.{digits}g} {unit}"
 
 
+def unit_factor(unit: str) -> float:
+    """One unit in SI, its zero left out; 1 for "1", a number without unit."""
+    if unit == "1":
+        return 1.0
+    entry = next(units[unit] for units in (kind.units for kind in DIMENSIONS.values()) if unit in units)
+    return float(entry.factor) * (math.pi if entry.pi else 1.0)
+
+
 def unit_of(text: str) -> str:
     """The unit of a quantity such as "44.5 mm", as `DIMENSIONS` names it; empty for any other text."""
     match = _NUMBER.fullmatch(_respelled(text))

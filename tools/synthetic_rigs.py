@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.rotor import chamber_letters
-from ringbalance.identification.balancers import model_errors, with_model_error
+from ringbalance.identification.balancers import model_errors
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.predict.device import Models
@@ -25,6 +25,7 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.joint import with_model_error
 from ringbalance.scene.models import InputUncertainty, Scene
 from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value, shifted
 

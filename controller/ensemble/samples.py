@@ -9,7 +9,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.reduced_model.law.calibrated_law import CalibratedMoment
+from ringbalance.controller.ensemble.fitted_effects import (
+    INFLUENCE,
+    LAG,
+    LINE_KEYS,
+    MOMENT,
+    RATE,
+    fitted_effects,
+)
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.operating.residual import FACTOR, Drawing
@@ -23,8 +31,6 @@ PAPER_DRAG_UNCERTAINTY: Final = 0.1
 """Relative half-width taken for "k is about 50"."""
 PAPER_MOMENT_UNCERTAINTY: Final = 0.007
 """Relative half-width that the liquid-ring paper states for lambda."""
-LINE_KEYS: Final = ("conductance", "critical_ratio", "dead_volume", "valve_lag")
-"""Of a chamber's gas line, which members may have of their own."""
 LARGEST_RATIO: Final = 0.99
 """A critical ratio is below one."""
 ASSUMED_INFLUENCE: Final = 0.05
@@ -49,6 +55,21 @@ class MemberUncertainty:
     """Relative, of those of `LINE_KEYS` whose uncertainty the scene states."""
     draw_down: float = 0.0
     """Relative, of the depth over a port at which gas enters it."""
+    together: FloatArray | None = None
+    """`fitted_effects` of inputs that were fitted together, which are in none of the others; None: none."""
+
+    @property
+    def whole_lag_angle(self) -> float:
+        """Of the lag angle, with what was fitted together, rad."""
+        return math.hypot(self.lag_angle, *self._together(LAG))
+
+    @property
+    def together_on_vibration(self) -> float:
+        """Relative, of the rate at which the vibration changes, by what was fitted together."""
+        return math.hypot(*(self._together(RATE) + self._together(MOMENT) + self._together(INFLUENCE)))
+
+    def _together(self, row: int) -> FloatArray:
+        return np.zeros(0) if self.together is None else self.together[row]
 
     @classmethod
     def of(cls, scene: Scene, model: BalancerModel) -> MemberUncertainty:
@@ -56,8 +77,10 @@ class MemberUncertainty:
         velocity, moment = _velocity(scene, model), _moment(scene, model)
         influence = _stated(scene, "influence_coefficient")
         lag = _stated(scene, "lag_angle")
-        own, assumed = "the scene's uncertainty", "assumed: the scene states none"
         coefficient = scene.rotor.influence_coefficient
+        together = None
+        if scene.fitted.quantities:
+            together = fitted_effects(scene, of_flow=isinstance(model.flow, CalibratedLaw))
         return cls(
             velocity=velocity[0],
             moment=moment[0],
@@ -66,12 +89,19 @@ class MemberUncertainty:
             sources=(
                 velocity[1],
                 moment[1],
-                assumed if influence is None else own,
-                assumed if lag is None else own,
+                _source(scene, "influence_coefficient", influence),
+                _source(scene, "lag_angle", lag),
             ),
             gas_line=_line(scene),
             draw_down=half_widths(scene).get(FACTOR, 0.0) / scene.tube.draw_down_factor,
+            together=together,
         )
+
+
+def _source(scene: Scene, quantity: str, stated: float | None) -> str:
+    if _fitted(scene, quantity):
+        return "fitted together with other inputs"
+    return "assumed: the scene states none" if stated is None else "the scene's uncertainty"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -144,31 +174,52 @@ class Members:
         line = uncertainty_95.gas_line
         wide = np.array([[math.log1p(line.get(name, 0.0))] for name in LINE_KEYS])
         alike = Members.alike(scene, size=BLOCK)
+        lines = np.exp(wide * random.standard_normal((4, BLOCK)) / NORMAL_95) if line else None
+        factors, lag = _drawn_together(uncertainty_95.together, seed=seed, block=block)
+        if line or np.any(factors[LAG + 1 :] != 1.0):
+            lines = factors[LAG + 1 :] * (1.0 if lines is None else lines)
         return cls(
-            velocity_factor=np.exp(math.log1p(uncertainty_95.velocity) * z[0]),
-            moment_factor=np.exp(math.log1p(uncertainty_95.moment) * z[1]),
+            velocity_factor=np.exp(math.log1p(uncertainty_95.velocity) * z[0]) * factors[RATE],
+            moment_factor=np.exp(math.log1p(uncertainty_95.moment) * z[1]) * factors[MOMENT],
             influence_coefficient=alike.influence_coefficient
-            * np.exp(math.log1p(uncertainty_95.influence_coefficient) * z[2]),
-            lag_angle=alike.lag_angle + uncertainty_95.lag_angle * z[3],
+            * np.exp(math.log1p(uncertainty_95.influence_coefficient) * z[2])
+            * factors[INFLUENCE],
+            lag_angle=alike.lag_angle + uncertainty_95.lag_angle * z[3] + lag,
             proportional=alike.proportional,
-            gas_line=np.exp(wide * random.standard_normal((4, BLOCK)) / NORMAL_95) if line else None,
+            gas_line=lines,
             draw_down=np.exp(deeper),
         )
 
 
+def _drawn_together(effects: FloatArray | None, *, seed: int, block: int) -> tuple[FloatArray, FloatArray]:
+    """Factors by what was fitted together, rows as in `fitted_effects`, and changes of the lag angle."""
+    if effects is None:
+        return np.ones((LAG + 1 + len(LINE_KEYS), BLOCK)), np.zeros(BLOCK)
+    random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 2)))
+    changes = effects @ random.standard_normal((effects.shape[1], BLOCK)) / NORMAL_95
+    return np.exp(changes), changes[LAG]
+
+
 def _line(scene: Scene) -> dict[str, float]:
     """Relative half-widths that the scene states of its gas line."""
-    stated = {name: _stated(scene, name) for name in LINE_KEYS if getattr(scene.gas, name)}
+    names = (name for name in LINE_KEYS if getattr(scene.gas, name))
+    stated = {name: _stated(scene, name) for name in names}
     return {name: width / getattr(scene.gas, name) for name, width in stated.items() if width}
 
 
 def _stated(scene: Scene, quantity: str) -> float | None:
-    """Absolute half-width that the scene states."""
+    """Absolute half-width that the scene states, zero for an input that was fitted together with others."""
+    if _fitted(scene, quantity):
+        return 0.0
     for entry in scene.uncertainty:
         if entry.quantity == quantity:
             value = nominal_value(scene=scene, quantity=quantity)
             return entry.half_width if value is None else entry.absolute(value)
     return None
+
+
+def _fitted(scene: Scene, quantity: str) -> bool:
+    return any(each.key == quantity for each in scene.fitted.quantities)
 
 
 def _velocity(scene: Scene, model: BalancerModel) -> tuple[float, str]:
@@ -178,10 +229,10 @@ def _velocity(scene: Scene, model: BalancerModel) -> tuple[float, str]:
         width = PAPER_DRAG_UNCERTAINTY * k if stated is None else stated
         why = "assumed: k within 10 %" if stated is None else "the scene's uncertainty of k"
         return width / (k + 1) / 2, why
-    x = scene.disc.initial_fill
-    flow = model.flow.evaluate(
-        fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=True
-    )
+    x, law = scene.disc.initial_fill, model.flow
+    if isinstance(law, CalibratedLaw):
+        law = replace(law, variants=())
+    flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=True)
     u = abs(float(flow.velocity))
     return (float(flow.uncertainty) / u if u > 0 else 0.0), "the law's own, at equal fills"
 

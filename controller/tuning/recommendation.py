@@ -21,8 +21,9 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.reduced_model.selection.tube_terms import with_tube_models
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
+from ringbalance.scene.joint import FITTED, independent_half_widths
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import half_widths, shifted
+from ringbalance.scene.uncertain import shifted
 
 _ELSEWHERE: Final = frozenset({"influence_coefficient", "lag_angle", "density"})
 """Inputs with a part of their own; the density is in that of the moment, and the velocity makes up for some
@@ -87,6 +88,14 @@ def factor_uncertainty(scene: Scene, model: BalancerModel) -> FactorUncertainty:
             for quantity, effect in effects.items()
         ),
     ]
+    if own.together is not None:
+        parts.append(
+            Contribution(
+                name=FITTED,
+                uncertainty=own.together_on_vibration,
+                source="inputs that were fitted together, and the influence coefficient where it is one",
+            )
+        )
     velocity = math.hypot(own.velocity, *effects.values())
     return FactorUncertainty(widths=replace(own, velocity=velocity), parts=tuple(parts))
 
@@ -97,7 +106,7 @@ def _without_inputs(scene: Scene, model: BalancerModel) -> BalancerModel:
     if not isinstance(law, CalibratedLaw):
         return model
     heads = law.heads.without_inputs(scene=scene, velocity=_velocity(scene, model) or 1.0)
-    return replace(model, flow=replace(law, heads=heads, inputs=DriveUncertainty()))
+    return replace(model, flow=replace(law, heads=heads, inputs=DriveUncertainty(), variants=()))
 
 
 def _velocity(scene: Scene, model: BalancerModel) -> float:
@@ -116,7 +125,7 @@ def _input_effects(scene: Scene, model: BalancerModel) -> dict[str, float]:
     if rate_of is None or nominal == 0.0:
         return {}
     found = {}
-    for quantity, width in half_widths(scene).items():
+    for quantity, width in independent_half_widths(scene).items():
         if quantity in _ELSEWHERE:
             continue
         moved = (shifted(scene=scene, quantity=quantity, change=side * width) for side in (-1, 1))

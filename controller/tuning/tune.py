@@ -200,7 +200,7 @@ def _margins(scene: Scene, loop: LoopFactor, known: FactorUncertainty) -> Margin
     return loop_margins(
         loop_factor=loop.value if fixed and loop.value else 1.0,
         gain_uncertainty=known.total,
-        phase_uncertainty=known.widths.lag_angle + error,
+        phase_uncertainty=known.widths.whole_lag_angle + error,
         integral=settings.period / (settings.integral_time or math.inf) if fixed else 0.0,
         derivative=settings.derivative_time / settings.period if fixed else 0.0,
     )

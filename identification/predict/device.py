@@ -118,7 +118,7 @@ class Device:
     @cached_property
     def _delay(self) -> float:
         """By which the flow starts late, s: its error (95 %) is L/2u at equal fills."""
-        length = self.scene.tube.models.error(START_ERROR) / NORMAL_95 * self.scene.tube.length / 2
+        length = self.scene.tube.model_error(START_ERROR) / NORMAL_95 * self.scene.tube.length / 2
         return length / velocity if (velocity := self.models.velocity) else 0.0
 
     @cached_property
@@ -161,7 +161,7 @@ class Device:
             scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=0.0, initial_phase=0.0
         )
         disc = replace(scene.disc, lambda_factor=None)
-        tube = replace(scene.tube, models=replace(models.tube, errors=scene.tube.models.errors))
+        tube = replace(scene.tube, models=models.tube)
         return _device(replace(scene, rotor=rotor, disc=disc, tube=tube), models)
 
 

@@ -20,8 +20,7 @@ from ringbalance.identification.predict.injections import INJECTION
 from ringbalance.identification.predict.positionings import POSITIONING
 from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.tube.state import tube_state
-from ringbalance.physics.tube.uncertainty import with_errors
+from ringbalance.physics.tube.uncertainty import corrected_state
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
@@ -138,10 +137,8 @@ def _flow_rate(device: Device, observations: Observations) -> FloatArray:
 
 def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:
     """k of the tube at rest, by the finest models: the scene's are chosen for its own velocities."""
-    tube = replace(scene.tube, models=replace(FINEST_MODELS, errors=scene.tube.models.errors))
-    still = replace(scene, rotor=replace(scene.rotor, speed=0.0))
-    state = tube_state(still, velocity, tube=tube)
-    return with_errors(tube=tube, state=state).k
+    tube, rotor = replace(scene.tube, models=FINEST_MODELS), replace(scene.rotor, speed=0.0)
+    return corrected_state(replace(scene, tube=tube, rotor=rotor), velocity).k
 
 
 def _pressures(scene: Scene, observations: Observations) -> FloatArray:

@@ -18,7 +18,7 @@ from ringbalance.physics.tube.ends import LAMINAR_ENTRY_LENGTH
 from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS
 from ringbalance.physics.tube.rotation_table import rotation_table_covers
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.physics.tube.uncertainty import uncertainty_parts
+from ringbalance.physics.tube.uncertainty import uncertainty_parts, with_errors
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
 
@@ -81,6 +81,7 @@ def tube_loss(scene: Scene, velocity: npt.ArrayLike) -> TubeLoss:
     if not np.all(np.isfinite(u) & (u > 0)):
         raise ValueError("velocity must be positive and finite")
     state = tube_state(scene, u)
+    right = with_errors(tube=scene.tube, state=state)
     parts = uncertainty_parts(scene, velocity=u, state=state)
     notes = range_notes(tube=scene.tube, state=state, velocity=u)
     outside = np.any(np.array([np.zeros(u.shape, dtype=np.bool_), *notes.values()]), axis=0)
@@ -88,13 +89,13 @@ def tube_loss(scene: Scene, velocity: npt.ArrayLike) -> TubeLoss:
         velocity=u,
         reynolds=state.reynolds,
         rotation_reynolds=float(state.rotation_reynolds),
-        k=_estimate(state, parts, bool(np.any(outside))),
-        terms=MappingProxyType(dict(state.terms)),
+        k=_estimate(right, parts, bool(np.any(outside))),
+        terms=MappingProxyType(dict(right.terms)),
         uncertainty_parts=MappingProxyType(dict(parts)),
         flow_state=flow_states(state),
         in_range=np.asarray(~outside),
         range_notes=MappingProxyType(dict(notes)),
-        state=state,
+        state=right,
     )
 
 

@@ -16,8 +16,9 @@ from ringbalance.physics.tube.rotation import turbulent_friction_ratio
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.joint import FITTED, combined, fitted_causes, input_sides
 from ringbalance.scene.models import Scene, Tube
-from ringbalance.scene.uncertain import NORMAL_95, half_widths, shifted
+from ringbalance.scene.uncertain import NORMAL_95
 
 SIMPLER: Final = "left out"
 """Part by what models simpler than the finest neglect."""
@@ -71,15 +72,28 @@ to +0.20, beyond what the same inlet costs at rest: a blunt one loses less where
 """
 
 
-def uncertainty_parts(scene: Scene, *, velocity: FloatArray, state: TubeState) -> Mapping[str, FloatArray]:
+def uncertainty_parts(
+    scene: Scene, *, velocity: FloatArray, state: TubeState, fitted: bool = True
+) -> Mapping[str, FloatArray]:
     """Expanded uncertainties (95 %) of k, one per cause; independent, so they combine by the root of the sum
     of squares.
-    Args: `state`: the terms of k of the scene's tube at these velocities.
+    Args: `state`: the terms of k of the scene's tube at these velocities, as its models have them. `fitted`:
+        whether those of inputs and errors that were fitted together count.
     Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
     """
-    by_input = input_parts(scene, k_of=lambda moved: tube_state(moved, velocity).k, k=state.k)
-    return model_parts(tube=scene.tube, state=state) | by_input
+    right = with_errors(tube=scene.tube, state=state)
+    by_input = input_parts(scene, k_of=lambda moved: corrected_state(moved, velocity).k, k=right.k)
+    together = f"{INPUT_PART}{FITTED}"
+    return unfitted_parts(scene, model_parts(tube=scene.tube, state=state)) | {
+        name: part for name, part in by_input.items() if fitted or name != together
+    }
+
+
+def unfitted_parts(scene: Scene, parts: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Parts of `model_parts` but for the causes whose errors the scene's joint distribution holds."""
+    fitted = fitted_causes(scene)
+    return {cause: part for cause, part in parts.items() if cause not in fitted}
 
 
 def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
@@ -124,7 +138,7 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
 
 
 def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
-    """The state with the errors that `TubeModels.errors` supposes of its models.
+    """The state with the errors that `Tube.model_errors` supposes of its models.
 
     e(Re) = (U/1.96) (n cos ln Re + m sin ln Re) of each cause, n and m its two parts: a random function of
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
@@ -132,16 +146,16 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     measured smooth tubes have.  U of one cause counts for half of k at most: a simpler model may be off by
     far more at velocities that the scene never has, and no error makes a loss a gain.
     """
-    if not tube.models.errors:
+    if not tube.model_errors:
         return state
     parts, terms, bends = _all_parts(tube, state), dict(state.terms), state.bends
     angle = np.log(state.reynolds)
-    for cause, even, odd in tube.models.errors:
-        if cause not in parts:
+    for each in tube.model_errors:
+        if each.cause not in parts:
             continue
-        width = _limited(parts[cause], _LARGEST_ERROR * state.k)
-        error = width / NORMAL_95 * (even * np.cos(angle) + odd * np.sin(angle))
-        term = "decree" if "decree" in terms else (MODEL_CAUSES | _BUILT_TERMS)[cause]
+        width = _limited(parts[each.cause], _LARGEST_ERROR * state.k)
+        error = width / NORMAL_95 * (each.even * np.cos(angle) + each.odd * np.sin(angle))
+        term = "decree" if "decree" in terms else (MODEL_CAUSES | _BUILT_TERMS)[each.cause]
         if term == "bends":
             bends = tuple(k * (1 + error / terms[term]) for k in bends)
         terms[term] = terms[term] + error
@@ -163,6 +177,11 @@ def _limited(width: FloatArray, largest: FloatArray) -> FloatArray:
     return np.asarray(width * (1 + (width / largest) ** 4) ** -0.25)
 
 
+def corrected_state(scene: Scene, velocity: npt.ArrayLike) -> TubeState:
+    """`tube_state` with the scene's corrections of its models."""
+    return with_errors(tube=scene.tube, state=tube_state(scene, velocity))
+
+
 def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:
     """What laminar flow that is still developing may add to k."""
     laminar = 1 - turbulent_share(reynolds=state.reynolds, critical_ratio=state.critical_ratio)
@@ -178,15 +197,14 @@ def input_parts(scene: Scene, *, k_of: Callable[[Scene], FloatArray], k: FloatAr
     """Expanded uncertainties (95 %) of k by what the scene leaves uncertain.
 
     Args: `k_of`: k for the scene with another value.
-    Returns: Half-width of k by input, each the shape of `k`.
+    Returns: Half-width of k by input, each the shape of `k`; "input: fitted" of all fitted together.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity.
     """
-    found = {}
-    for name, width in half_widths(scene).items():
-        if name in TUBE_INPUTS:
-            sides = [k_of(shifted(scene=scene, quantity=name, change=c)) - k for c in (-width, width)]
-            found[f"{INPUT_PART}{name}"] = np.asarray(np.max(np.abs(np.array(sides)), axis=0))
-    return found
+    effects = {
+        name: np.max(np.abs([k_of(side) - k for side in sides]), axis=0)
+        for name, sides in input_sides(scene, among=TUBE_INPUTS).items()
+    }
+    return {f"{INPUT_PART}{name}": effect for name, effect in combined(effects).items()}
 
 
 def developing_length(

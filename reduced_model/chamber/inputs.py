@@ -17,8 +17,8 @@ from ringbalance.mesh.geometry import (
     wall_square,
 )
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.joint import combined, input_sides
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import half_widths, shifted
 
 CHAMBER_INPUTS: Final = (
     "outer_radius",
@@ -49,22 +49,38 @@ class InputEffect:
 def input_effects(*, scene: Scene, fill_ratio: FloatArray) -> Mapping[str, InputEffect]:
     """Effect of each uncertain input of the chamber, at a fixed fill ratio.
 
-    Returns: InputEffect by quantity; empty when every input is exact.
+    Returns: InputEffect by quantity, "fitted" for those that were fitted together; empty when every input is
+        exact.
     Source: ASME V&V 20-2009, one input at a time; steps of the half-width to both sides, of which the larger
         change counts, because a sensitivity at the value itself misses what bends within the interval.
     """
-    widths = {name: w for name, w in half_widths(scene).items() if name in CHAMBER_INPUTS}
-    return {name: _effect(scene, fill_ratio, name, width) for name, width in widths.items()}
+    sides = input_sides(scene, among=CHAMBER_INPUTS, errors=False)
+    found = {name: _effect(scene, fill_ratio, both) for name, both in sides.items()}
+    parts = (
+        combined({name: np.append(each.wall_pressure, 0.0) for name, each in found.items()}),
+        combined({name: np.append(each.hydrostatic_pressure, 0.0) for name, each in found.items()}),
+        combined({name: np.append(each.moment, 0.0) for name, each in found.items()}),
+        combined({name: each.moment_per_mass for name, each in found.items()}),
+    )
+    return {
+        name: InputEffect(
+            wall_pressure=parts[0][name][:-1],
+            hydrostatic_pressure=parts[1][name][:-1],
+            moment=parts[2][name][:-1],
+            moment_per_mass=parts[3][name],
+        )
+        for name in parts[0]
+    }
 
 
-def _effect(scene: Scene, fill_ratio: FloatArray, quantity: str, width: float) -> InputEffect:
+def _effect(scene: Scene, fill_ratio: FloatArray, both: tuple[Scene, Scene]) -> InputEffect:
     fills = np.append(fill_ratio, scene.disc.max_fill_ratio / 2)
     here, *sides = (
         (
             *measured_closed_forms(scene=s, fill_ratio=fills),
             chamber_pressure(scene=s, fill_ratio=fills),
         )
-        for s in (scene, *(shifted(scene=scene, quantity=quantity, change=c) for c in (-width, width)))
+        for s in (scene, *both)
     )
     pressure, moment, ratio, hydrostatic = (
         np.maximum(np.abs(low - at), np.abs(high - at)) for at, low, high in zip(here, *sides, strict=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from ringbalance.physics.gas import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
 from ringbalance.reduced_model.chamber.pressure_table import pressure_table
+from ringbalance.reduced_model.chamber.range import mean_gravity
 from ringbalance.reduced_model.chamber.values import RingValues, share_across
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
@@ -19,12 +21,19 @@ from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.joint import FITTED, direction_sides, fitted_causes, independent_half_widths
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
-from ringbalance.scene.uncertain import NORMAL_95, half_widths
+from ringbalance.scene.uncertain import NORMAL_95
 
 # Density and speed act on both chambers and on the tube at once, so the law handles them separately.
 _SHARED: Final = ("density", "speed")
+_VARIED_FILLS: Final = np.array([0.2, 0.5, 0.8])
+"""Of the greatest fill ratio: where the velocity's dependence on fitted inputs is looked at."""
+_VARIED_PRESSURES: Final = np.array([0.7, 1.0, 1.4])
+"""Of the scene's gas pressure."""
+_LITTLE: Final = 1e-2
+"""Of the largest effect of a direction, below which it is left out: its square counts."""
 _NEXT_TO_NOTHING: Final = 0.01
 """Of the tolerance: no mesh of a symmetric chamber is quite symmetric."""
 
@@ -34,10 +43,14 @@ def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHead
 
     Source: Eqs. 13 to 18 of the liquid-ring paper, with exact chambers and k(u).
     """
-    own = [e.hydrostatic_pressure for name, e in chamber.input_effects.items() if name not in _SHARED]
+    own = [
+        e.hydrostatic_pressure
+        for name, e in chamber.input_effects.items()
+        if name not in _SHARED and name != FITTED
+    ]
     inputs = np.sqrt(sum((e**2 for e in own), start=np.zeros_like(chamber.fill_ratio)))
     no_inputs = np.zeros_like(chamber.fill_ratio)
-    return _put_together(
+    law = _put_together(
         scene,
         heads=heads,
         hydrostatic_pressure=chamber.hydrostatic_pressure.table,
@@ -49,6 +62,28 @@ def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHead
             across=_across_table(scene, chamber.moment.table.nodes),
         ),
     )
+    return replace(law, variants=_variants(scene)) if scene.fitted.quantities else law
+
+
+def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
+    """Nominal laws along the directions of the fitted inputs that the velocity depends on, low and high.
+
+    The directions are turned to the singular vectors of the velocity's changes over fills and pressures.
+    """
+    gravity = mean_gravity(scene) > scene.tolerance
+
+    def laws(turned: FloatArray | None = None) -> tuple[CalibratedLaw, ...]:
+        sides = direction_sides(scene, turned=turned).values()
+        return tuple(nominal_law(side, gravity=gravity) for both in sides for side in both)
+
+    pressure = _VARIED_PRESSURES * scene.gas.pressure
+    fill = _VARIED_FILLS[:, None] * scene.disc.max_fill_ratio
+    velocities = np.array(
+        [law.evaluate(fill_ratio=fill, gas_pressure=pressure, primed=True).velocity.ravel() for law in laws()]
+    )
+    changes = (velocities[1::2] - velocities[::2]).T
+    _, size, turned = np.linalg.svd(changes, full_matrices=False)
+    return laws(turned[size > _LITTLE * size[0]].T) if size[0] > 0 else ()
 
 
 def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
@@ -108,10 +143,11 @@ def tube_path(scene: Scene) -> TubePath:
 
     Source: p(r) = rho omega^2 r^2/2 of liquid at rest in the rotating frame.
     """
-    hump, error = scene.tube.hump_radius, scene.tube.models.error
+    hump, error = scene.tube.hump_radius, scene.tube.model_error
     froude = 1 + CLEARING_UNCERTAINTY * error(CLEARING_ERROR) / NORMAL_95
     # With dissolved gas both ends of what the cavity's pressure may be are in its uncertainty.
     released = min(max(RELEASED * (1 + error(CAVITY_ERROR) / NORMAL_95), 0.0), 1.0)
+    fitted = fitted_causes(scene)
     return TubePath(
         density=scene.liquid.density,
         port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
@@ -120,6 +156,8 @@ def tube_path(scene: Scene) -> TubePath:
         vapour_pressure=scene.liquid.vapour_pressure - vented_pressure(scene),
         released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
         froude_velocity=froude * abs(scene.rotor.speed) * math.sqrt((hump or 0.0) * scene.tube.bore),
+        cavity_fitted=CAVITY_ERROR in fitted,
+        clearing_fitted=CLEARING_ERROR in fitted,
     )
 
 
@@ -138,7 +176,7 @@ def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
 
 
 def _drive_uncertainty(scene: Scene) -> DriveUncertainty:
-    width = half_widths(scene)
+    width = independent_half_widths(scene)
     hump = scene.tube.hump_radius or 0.0
     moved = scene.liquid.density * scene.rotor.speed**2 * hump * width.get("hump_radius", 0.0)
     return DriveUncertainty(

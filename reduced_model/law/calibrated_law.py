@@ -80,6 +80,10 @@ class CalibratedLaw:
     gas_factor: float = 1.0
     """Gas pressure on the liquid over the one at the place of measurement, which all arguments are."""
 
+    variants: tuple[CalibratedLaw, ...] = ()
+    """Laws without uncertainties of a device that is lower, then higher, by the expanded uncertainty (95 %)
+    along each direction of the inputs that were fitted together; `inputs` and the rest have the others."""
+
     @property
     def density(self) -> float:
         return self.path.density
@@ -131,7 +135,7 @@ class CalibratedLaw:
 
     def holds(self, fill_ratio: float) -> bool:
         """Whether a chamber of that fill keeps it against a lower one with the gas off."""
-        return self.path.holds(max(float(self.wall_pressure(fill_ratio)), 0.0))
+        return self.path.holds(max(float(self.hydrostatic_pressure(fill_ratio)), 0.0))
 
     def drive(self, asked: Conditions, *, reverse: bool) -> Drive:
         """What acts on the tube in one direction; `reverse`: out of the opposite chamber."""
@@ -145,13 +149,15 @@ class CalibratedLaw:
         )
 
     def _directed(self, asked: Conditions, *, reverse: bool) -> DirectedFlow:
-        return DirectedFlow.of(
+        flow = DirectedFlow.of(
             path=self.path,
             heads=self.heads,
             hump_head=self.heads.to_crest(reverse=reverse),
             inputs=self.inputs,
             drive=self.drive(asked, reverse=reverse),
         )
+        sides = [variant._directed(asked, reverse=reverse) for variant in self.variants]
+        return flow.widened(sides[::2], sides[1::2])
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)

@@ -160,6 +160,8 @@ def _plain(value: object) -> Any:
         return {"type": type(value).__name__} | named
     if isinstance(value, np.ndarray):
         return [float(v) for v in value]
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
     # The order matters: bool is an int, and a NumPy float is a float.
     if value is None or isinstance(value, bool | str):
         return value

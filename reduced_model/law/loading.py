@@ -54,6 +54,7 @@ _NOT_NEGATIVE: Final = frozenset(
     {"ambient_pressure", "drag_coefficient", "interpolation_error", "released", "froude_velocity"}
 )
 _LONGEST: Final = 40
+_VARIANTS: Final = "tuple[CalibratedLaw, ...]"
 
 
 class _Reader:
@@ -100,7 +101,15 @@ class _Reader:
         value, optional = data[field.name], str(field.type).endswith("| None")
         if value is None and optional:
             return None
+        if str(field.type) == _VARIANTS:
+            return self.variants(value, where)
         return self.value(value, str(field.type).removesuffix(" | None"), field.name, where)
+
+    def variants(self, value: object, where: str) -> tuple[CalibratedLaw, ...]:
+        if not isinstance(value, list) or len(value) % 2:
+            self.fault(where, _shown(value), "it is not a list of pairs of laws", "a list of pairs of laws")
+            return ()
+        return tuple(self.record(each, (CalibratedLaw,), f"{where}[{i + 1}]") for i, each in enumerate(value))
 
     def value(self, value: object, kind: str, name: str, where: str) -> Any:
         checks: Mapping[str, tuple[Callable[[object], bool], str]] = {

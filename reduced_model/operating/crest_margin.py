@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,7 @@ class DirectedState:
 
     reverse: bool
     """Whether the opposite chamber is upstream."""
+    conditions: Conditions
     drive: Drive
     """What acts on the tube in that direction, arrays of shape ()."""
 
@@ -30,7 +32,11 @@ class DirectedState:
         """Take a state in one direction of flow."""
         x, y, p = (np.asarray(v, dtype=np.float64) for v in (*fills, gas_pressure))
         asked = Conditions(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=np.asarray(True))
-        return cls(reverse=reverse, drive=law.drive(asked, reverse=reverse))
+        return cls._at(asked, law=law, reverse=reverse)
+
+    @classmethod
+    def _at(cls, asked: Conditions, *, law: CalibratedLaw, reverse: bool) -> DirectedState:
+        return cls(reverse=reverse, conditions=asked, drive=law.drive(asked, reverse=reverse))
 
     @property
     def ends(self) -> TubeEnds[Any]:
@@ -45,7 +51,7 @@ class DirectedState:
         crest, head = law.path.crest, law.heads.to_crest(reverse=self.reverse)
         if crest is None or head is None:
             return None, None
-        driving, (low, high) = np.asarray(self.ends.driving_pressure()), crest.cavity_bounds(self.ends)
+        driving, (low, high) = np.asarray(self.ends.driving_pressure()), crest.possible_cavity(self.ends)
         margin, width = siphon_margin(
             path=law.path,
             heads=law.heads,
@@ -56,4 +62,9 @@ class DirectedState:
             spread=np.asarray(max(crest.released, 1 - crest.released) * (high - low)),
             velocity=velocity_of(table=law.heads.head, head=driving / law.density, where=driving > 0),
         )
-        return float(margin), float(width)
+        sides = [
+            self._at(self.conditions, law=each, reverse=self.reverse).margin(law=each)[0] or 0.0
+            for each in law.variants
+        ]
+        by_fitted = ((high - low) / 2 for low, high in zip(sides[::2], sides[1::2], strict=True))
+        return float(margin), math.hypot(float(width), *by_fitted)

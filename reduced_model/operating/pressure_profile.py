@@ -6,14 +6,15 @@ A tube at rest without liquid over its crest: how far each leg is full, and what
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ringbalance.physics.gas import vented_pressure
 from ringbalance.physics.pressure.hydrostatics import column_radius
 from ringbalance.physics.roots import bracketed_root
-from ringbalance.physics.tube.state import TubeState, tube_state
+from ringbalance.physics.tube.state import TubeState
+from ringbalance.physics.tube.uncertainty import corrected_state
 from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
@@ -172,7 +173,7 @@ def _flowing(
     scene: Scene, tube: Tube, velocity: float, ends: TubeEnds[float], cavity: float | None, points: int
 ) -> _Line:
     """Along a tube in which liquid flows or a column rests, from its upstream end."""
-    terms = tube_state(scene, velocity, tube=tube) if velocity else None
+    terms = corrected_state(replace(scene, tube=tube), velocity) if velocity else None
     head = scene.liquid.density * velocity**2 / 2
     if cavity is not None and terms is not None:
         return _separated(scene, tube, terms, ends, cavity, head, points)

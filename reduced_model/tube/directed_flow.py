@@ -5,7 +5,8 @@ The pressures and the regime are those of `tube_regime`, the velocities those of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -14,7 +15,6 @@ import numpy as np
 from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
 from ringbalance.reduced_model.tube.regime import (
-    CLEARING,
     ColumnFlow,
     SiphonCrest,
     Truth,
@@ -66,6 +66,26 @@ class DirectedFlow:
     """Whether the tube holds a continuous column afterwards."""
     half_width: FloatArray
     """Expanded uncertainty (95 %) of the velocity, m/s."""
+    margin: FloatArray
+    """`siphon_margin` of a full siphon, Pa; zero without a crest."""
+    margin_half_width: FloatArray
+    """Its expanded uncertainty (95 %), Pa."""
+
+    def widened(self, low: Sequence[DirectedFlow], high: Sequence[DirectedFlow]) -> DirectedFlow:
+        """With what inputs add that move the flow to both sides along independent directions."""
+        if not low:
+            return self
+        flows = self.velocity > 0
+        both = list(zip(low, high, strict=True))
+        speeds = np.sqrt(sum(((b.velocity - a.velocity) / 2) ** 2 for a, b in both))
+        margins = np.sqrt(sum(((b.margin - a.margin) / 2) ** 2 for a, b in both))
+        open_by = np.hypot(self.margin_half_width, margins)
+        return replace(
+            self,
+            half_width=np.hypot(self.half_width, np.where(flows, speeds, 0.0)),
+            margin_half_width=open_by,
+            undecided=flows & (np.abs(self.margin) < open_by),
+        )
 
     @classmethod
     def of(
@@ -96,15 +116,16 @@ class DirectedFlow:
         )
         width = _siphon_width(heads, inputs, drive, flow.siphon_velocity)
         undecided = np.zeros_like(drive.primed)
+        margin, open_by = np.zeros_like(flow.velocity), np.zeros_like(flow.velocity)
         if crest is not None and hump_head is not None:
             broken = _separated_width(
                 hump_head, heads.hump_uncertainty, path.density, inputs, drive, crest, flow
             )
-            margins = _separation_margins(
+            bounds = _separation_margins(
                 ends=drive.ends, crest=crest, primed=drive.primed, spill=flow.spill_velocity
             )
             flows, full = flow.velocity > 0, flow.siphon_velocity
-            slowest, fastest = (separation(margin, flows & (margin > 0)) for margin in margins)
+            slowest, fastest = (separation(bound, flows & (bound > 0)) for bound in bounds)
             held = _head_at(hump_head, flow.separation_velocity) * path.density
             margin, open_by = siphon_margin(
                 path=path,
@@ -113,7 +134,7 @@ class DirectedFlow:
                 inputs=inputs,
                 drive=drive,
                 at_rest=held,
-                spread=np.maximum(held - margins[0], margins[1] - held),
+                spread=np.maximum(held - bounds[0], bounds[1] - held),
                 velocity=full,
             )
             undecided = flows & (np.abs(margin) < open_by)
@@ -127,6 +148,8 @@ class DirectedFlow:
             undecided=undecided,
             primed=np.asarray(flow.primed),
             half_width=width,
+            margin=margin,
+            margin_half_width=open_by,
         )
 
 
@@ -232,11 +255,11 @@ def _separation_margins(
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest separation margin that the cavity's pressure and the gas over the crest allow, Pa.
 
-    Args: `spill`: `ColumnFlow.spill_velocity`; within `CLEARING` the gas may be there or gone.
+    Args: `spill`: `ColumnFlow.spill_velocity`; between `clearing_velocities` the gas may be there or gone.
     """
-    low, high = crest.cavity_bounds(ends)
+    low, high = crest.possible_cavity(ends)
     gas = np.maximum(crest.gas_pressure(ends), high)
-    slowest, fastest = (number * crest.froude_velocity for number in CLEARING)
+    slowest, fastest = crest.clearing_velocities
     rest = crest.resting_pressure(ends)
     highest = np.where(~primed & (spill < fastest), gas, high)
     lowest = np.where(~primed & (spill < slowest), gas, low)

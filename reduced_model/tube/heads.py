@@ -12,7 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
-from ringbalance.physics.tube.uncertainty import SIMPLER, model_parts, uncertainty_parts, with_errors
+from ringbalance.physics.tube.uncertainty import (
+    SIMPLER,
+    corrected_state,
+    model_parts,
+    uncertainty_parts,
+    unfitted_parts,
+    with_errors,
+)
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, level_table, refined_table
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
@@ -21,8 +28,8 @@ from ringbalance.reduced_model.tube.path import (
     reversed_tube,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.joint import independent_half_widths
 from ringbalance.scene.models import Scene, Tube
-from ringbalance.scene.uncertain import half_widths
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""
@@ -98,7 +105,7 @@ class TubeHeads:
         Raises: ValueError: arcs of bends longer than the tube.
         Source: definition of k; the crest's energy balance with the profile's kinetic-energy factor alpha.
         """
-        place = crest_end_uncertainty(scene.tube, half_widths(scene).get("hump_position", 0.0))
+        place = crest_end_uncertainty(scene.tube, independent_half_widths(scene).get("hump_position", 0.0))
         start, stop = np.log(TABLE_VELOCITIES)
         widths = _widths(scene, np.linspace(start, stop, _UNCERTAINTY_NODES), place=place)
         return replace(TubeHeads.exact(scene), **widths)  # type: ignore[arg-type]
@@ -127,17 +134,22 @@ def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -
 def _widths(
     scene: Scene, log_velocity: FloatArray, *, place: float, by_inputs: bool = True
 ) -> dict[str, HermiteTable]:
-    """Uncertainties of `TubeHeads` over even places in ln u; `place`: that of the crest's end."""
+    """Uncertainties of `TubeHeads` over even places in ln u, but for those of inputs fitted together.
+
+    Args: `place`: uncertainty of the crest's end.
+    """
     tube, u, end = scene.tube, np.exp(log_velocity), crest_span(scene.tube)[1]
     state = tube_state(scene, u)
-    parts: Mapping[str, FloatArray] = model_parts(tube=tube, state=state)
+    right = with_errors(tube=tube, state=state)
+    parts: Mapping[str, FloatArray] = unfitted_parts(scene, model_parts(tube=tube, state=state))
     if by_inputs:
-        parts = uncertainty_parts(scene, velocity=u, state=state)
-    k, upstream = state.k, state.upstream_loss(end)
+        parts = uncertainty_parts(scene, velocity=u, state=state, fitted=False)
+    k, upstream = right.k, right.upstream_loss(end)
     width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(k)))
     share = np.where(k > 0, upstream / np.where(k > 0, k, 1.0), 1.0)
-    finest, to_crest = finest_state(tube=tube, state=state), state.kinetic_factor + upstream
-    simpler = finest.kinetic_factor + finest.upstream_loss(end) - to_crest
+    finest, to_crest = finest_state(tube=tube, state=state), right.kinetic_factor + upstream
+    simpler = finest.kinetic_factor + finest.upstream_loss(end)
+    simpler = simpler - state.kinetic_factor - state.upstream_loss(end)
     moved = np.sqrt((width * share) ** 2 + (state.along * place) ** 2 + simpler**2)
     found = {
         "uncertainty": width / (k + 1),
@@ -212,6 +224,6 @@ def crest_head(
 def entrance_fraction(scene: Scene, velocity: float) -> float:
     """Fraction of the head up to the crest that is lost at the entrance, (alpha + K_ent)/(alpha + k_up)."""
     u = np.array([velocity])
-    state = tube_state(scene, u)
+    state = corrected_state(scene, u)
     entrance = (state.kinetic_factor + state.terms.get("entrance", 0.0)) * u**2 / 2
     return float((entrance / crest_head(scene=scene, tube=scene.tube, state=state, velocity=u))[0])

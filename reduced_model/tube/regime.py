@@ -112,6 +112,22 @@ class SiphonCrest(Generic[Pressure]):
     `RELEASED` with dissolved gas."""
     froude_velocity: float = 0.0
     """sqrt(g_c d), m/s; zero: gas over the crest leaves as soon as liquid flows."""
+    cavity_fitted: bool = False
+    """Whether what the cavity's pressure may be is among the inputs that were fitted together."""
+    clearing_fitted: bool = False
+    """Whether the Froude number that clears the crest is."""
+
+    @property
+    def clearing_velocities(self) -> tuple[float, float]:
+        """Between which the gas over the crest may be there or gone, m/s; fitted, both in their middle."""
+        low, high = (sum(CLEARING) / 2,) * 2 if self.clearing_fitted else CLEARING
+        return low * self.froude_velocity, high * self.froude_velocity
+
+    def possible_cavity(self, ends: TubeEnds[Pressure]) -> tuple[Pressure, Pressure]:
+        """Between which a cavity's pressure lies, Pa; fitted, twice what is taken."""
+        if self.cavity_fitted:
+            return self.cavity_pressure(ends), self.cavity_pressure(ends)
+        return self.cavity_bounds(ends)
 
     def cavity_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
         """Pressure of a cavity in a primed tube, Pa; over an open downstream port that of the gas there."""
@@ -188,6 +204,10 @@ class TubePath:
     """As in `SiphonCrest`."""
     froude_velocity: float
     """sqrt(omega^2 r_m d), m/s; zero without a crest."""
+    cavity_fitted: bool = False
+    """As in `SiphonCrest`."""
+    clearing_fitted: bool = False
+    """As in `SiphonCrest`."""
 
     @property
     def crest(self) -> SiphonCrest[Any] | None:
@@ -200,6 +220,8 @@ class TubePath:
             trapped=self.trapped,
             released=self.released,
             froude_velocity=self.froude_velocity,
+            cavity_fitted=self.cavity_fitted,
+            clearing_fitted=self.clearing_fitted,
         )
 
     @property

@@ -13,6 +13,7 @@ from typing import Any, Final
 _HOME: Final = MappingProxyType(
     {
         "sheet": "ringbalance.reports.figures.sheet",
+        "fit_figures": "ringbalance.reports.figures.fit",
         "run_figures": "ringbalance.reports.figures.loop",
         "eccentric_figures": "ringbalance.reports.figures.eccentric",
         "typeset": "ringbalance.reports.typesetting",

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.chamber_file.keys import MeshKeys
+from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
 from ringbalance.scene.origins import Measured, Origin
@@ -168,6 +169,11 @@ _TOLERANCE = Key(
 _RUN = {
     "run": Table.of(loop_models.RunSettings, "a simulation's seed and end"),
     "accuracy": Table(text="what is asked of the result", keys={"tolerance": _TOLERANCE}),
+    "fitted": Table.of(
+        Fitted,
+        "what a fit leaves uncertain, jointly: standard deviations of the values in this file, and how they "
+        "go together; `ringbalance fit --save` writes it",
+    ),
     "measured": Table.of(
         Measured, "the measurements that `ringbalance fit` has fitted the scene to; `fit --save` writes it"
     ),

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student_t
 from synthetic_rigs import covered, fitted, measured, observations, rig
 
-from ringbalance.identification.balancers import model_errors, with_model_error
+from ringbalance.identification.balancers import model_errors
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit, problem_of
 from ringbalance.identification.likelihood import Block, Problem
@@ -20,6 +20,7 @@ from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.joint import with_model_error
 from ringbalance.scene.models import InputUncertainty, Scene
 from ringbalance.scene.uncertain import with_value
 

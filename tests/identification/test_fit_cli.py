@@ -368,3 +368,23 @@ def test_data_that_tell_nothing_of_a_parameter(run: Run) -> None:
     low, high = found["interval"]
     assert high > 100 * low
     assert found["verdict"] == "structurally not identified"
+
+
+def test_a_plot_of_data_against_fit(run: Run, tmp_path: Path) -> None:
+    """One figure a kind of reading, with the slope that the JSON has; the examples agree with their fit."""
+    sheet, files = tmp_path / "fit.svg", [EXAMPLES["trial_weight"], EXAMPLES["flow"]]
+    code, text, _ = run(PAPER, *files, "--plot", sheet, "--json")
+    slopes = {each["kind"]: each for each in json.loads(text)["data_over_fit"]}
+    assert (code, set(slopes)) == (0, {"trial_weight", "flow"})
+    for each in slopes.values():
+        assert abs(each["slope"] - 1) < each["slope_uncertainty"] < 0.02
+    drawn = sheet.read_text(encoding="utf-8")
+    assert drawn.count("<svg ") == 1 + len(files)
+    assert "var(" not in drawn
+
+
+def test_a_plot_replaces_nothing_that_is_read(run: Run, tmp_path: Path) -> None:
+    data = tmp_path / "flow.svg"
+    data.write_text(Path(EXAMPLES["flow"]).read_text(encoding="utf-8"), encoding="utf-8")
+    assert run(PAPER, data, "--plot", data)[0] == 2
+    assert run(PAPER, EXAMPLES["flow"], "--plot", tmp_path / "fit.png")[0] == 2

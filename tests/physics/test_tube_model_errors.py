@@ -10,14 +10,19 @@ import pytest
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.physics.tube.uncertainty import MODEL_CAUSES, model_parts, with_errors
 from ringbalance.scene.models import Scene, Tube
-from ringbalance.scene.tube_models import FINEST_MODELS
+from ringbalance.scene.tube_models import ModelError
 from ringbalance.scene.uncertain import NORMAL_95
 
 VELOCITIES = np.array([1.0, 3.0, 8.0, 20.0])
 
 
 def erring(scene: Scene, *errors: tuple[str, float, float]) -> tuple[Tube, TubeState]:
-    tube = replace(scene.tube, models=replace(FINEST_MODELS, errors=errors))
+    supposed = tuple(
+        ModelError.named(f"model: {cause}, {part}", size)
+        for cause, *both in errors
+        for part, size in zip(("even", "odd"), both, strict=True)
+    )
+    tube = replace(scene.tube, model_errors=supposed)
     state = tube_state(scene, VELOCITIES, tube=tube)
     return tube, with_errors(tube=tube, state=state)
 

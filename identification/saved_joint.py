@@ -1,0 +1,160 @@
+"""What was fitted together, as a scene file has it: pulled values, corrections of models, and [fitted]."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.identification.parameters import START
+from ringbalance.identification.result import FitResult, path_of
+from ringbalance.identification.saved_places import Place, place_of
+from ringbalance.scene.fitted import MODEL, NO_UNIT
+from ringbalance.scene.keys.schema import ORIGIN
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.tube_models import ERROR_NAME, ModelError
+from ringbalance.scene.uncertain import NORMAL_95, eccentric_value, nominal_value
+
+_DIGITS: Final = 9
+_PARTS: Final = ("even", "odd")
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointEntry:
+    """One quantity that was fitted together with others."""
+
+    name: str
+    """As the fit names it."""
+    held: bool
+    """Whether it was not a parameter."""
+    standard_deviation: float
+    """SI; of an error of a model in its stated standard deviations."""
+    correlations: tuple[float, ...]
+    """With all of them, in their order."""
+
+    @property
+    def is_model(self) -> bool:
+        """Whether it is an error of a model and not a value."""
+        return self.name.startswith(MODEL)
+
+    @property
+    def path(self) -> str:
+        """As a scene file names it."""
+        return self.name if self.is_model else path_of(self.name)
+
+    @property
+    def key(self) -> str:
+        """In its table."""
+        return self.path.split(".")[-1].split("[")[0]
+
+
+def joint_entries(result: FitResult) -> list[JointEntry]:
+    """All that was fitted together and that a scene file has; both parts of every error of k.
+
+    A part that the data do not depend on is as uncertain as it was, and independent.
+    """
+    names, size = result.joint.names, result.joint.deviations
+    kept = [i for i, name in enumerate(names) if name not in START]
+    pairs = {
+        f"{MODEL}{match[1]}, {part}": None
+        for name in names
+        if (match := ERROR_NAME.fullmatch(name)) and match[2]
+        for part in _PARTS
+    }
+    lacking = [name for name in pairs if name not in names]
+    whole = np.eye(len(kept) + len(lacking))
+    correlations = result.joint.covariance[np.ix_(kept, kept)] / np.outer(size[kept], size[kept])
+    whole[: len(kept), : len(kept)] = np.clip((correlations + correlations.T) / 2, -1.0, 1.0)
+    np.fill_diagonal(whole, 1.0)
+    everything = [*((names[i], float(size[i])) for i in kept), *((name, 1.0) for name in lacking)]
+    return [
+        JointEntry(
+            name=name,
+            held=name in result.held or name in lacking,
+            standard_deviation=sd,
+            correlations=tuple(round(float(r), _DIGITS) for r in row),
+        )
+        for (name, sd), row in zip(everything, whole, strict=True)
+    ]
+
+
+def put_joint(
+    document: dict[str, Any],
+    joint: Sequence[JointEntry],
+    pulled: Sequence[JointEntry],
+    scene: AnyScene | None,
+) -> None:
+    """Write values of held inputs, corrections and the joint distribution into a scene's document.
+
+    Args: `pulled`: those whose values are written. `scene`: that has them.
+    """
+    if scene is None or not joint:
+        return
+    values = [(place_of(each.path, document), each) for each in pulled if each.held and not each.is_model]
+    for place, each in values:
+        _put_value(document, place, _value(scene, each.name))
+        _put_width(document, place, each.standard_deviation, _value(scene, each.name))
+    if isinstance(scene, Scene):
+        _put_errors(document, scene)
+    document["fitted"] = {"quantities": list(_quantities(document, joint))}
+
+
+def _value(scene: AnyScene, name: str) -> float:
+    if not isinstance(scene, Scene):
+        return eccentric_value(scene, name)
+    value = nominal_value(scene=scene, quantity=name)
+    if value is None:
+        raise ValueError(f"the scene has no {name}")
+    return value
+
+
+def _put_value(document: dict[str, Any], place: Place, value: float) -> None:
+    """Write a value that a fit has moved; where it stays as it is, nothing changes."""
+    if place.put(document, value):
+        document[place.table].setdefault(ORIGIN, {})[place.key] = "inferred"
+
+
+def _put_width(document: dict[str, Any], place: Place, size: float, value: float) -> None:
+    """State the uncertainty that is left, for whoever looks at one quantity."""
+    inside = document.setdefault("uncertainty", {})
+    inside = inside.setdefault(place.table, {}) if place.by_table else inside
+    if place.entry is None:
+        inside[place.key] = place.written(min(NORMAL_95 * size, abs(value)) if value else NORMAL_95 * size)
+
+
+def _put_errors(document: dict[str, Any], scene: Scene) -> None:
+    """Corrections of models, one entry a cause."""
+    causes = dict.fromkeys(each.cause for each in scene.tube.model_errors)
+    sums = [
+        ModelError(
+            cause=cause,
+            even=sum(each.even for each in scene.tube.model_errors if each.cause == cause),
+            odd=sum(each.odd for each in scene.tube.model_errors if each.cause == cause),
+        )
+        for cause in causes
+    ]
+    if sums:
+        document["tube"]["model_errors"] = [
+            {"cause": each.cause, "even": _rounded(each.even), "odd": _rounded(each.odd)} for each in sums
+        ]
+        document["tube"].setdefault(ORIGIN, {})["model_errors"] = "inferred"
+
+
+def _quantities(document: dict[str, Any], joint: Sequence[JointEntry]) -> Iterator[dict[str, Any]]:
+    for each in joint:
+        place = None if each.is_model else place_of(each.path, document)
+        yield {
+            "quantity": each.path,
+            "unit": NO_UNIT if place is None or not place.unit else place.unit,
+            "standard_deviation": _rounded(each.standard_deviation)
+            if place is None
+            else place.difference(each.standard_deviation),
+            "correlations": list(each.correlations),
+        }
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")

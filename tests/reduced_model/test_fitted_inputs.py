@@ -1,0 +1,105 @@
+"""Inputs that were fitted together, in a calibration's intervals and in its law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.law.building import nominal_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.loading import load_law
+from ringbalance.scene.fitted import Fitted, FittedQuantity
+from ringbalance.scene.models import Scene
+from ringbalance.scene.tube_models import ModelError
+from ringbalance.scene.uncertain import NORMAL_95, with_value
+
+SIZES = {"tube.bore": 3e-5, "tube.length": 2e-3, "model: friction correlation, even": 0.8}
+
+
+def fitted(scene: Scene, correlation: float) -> Scene:
+    """Bore, length and friction fitted together; all else exact, and a tube that stays full."""
+    rows = np.full((3, 3), correlation) + (1 - correlation) * np.eye(3)
+    quantities = tuple(
+        FittedQuantity(
+            quantity=name,
+            unit="m" if "tube" in name else "1",
+            standard_deviation=size,
+            correlations=tuple(row.tolist()),
+        )
+        for (name, size), row in zip(SIZES.items(), rows, strict=True)
+    )
+    exact = replace(scene.liquid, density_uncertainty=0.0, viscosity_uncertainty=0.0)
+    tube = replace(scene.tube, hump_radius=None, roughness=0.0)
+    return replace(scene, liquid=exact, tube=tube, uncertainty=(), fitted=Fitted(quantities=quantities))
+
+
+def by_hand(scene: Scene, correlation: float) -> float:
+    """1.96 sqrt(J C J') of the velocity, J by small steps."""
+
+    def velocity(changed: Scene) -> float:
+        law = nominal_law(changed, gravity=False)
+        return float(law.evaluate(fill_ratio=0.25, gas_pressure=scene.gas.pressure, primed=True).velocity)
+
+    def moved(step: float) -> list[Scene]:
+        error = ModelError(cause="friction correlation", even=0.8 * step)
+        return [
+            with_value(scene=scene, quantity="bore", value=scene.tube.bore + step * 3e-5),
+            with_value(scene=scene, quantity="length", value=scene.tube.length + step * 2e-3),
+            replace(scene, tube=replace(scene.tube, model_errors=(error,))),
+        ]
+
+    effects = np.array(
+        [(velocity(b) - velocity(a)) / 0.2 for a, b in zip(moved(-0.1), moved(0.1), strict=True)]
+    )
+    matrix = np.full((3, 3), correlation) + (1 - correlation) * np.eye(3)
+    return float(NORMAL_95 * np.sqrt(effects @ matrix @ effects))
+
+
+def found(scene: Scene) -> tuple[Calibration, float]:
+    """The calibration, and what its law adds to the velocity's uncertainty by the fitted inputs."""
+    calibration = calibrate(scene)
+    law = calibration.flow_law
+    with_them, without = (
+        float(each.evaluate(fill_ratio=0.25, gas_pressure=scene.gas.pressure, primed=True).uncertainty)
+        for each in (law, replace(law, variants=()))
+    )
+    return calibration, float(np.sqrt(with_them**2 - without**2))
+
+
+def test_budget_and_law_follow_the_correlations(paper_scene: Scene) -> None:
+    """Within 5 %: a step of a whole half-width is no derivative. The independent sum is another number."""
+    alone = by_hand(fitted(paper_scene, 0.0), 0.0)
+    for correlation in (-0.45, 0.9):
+        scene = fitted(paper_scene, correlation)
+        expected = by_hand(scene, correlation)
+        calibration, by_law = found(scene)
+        budget = calibration.budgets["velocity"]
+        assert set(budget.inputs) == {"fitted"}
+        assert budget.inputs["fitted"] == pytest.approx(expected, rel=0.05)
+        assert by_law == pytest.approx(expected, rel=0.05)
+        assert expected != pytest.approx(alone, rel=0.15)
+
+
+def test_a_law_with_fitted_inputs_is_read_back_as_it_was(paper_scene: Scene, tmp_path: Path) -> None:
+    law = calibrate(fitted(paper_scene, 0.9)).flow_law
+    again = load_law(law.save(tmp_path / "law.json"))
+    assert isinstance(again, CalibratedLaw)
+    states = {"fill_ratio": np.array([0.1, 0.25, 0.4]), "gas_pressure": 5e5}
+    assert np.array_equal(again.evaluate(**states).uncertainty, law.evaluate(**states).uncertainty)
+    assert len(again.variants) == len(law.variants) > 0
+
+
+def test_a_correction_of_a_model_changes_the_law(paper_scene: Scene) -> None:
+    """Two standard deviations of friction more, at cos(ln Re) of either sign: another k, another velocity."""
+    error = ModelError(cause="friction correlation", even=2.0)
+    corrected = replace(paper_scene, tube=replace(paper_scene.tube, model_errors=(error,)))
+    k, velocity = (
+        [value(calibrate(scene)) for scene in (paper_scene, corrected)]
+        for value in (lambda c: c.tube.k.value[-1], lambda c: c.operating_point.velocity)
+    )
+    assert abs(k[1] / k[0] - 1) > 0.005
+    assert velocity[1] != pytest.approx(velocity[0], rel=1e-4)

@@ -1,4 +1,4 @@
-"""What only a scene with eccentric masses or the mesh of a chamber needs, loaded when first used.
+"""What only scenes with eccentric masses, with the mesh of a chamber or with changes need, loaded then.
 
 Others start faster without.
 
@@ -17,6 +17,7 @@ _HOME: Final = MappingProxyType(
         "ECCENTRIC_MASS": "ringbalance.scene.eccentric_models",
         "EccentricScene": "ringbalance.scene.eccentric_models",
         "with_chamber": "ringbalance.scene.chamber_file.loading",
+        "with_values": "ringbalance.scene.changes",
     }
 )
 

@@ -107,6 +107,11 @@ def checked_scene(scene: SceneFile) -> AnyScene:
     return cast("AnyScene", scene)
 
 
+def document_of(scene: SceneFile) -> Mapping[str, Any]:
+    """The scene's document, as TOML has it. Raises: SceneError: a scene that was not read."""
+    return _known(scene).document
+
+
 def _known(scene: SceneFile) -> CheckedValues:
     """Raises: SceneError: a record that was not read."""
     if scene.checked is None:

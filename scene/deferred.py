@@ -16,6 +16,7 @@ _HOME: Final = MappingProxyType(
         "CHECKS": "ringbalance.scene.rules.eccentric",
         "ECCENTRIC_MASS": "ringbalance.scene.eccentric_models",
         "EccentricScene": "ringbalance.scene.eccentric_models",
+        "scene_lines": "ringbalance.scene.describe",
         "with_chamber": "ringbalance.scene.chamber_file.loading",
         "with_values": "ringbalance.scene.changes",
     }

@@ -14,6 +14,7 @@ from ringbalance.scene import deferred
 from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
 from ringbalance.scene.keys.fields import Bounds, OneLine, number, numbers, whole
 from ringbalance.scene.loop_models import RunSettings
+from ringbalance.scene.results import summary_text
 
 Number = Annotated[float, number(Bounds())]
 Numbers = Annotated[tuple[float, ...], numbers()]
@@ -131,6 +132,11 @@ class SceneFile:
     """Origin of each key by path; empty for a scene that was not read from a file."""
     checked: CheckedValues | None = field(default=None, compare=False, repr=False)
     """None for a scene that was not read from a file."""
+
+    def __repr__(self) -> str:
+        """Name, file and hash; the values are its fields."""
+        lines = deferred.scene_lines(self)
+        return summary_text((f"Scene {self.name!r} ({self.source}, SHA-256 {self.sha256[:12]})", *lines))
 
     def with_values(self, values: Mapping[str, object], *, origin: Origin = "given") -> Self:
         """The scene with other values, checked as a file is checked, with hashes of its own.

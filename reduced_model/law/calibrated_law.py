@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, save_record
+from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, law_text, save_record
 from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads
@@ -79,6 +79,9 @@ class CalibratedLaw:
     """The moment that goes with this law."""
     gas_factor: float = 1.0
     """Gas pressure on the liquid over the one at the place of measurement, which all arguments are."""
+
+    def __repr__(self) -> str:
+        return law_text(self)
 
     @property
     def density(self) -> float:

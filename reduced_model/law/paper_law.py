@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, save_record
+from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, law_text, save_record
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
@@ -73,6 +73,9 @@ class PaperLaw:
     """Absolute, Pa."""
     moment: PaperMoment
     """The moment that goes with this law."""
+
+    def __repr__(self) -> str:
+        return law_text(self)
 
     @property
     def name(self) -> str:

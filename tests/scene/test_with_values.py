@@ -50,14 +50,11 @@ def test_it_is_the_scene_that_the_changed_file_would_be(paper_scene: Scene) -> N
     assert paper_scene.tube.bore == 1.5e-3
 
 
-@pytest.mark.parametrize("dimension", sorted(DIMENSIONS))
+@pytest.mark.parametrize("dimension", sorted({*DIMENSIONS} - {"share"}))
 def test_a_number_is_one_in_si(dimension: str) -> None:
     """What `with_values` writes for a number, the first unit of its dimension, reads back to the last bit."""
     unit = next(iter(DIMENSIONS[dimension].units))
-    factor = 0.01 if dimension == "share" else 1.0
-    assert parse_quantity(f"{0.1 + 0.2!r} {unit}", dimension) == pytest.approx(
-        factor * (0.1 + 0.2), rel=1e-16
-    )
+    assert parse_quantity(f"{0.1 + 0.2!r} {unit}", dimension) == 0.1 + 0.2
 
 
 def test_numbers_lists_and_tables() -> None:
@@ -87,7 +84,7 @@ def test_defaults_follow_and_keys_go(paper_scene: Scene) -> None:
     )
     assert (six.disc.chambers, len(six.controller.sequence)) == (6, 6)
     warm = paper_scene.with_values({"liquid.temperature": "40 degC"})
-    assert warm.liquid.density < paper_scene.liquid.density
+    assert warm.liquid.kinematic_viscosity < 0.7 * paper_scene.liquid.kinematic_viscosity
     straight = paper_scene.with_values({"tube.hump_radius": None, "uncertainty.hump_radius": None})
     assert straight.tube.hump_radius is None
     assert paper_scene.with_values({}) is paper_scene

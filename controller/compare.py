@@ -24,6 +24,7 @@ from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.results import CommandResult
 
 _ModelOf = Callable[[Scene], BalancerModel]
 """Makes the model of a liquid ring from its scene on the common rotor."""
@@ -88,9 +89,12 @@ class Side:
         return [getattr(result, name) for result in self.results]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Comparison(CommandResult):
     """Two balancers on one rotor."""
+
+    _document = "ringbalance.controller.compare:Comparison.document"
+    _summary = "ringbalance.controller.summary:comparison_lines"
 
     rotor: OneRotor
     """That of the first scene."""

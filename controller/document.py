@@ -26,8 +26,11 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
     `time_s`, `amplitude_m`, `phase_rad` and each list of `fill_ratio` run together and hold the true state;
     what the sensor showed is under `samples`, null where a sample was dropped or not a number.
     """
+    scene = simulation.scene
     return {
+        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "balancer": simulation.balancer,
+        "controller": simulation.controller,
         "law": simulation.law,
         "integrator": simulation.integrator,
         "settled": simulation.settled,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import can_carry
@@ -51,6 +52,17 @@ def line_runs(scene: Scene, model: BalancerModel) -> tuple[_LineRun, ...]:
             _LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)
         )
     return tuple(found)
+
+
+def command_document(simulation: Simulation, at_ends: Sequence[_LineRun] | None = None) -> dict[str, Any]:
+    """What `ringbalance simulate --json` prints of a run.
+
+    Args: `at_ends`: of the same scene and law; None: they are run, unless algorithm or sensor are the
+        caller's own.
+    """
+    if at_ends is None:
+        at_ends = line_runs(simulation.scene, simulation.model) if simulation.as_scene else ()
+    return simulation_document(simulation) | {"gas_line_runs": line_runs_document(at_ends)}
 
 
 def line_runs_text(runs: Sequence[_LineRun]) -> str:

@@ -11,6 +11,9 @@ import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.law_based import LawBased
+from ringbalance.controller.algorithms.target_vector import TargetVector
+from ringbalance.controller.algorithms.trial import Trial
 from ringbalance.controller.checks import check_fit, check_settings
 from ringbalance.controller.formulas import Cause, has_held, has_risen, stop_cause
 from ringbalance.controller.liquid_ring.integrators import integrator_of
@@ -110,12 +113,20 @@ def simulate(
         ),
         controller=used_controller,
         sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
+        own_algorithm=_own_name(controller),
+        as_scene=controller is None and sensor is None,
         exact=sensor is None and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0,
         state=DiscState.initial(disc=scene.disc),
     )
     run.cause = run.go(progress or (lambda _, __: None))
     name = getattr(quasi_steady, "__name__", "custom") if dynamics is None else RUNGE_KUTTA
     return _record(run, integrator=name, used=used)
+
+
+def _own_name(controller: Controller[Any] | None) -> str:
+    """Name of a caller's algorithm; empty for one of the program's."""
+    known = controller is None or isinstance(controller, TargetVector | Trial | LawBased)
+    return "" if known else type(controller).__name__
 
 
 def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> BalancerModel:
@@ -134,6 +145,8 @@ class _Run(Facts):
     controller: Controller[Any]
     sensor: Sensor
     exact: bool
+    as_scene: bool
+    """Whether algorithm and sensor are those of the scene."""
     times: list[FloatArray] = field(default_factory=list)
     fills: list[FloatArray] = field(default_factory=list)
     vibrations: list[ComplexArray] = field(default_factory=list)
@@ -318,6 +331,8 @@ def _record(run: _Run, *, integrator: str, used: tuple[ModelUsed, ...]) -> Simul
         scene=run.scene,
         model=run.plant.model,
         balancer="liquid_ring",
+        controller=run.own_algorithm or run.scene.controller.kind,
+        as_scene=run.as_scene,
         integrator=integrator,
         outcome=run.outcome,
         settled=settled,

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.advice import lowered_gain, raised_gain
 from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, runs_back_text
@@ -44,6 +45,8 @@ class Facts:
     plant: LiquidRing
     state: DiscState
     loop: LoopFactor
+    own_algorithm: str = ""
+    """Name of the caller's; empty: that of the scene."""
     time: float = 0.0
     """s."""
     since: float = math.inf
@@ -225,9 +228,9 @@ def _settled(facts: Facts) -> str:
 
 def _lower(facts: Facts) -> str:
     """What to change in a loop that overshoots; the law-based algorithm has no gain to lower."""
-    if facts.scene.controller.kind == "law_based":
+    if facts.scene.controller.kind == "law_based" and not facts.own_algorithm:
         return _standing(facts) or "check controller.assumed_influence_coefficient and assumed_lag_angle"
-    return f"lower controller.proportional{_to_gain(facts)}"
+    return lowered_gain(facts.own_algorithm, _to_gain(facts))
 
 
 def _to_gain(facts: Facts) -> str:
@@ -275,7 +278,7 @@ def _unstable(facts: Facts) -> str:
 
 
 def _standing(facts: Facts) -> str:
-    return standing_remedy(facts.scene, facts.plant.model)
+    return "" if facts.own_algorithm else standing_remedy(facts.scene, facts.plant.model)
 
 
 def _not_settled(facts: Facts) -> str:
@@ -289,7 +292,7 @@ def _time_limit(facts: Facts) -> str:
     if facts.overshoots > MANY_OVERSHOOTS:
         cure = f"{facts.overshoots} overshoots: {_lower(facts)}, or shorten the trial steps"
     else:
-        cure = _standing(facts) or "raise controller.proportional or run.time_limit"
+        cure = _standing(facts) or f"{raised_gain(facts.own_algorithm)} or raise run.time_limit"
     return f"{_not_settled(facts)}; time is up ({facts.scene.run.time_limit:.4g} s): {cure}"
 
 
@@ -355,7 +358,7 @@ def _too_short(facts: Facts) -> str:
         )
     return (
         f"{_not_settled(facts)}; the commanded valve-open times have fallen below the valves' minimum of "
-        f"{facts.scene.controller.minimum_gas_time * 1e3:.4g} ms: raise controller.proportional, lower "
+        f"{facts.scene.controller.minimum_gas_time * 1e3:.4g} ms: {raised_gain(facts.own_algorithm)}, lower "
         "controller.minimum_gas_time or raise controller.limit"
     )
 
@@ -363,7 +366,8 @@ def _too_short(facts: Facts) -> str:
 def _pushed(facts: Facts) -> str:
     """What moves liquid where an amplitude stands still."""
     settings = facts.scene.controller
-    without = settings.kind == "target_vector" and settings.integral_time is None
+    from_scene = settings.kind == "target_vector" and not facts.own_algorithm
+    without = from_scene and settings.integral_time is None
     first = "set controller.integral_time to some periods, " if without else ""
     return f"{first}raise controller.limit, or use a larger or faster valve"
 

@@ -24,6 +24,7 @@ from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.selection.registry import ModelUsed
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.results import CommandResult
 
 _LITRE = 1e-3
 
@@ -172,14 +173,21 @@ class Injection:
     operation: Operation
 
 
-@dataclass(frozen=True, kw_only=True)
-class Simulation:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Simulation(CommandResult):
     """One closed-loop run."""
+
+    _document = "ringbalance.controller.line_runs:command_document"
+    _summary = "ringbalance.controller.summary:simulation_lines"
 
     scene: Scene
     model: BalancerModel
     balancer: str
     """ "liquid_ring"."""
+    controller: str
+    """`controller.kind` of the scene; of another algorithm the name of its type."""
+    as_scene: bool
+    """Whether algorithm and sensor are those of the scene."""
     integrator: str
     """How operations were carried through time."""
     outcome: Outcome

@@ -43,13 +43,17 @@ class Block:
     """One file of measurements, its errors made independent."""
 
     observations: Observations
-    kind: PredictedKind
     measured: FloatArray
     """y, shape (n,)."""
     whiten: FloatArray
     """L^-1, shape (n, n)."""
     free: FloatArray
     """B, shape (n, m)."""
+
+    @property
+    def kind(self) -> PredictedKind:
+        """How the data are predicted."""
+        return PREDICTED[self.observations.kind]
 
     @property
     def group(self) -> str:
@@ -68,7 +72,6 @@ class Block:
         lower = np.linalg.cholesky(kind.covariance(observations))
         return cls(
             observations=observations,
-            kind=kind,
             measured=kind.measured(observations),
             whiten=np.linalg.inv(lower),
             free=np.zeros((len(lower), 0)) if kind.free is None else kind.free(observations),

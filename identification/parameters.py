@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 from ringbalance.identification.predict.device import Device, Models
@@ -105,7 +106,7 @@ class Parameter:
             offset=offset,
             gain=gain,
             scale=scale,
-            change=lambda to, value: with_value(scene=to, quantity=name, value=value),
+            change=partial(_with_quantity, name),
         )
 
 
@@ -127,6 +128,14 @@ START: Final = ("initial_amplitude", "initial_phase")
 _LOSS_STEP: Final = 0.01
 
 
+def _with_quantity(name: str, scene: Scene, value: float) -> Scene:
+    return with_value(scene=scene, quantity=name, value=value)
+
+
+def _with_start(name: str, scene: Scene, value: float) -> Scene:
+    return replace(scene, rotor=replace(scene.rotor, **{name: value}))
+
+
 def _of_start(scene: Scene, name: str) -> Parameter:
     """Amplitude or phase of the vibration without trial weight, of which nothing is known beforehand."""
     start = float(getattr(scene.rotor, name))
@@ -142,7 +151,7 @@ def _of_start(scene: Scene, name: str) -> Parameter:
         highest=ends[1],
         prior=None,
         scale=scale,
-        change=lambda to, value: replace(to, rotor=replace(to.rotor, **{name: value})),
+        change=partial(_with_start, name),
     )
 
 

@@ -36,6 +36,7 @@ from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
+from ringbalance.scene.results import CommandResult
 
 VELOCITY_POINTS: Final = 47
 IDENTIFIABILITY: Final = (
@@ -44,9 +45,12 @@ IDENTIFIABILITY: Final = (
 )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Calibration:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Calibration(CommandResult):
     """Everything that `calibrate` finds out about a scene's balancer."""
+
+    _document = "ringbalance.reduced_model.documents:calibration_document"
+    _summary = "ringbalance.reduced_model.summary:calibration_lines"
 
     scene: Scene
     """With the models of the tube's loss that its tolerance asks for."""

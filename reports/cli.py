@@ -7,11 +7,12 @@ loads the same meanwhile.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from ringbalance.reports import deferred
-from ringbalance.scene import liquid_ring_scene, load_scene, read_scene
+from ringbalance.scene import Scene, liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.narrowing import Models, with_tolerance
@@ -96,16 +97,29 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
         OSError: the folder cannot be written.
     """
     told = liquid_ring_scene(load_scene(scene))
-    console, process = messages_console(), deferred.drawing
-    with staged(out, folders=process.FOLDERS) as stage, activity("plot", "pressure fields") as shown:
-        fields = process.write_fields(scene=told, folder=stage)
-        drawing = process.start_drawing(scene=told, fields=fields, folder=stage)
-        try:
-            shown.show("pictures")
-            pictures = drawing.finish()
-        finally:
-            drawing.stop()
+    with activity("plot", "pressure fields") as shown:
+        pictures = draw_pictures(told, out, progress=shown.show)
     if not pictures["drawn"]:
-        console.print(pictures["text"], markup=False, highlight=False)
+        messages_console().print(pictures["text"], markup=False, highlight=False)
     print(out)
     return DONE if pictures["drawn"] else NOT_SOUND
+
+
+def draw_pictures(
+    scene: Scene, out: Path, *, progress: Callable[[str], None] = lambda _: None
+) -> dict[str, Any]:
+    """Write figures/*.png and fields/*.vtu of a scene.
+
+    Returns: `drawn`, and `text` with the reason where this machine cannot draw.
+    Raises: OSError: the folder cannot be written.
+    """
+    process = deferred.drawing
+    with staged(out, folders=process.FOLDERS) as stage:
+        fields = process.write_fields(scene=scene, folder=stage)
+        drawing = process.start_drawing(scene=scene, fields=fields, folder=stage)
+        try:
+            progress("pictures")
+            pictures: dict[str, Any] = drawing.finish()
+        finally:
+            drawing.stop()
+    return pictures

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json as json_format
 import os
-import tomllib
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Final
@@ -16,8 +15,10 @@ from rich.table import Table
 from ringbalance.reports.numbers import number
 from ringbalance.reports.pages.extremes import axis_rows, map_drawings
 from ringbalance.reports.section import Cells
+from ringbalance.scene.changes import document_of
 from ringbalance.scene.faults import Fault, SceneError, toml_text
-from ringbalance.scene.loader import read_scene
+from ringbalance.scene.loader import load_scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.processes import checked_workers
@@ -59,7 +60,7 @@ def extremes(
         SceneError: a scene that cannot be used; nothing is written.
         OSError: the folder cannot be written.
     """
-    base = _scene_base(scene)
+    base = base_of(liquid_ring_scene(load_scene(scene)))
     console = messages_console()
     with nullcontext() if out is None else staged(out, files=(KEPT, FILE)) as stage:
         with activity("extremes", "axes") as shown:
@@ -105,13 +106,11 @@ def _show(told: Record, rows: list[Cells]) -> None:
         console.print(Padding(f"{fault['violations']} at {fault['point']}", (0, 0, 0, 2)), style="red")
 
 
-def _scene_base(path: Path) -> Base:
-    """Take a scene file as the scene to vary.
+def base_of(scene: Scene) -> Base:
+    """Take a scene as the one to vary.
 
-    Raises: SceneError: the file is no liquid-ring scene, or its chamber is imported.
+    Raises: SceneError: its chamber is imported.
     """
-    read, text = read_scene(path)
-    scene = liquid_ring_scene(read)
     if scene.disc.geometry is not None:
         fault = Fault(
             file=scene.file,
@@ -122,4 +121,4 @@ def _scene_base(path: Path) -> Base:
             allowed="a scene that gives the dimensions of its chambers",
         )
         raise SceneError([fault])
-    return Base(document=tomllib.loads(text), file=scene.source)
+    return Base(document=document_of(scene), file=scene.source)

@@ -15,7 +15,7 @@ from ringbalance.controller.eccentric_mass.document import (
     show_eccentric,
 )
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
-from ringbalance.controller.line_runs import line_runs, line_runs_document, line_runs_text
+from ringbalance.controller.line_runs import command_document, line_runs, line_runs_text
 from ringbalance.controller.loop import simulate as run_loop
 from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reports.figures import deferred
@@ -115,8 +115,7 @@ def _ring(scene: Scene, law: str, outputs: _Outputs) -> bool:
     if outputs.plot is not None:
         _draw(outputs.plot, deferred.run_figures(simulation_document(found)))
     if outputs.json:
-        document = simulation_document(found) | {"gas_line_runs": line_runs_document(at_ends)}
-        print(json_format.dumps(document, allow_nan=False))
+        print(json_format.dumps(command_document(found, at_ends), allow_nan=False))
     else:
         show(found, console=results_console())
         if at_ends:

@@ -1,6 +1,7 @@
 """ringbalance: are the closed formulas of a liquid-ring balancer to be trusted, for your disc?
 
 The names below are loaded when they are first used, so that `import ringbalance` costs nothing.
+docs/python.md shows them at work.
 """
 
 from __future__ import annotations
@@ -9,33 +10,121 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ringbalance.controller.algorithms.algorithm import Command as Command
+    from ringbalance.controller.algorithms.algorithm import Controller as Controller
+    from ringbalance.controller.algorithms.algorithm import Measurement as Measurement
+    from ringbalance.controller.algorithms.algorithm import ValveCommand as ValveCommand
+    from ringbalance.controller.compare import Comparison as Comparison
+    from ringbalance.controller.eccentric_mass.run_record import EccentricRun as EccentricRun
+    from ringbalance.controller.rotor import Sensor as Sensor
+    from ringbalance.controller.simulation import Simulation as Simulation
+    from ringbalance.controller.tuning.eccentric import EccentricTuning as EccentricTuning
+    from ringbalance.controller.tuning.tune import Tuning as Tuning
+    from ringbalance.face import calibrate as calibrate
     from ringbalance.face import compare as compare
+    from ringbalance.face import paper_law as paper_law
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
-    from ringbalance.reduced_model.calibration import calibrate as calibrate
+    from ringbalance.reduced_model.calibration import Calibration as Calibration
+    from ringbalance.reduced_model.law.flow_law import Flow as Flow
+    from ringbalance.reduced_model.law.flow_law import FlowLaw as FlowLaw
+    from ringbalance.reduced_model.law.flow_law import Regime as Regime
     from ringbalance.reduced_model.law.loading import load_law as load_law
-    from ringbalance.reduced_model.law.paper_law import paper_law as paper_law
-    from ringbalance.reports.report import write_report as write_report
+    from ringbalance.reduced_model.law.model import CompleteLaw as CompleteLaw
+    from ringbalance.reduced_model.law.model import MomentCurve as MomentCurve
+    from ringbalance.scene import EccentricScene as EccentricScene
+    from ringbalance.scene import Scene as Scene
     from ringbalance.scene import SceneError as SceneError
     from ringbalance.scene import bundled_scene as bundled_scene
     from ringbalance.scene import load_scene as load_scene
-    from ringbalance.verification.runner import run_cases as run_cases
+    from ringbalance.studies import Fit as Fit
+    from ringbalance.studies import extremes as extremes
+    from ringbalance.studies import fit as fit
+    from ringbalance.studies import plot as plot
+    from ringbalance.studies import run_cases as run_cases
+    from ringbalance.studies import trade as trade
+    from ringbalance.studies import write_report as write_report
+    from ringbalance.verification.extremes.study import Extremes as Extremes
+    from ringbalance.verification.selection_studies.study import TradeStudy as TradeStudy
 
 __version__ = "0.1.0"
 
 _HOME = {
+    "Calibration": "ringbalance.reduced_model.calibration",
+    "Command": "ringbalance.controller.algorithms.algorithm",
+    "Comparison": "ringbalance.controller.compare",
+    "CompleteLaw": "ringbalance.reduced_model.law.model",
+    "Controller": "ringbalance.controller.algorithms.algorithm",
+    "EccentricRun": "ringbalance.controller.eccentric_mass.run_record",
+    "EccentricScene": "ringbalance.scene",
+    "EccentricTuning": "ringbalance.controller.tuning.eccentric",
+    "Extremes": "ringbalance.verification.extremes.study",
+    "Fit": "ringbalance.studies",
+    "Flow": "ringbalance.reduced_model.law.flow_law",
+    "FlowLaw": "ringbalance.reduced_model.law.flow_law",
+    "Measurement": "ringbalance.controller.algorithms.algorithm",
+    "MomentCurve": "ringbalance.reduced_model.law.model",
+    "Regime": "ringbalance.reduced_model.law.flow_law",
+    "Scene": "ringbalance.scene",
     "SceneError": "ringbalance.scene",
+    "Sensor": "ringbalance.controller.rotor",
+    "Simulation": "ringbalance.controller.simulation",
+    "TradeStudy": "ringbalance.verification.selection_studies.study",
+    "Tuning": "ringbalance.controller.tuning.tune",
+    "ValveCommand": "ringbalance.controller.algorithms.algorithm",
     "bundled_scene": "ringbalance.scene",
-    "calibrate": "ringbalance.reduced_model.calibration",
+    "calibrate": "ringbalance.face",
     "compare": "ringbalance.face",
+    "extremes": "ringbalance.studies",
+    "fit": "ringbalance.studies",
     "load_law": "ringbalance.reduced_model.law.loading",
     "load_scene": "ringbalance.scene",
-    "paper_law": "ringbalance.reduced_model.law.paper_law",
-    "run_cases": "ringbalance.verification.runner",
+    "paper_law": "ringbalance.face",
+    "plot": "ringbalance.studies",
+    "run_cases": "ringbalance.studies",
     "simulate": "ringbalance.face",
+    "trade": "ringbalance.studies",
     "tune": "ringbalance.face",
-    "write_report": "ringbalance.reports.report",
+    "write_report": "ringbalance.studies",
 }
+__all__ = [
+    "Calibration",
+    "Command",
+    "Comparison",
+    "CompleteLaw",
+    "Controller",
+    "EccentricRun",
+    "EccentricScene",
+    "EccentricTuning",
+    "Extremes",
+    "Fit",
+    "Flow",
+    "FlowLaw",
+    "Measurement",
+    "MomentCurve",
+    "Regime",
+    "Scene",
+    "SceneError",
+    "Sensor",
+    "Simulation",
+    "TradeStudy",
+    "Tuning",
+    "ValveCommand",
+    "bundled_scene",
+    "calibrate",
+    "compare",
+    "extremes",
+    "fit",
+    "load_law",
+    "load_scene",
+    "paper_law",
+    "plot",
+    "run_cases",
+    "simulate",
+    "trade",
+    "tune",
+    "write_report",
+]
 
 
 def __getattr__(name: str) -> object:
@@ -45,4 +134,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME})
+    return sorted(__all__)

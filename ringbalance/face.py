@@ -1,63 +1,159 @@
-"""What a Python user calls, where it takes more than one room."""
+"""What a Python user calls: each function refuses a scene that was changed without its checks."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import overload
+from collections.abc import Callable, Collection
+from dataclasses import replace
+from typing import Any, Protocol, overload
 
+from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.compare import Comparison
 from ringbalance.controller.compare import compare as run_comparison
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.loop import Progress
 from ringbalance.controller.loop import simulate as run_closed_loop
+from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Simulation
+from ringbalance.controller.terms import can_carry
+from ringbalance.controller.tuning.eccentric import EccentricTuning, tune_eccentric
 from ringbalance.controller.tuning.tune import Tuning
 from ringbalance.controller.tuning.tune import tune as tune_scene
-from ringbalance.reduced_model.calibration import calibrate, calibrated_model
-from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
+from ringbalance.reduced_model.calibration import Calibration, calibrated_model
+from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.completing import completed_model, lacking
+from ringbalance.reduced_model.law.flow_law import Flow
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.reduced_model.law.paper_law import paper_law as paper_law_of
+from ringbalance.reduced_model.selection.registry import IN_INJECTIONS, NOT_MODELLED
 from ringbalance.scene import AnyScene, EccentricScene, Scene
-from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.changes import checked_scene
+
+
+class GivesVelocities(Protocol):
+    """The least that a flow law of one's own has."""
+
+    @property
+    def evaluate(self) -> Callable[..., Flow]:
+        """Flow for `fill_ratio`, `opposite_fill_ratio`, `gas_pressure` and `primed`, see `FlowLaw`."""
+        ...
+
+
+def calibrate(scene: AnyScene) -> Calibration:
+    """Calibrate a scene's balancer: lambda, k(u) and the flow law, with uncertainties.
+
+    Raises: SceneError: a rotor too slow for the liquid to form a ring, or a balancer without liquid.
+    """
+    return calibrate_scene(checked_scene(scene))
+
+
+def paper_law(scene: AnyScene) -> PaperLaw:
+    """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
+
+    Raises: SceneError: a balancer without liquid.
+    """
+    return paper_law_of(checked_scene(scene))
 
 
 @overload
 def simulate(
-    scene: AnyScene, *, flow_law: CompleteLaw, modelled: Collection[str] | None = None
+    scene: Scene,
+    *,
+    flow_law: GivesVelocities | None = None,
+    controller: Controller[Any] | None = None,
+    sensor: Sensor | None = None,
+    progress: Progress | None = None,
+    modelled: Collection[str] | None = None,
 ) -> Simulation: ...
 
 
 @overload
 def simulate(
-    scene: Scene, *, flow_law: CompleteLaw | None = None, modelled: Collection[str] | None = None
+    scene: EccentricScene,
+    *,
+    flow_law: None = None,
+    controller: None = None,
+    sensor: None = None,
+    progress: Progress | None = None,
+    modelled: None = None,
+) -> EccentricRun: ...
+
+
+@overload
+def simulate(
+    scene: AnyScene, *, flow_law: GivesVelocities, progress: Progress | None = None
 ) -> Simulation: ...
 
 
 @overload
-def simulate(scene: EccentricScene, *, flow_law: None = None, modelled: None = None) -> EccentricRun: ...
+def simulate(scene: AnyScene, *, progress: Progress | None = None) -> Simulation | EccentricRun: ...
 
 
 def simulate(
-    scene: AnyScene, *, flow_law: CompleteLaw | None = None, modelled: Collection[str] | None = None
+    scene: AnyScene,
+    *,
+    flow_law: GivesVelocities | None = None,
+    controller: Controller[Any] | None = None,
+    sensor: Sensor | None = None,
+    progress: Progress | None = None,
+    modelled: Collection[str] | None = None,
 ) -> Simulation | EccentricRun:
     """One closed-loop run of a scene's rotor: under a flow law, or with two eccentric masses.
 
     Args:
-        scene: the scene, of either balancer.
-        flow_law: the law, from `calibrate(scene).flow_law`, `paper_law(scene)` or `load_law(path)`; default
-            the calibrated law of the scene. Eccentric masses have none.
-        modelled: of "tube inertia", "gas filling" and "valve lag" those to model; default those whose
-            estimated contribution is above the scene's tolerance.
+        scene: the scene, of either balancer; all but `progress` is for a liquid ring alone.
+        flow_law: the law, from `calibrate(scene).flow_law`, `paper_law(scene)` or `load_law(path)`, or one of
+            your own; what that lacks is the calibrated law's, and the status says so. Default the calibrated
+            law.
+        controller: an algorithm of your own, see `Controller`; default that of the scene.
+        sensor: what the controller sees, called with the time, s, and the vibration, m, complex; default the
+            scene's noise from the scene's seed.
+        progress: called with the simulated time and the time limit, s.
+        modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
+            default those whose estimated contribution is above the scene's tolerance.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
-    Raises: ValueError: a flow law or terms for eccentric masses; terms that the scene or the law gives no
-        numbers for.
+    Raises: ValueError: a law, an algorithm, a sensor or terms for eccentric masses; terms that the scene or
+        the law gives no numbers for.
     """
+    scene = checked_scene(scene)
     if isinstance(scene, EccentricScene):
-        if flow_law is not None:
-            raise ValueError("eccentric masses have no flow law: leave flow_law out")
-        if modelled is not None:
-            raise ValueError("eccentric masses have no terms of a tube: leave modelled out")
-        return simulate_eccentric(scene)
-    law = calibrate(scene).flow_law if flow_law is None else flow_law
-    return run_closed_loop(scene, BalancerModel.of(law), modelled=modelled)
+        given = {"flow_law": flow_law, "controller": controller, "sensor": sensor, "modelled": modelled}
+        if names := [name for name, value in given.items() if value is not None]:
+            raise ValueError(f"eccentric masses have their own strategy: leave {', '.join(names)} out")
+        return simulate_eccentric(scene, progress=progress)
+    run = run_closed_loop(
+        scene,
+        _model_of(scene, flow_law),
+        controller=controller,
+        sensor=sensor,
+        progress=progress,
+        modelled=modelled,
+    )
+    remark = _of_own_law(scene, flow_law, run)
+    return replace(run, status=f"{run.status}; {remark}") if remark else run
+
+
+def _model_of(scene: Scene, law: Any) -> BalancerModel:
+    if law is None:
+        return BalancerModel.of(calibrate_scene(scene).flow_law)
+    if isinstance(law, CalibratedLaw | PaperLaw):
+        return BalancerModel.of(law)
+    return completed_model(law, by=calibrate_scene(scene).flow_law)
+
+
+def _of_own_law(scene: Scene, law: object, run: Simulation) -> str:
+    """What a run takes from elsewhere, or leaves out, because a law of the caller's own does not give it."""
+    if law is None or isinstance(law, CalibratedLaw | PaperLaw):
+        return ""
+    rows = [row.term for row in run.models_used if row.term in IN_INJECTIONS and row.model == NOT_MODELLED]
+    parts = []
+    if names := lacking(law):
+        parts.append(f"the law gives no {', '.join(names)}: those of the calibrated law are used")
+    if rows and not can_carry(scene, run.model):
+        parts.append(f"it gives velocities and no forces, so the run leaves out {', '.join(rows)}")
+    return "; ".join(parts)
 
 
 def compare(first: AnyScene, second: AnyScene) -> Comparison:
@@ -67,13 +163,42 @@ def compare(first: AnyScene, second: AnyScene) -> Comparison:
         liquid rings run under their calibrated laws.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
-    return run_comparison(first, second, model_of=lambda scene: calibrated_model(scene))
+    scenes = checked_scene(first), checked_scene(second)
+    return run_comparison(*scenes, model_of=lambda scene: calibrated_model(scene))
 
 
-def tune(scene: AnyScene, *, flow_law: CompleteLaw | None = None) -> Tuning:
+@overload
+def tune(
+    scene: Scene, *, flow_law: GivesVelocities | None = None, progress: Callable[[str], None] | None = None
+) -> Tuning: ...
+
+
+@overload
+def tune(
+    scene: EccentricScene, *, flow_law: None = None, progress: Callable[[str], None] | None = None
+) -> EccentricTuning: ...
+
+
+@overload
+def tune(scene: AnyScene, *, progress: Callable[[str], None] | None = None) -> Tuning | EccentricTuning: ...
+
+
+def tune(
+    scene: AnyScene,
+    *,
+    flow_law: GivesVelocities | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Tuning | EccentricTuning:
     """Recommend the controller's gain, with its margins and the settling times under it.
 
-    Raises: SceneError: a scene with eccentric masses, or a rotor too slow for the liquid to form a ring.
+    Args: `flow_law`: as in `simulate`. `progress`: called with what is being done.
+    Raises: SceneError: a rotor too slow for the liquid to form a ring.
+    Raises: ValueError: a flow law for eccentric masses.
     """
-    told = liquid_ring_scene(scene)
-    return tune_scene(told, calibrated_model(told) if flow_law is None else BalancerModel.of(flow_law))
+    scene = checked_scene(scene)
+    if not isinstance(scene, EccentricScene):
+        model = calibrated_model(scene) if flow_law is None else _model_of(scene, flow_law)
+        return tune_scene(scene, model, progress=progress)
+    if flow_law is not None:
+        raise ValueError("eccentric masses have no flow law: leave flow_law out")
+    return tune_eccentric(scene, told=progress)

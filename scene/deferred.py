@@ -1,4 +1,4 @@
-"""What only a scene with eccentric masses or the mesh of a chamber needs, loaded when first used.
+"""What only scenes with eccentric masses, with the mesh of a chamber or with changes need, loaded then.
 
 Others start faster without.
 
@@ -16,7 +16,9 @@ _HOME: Final = MappingProxyType(
         "CHECKS": "ringbalance.scene.rules.eccentric",
         "ECCENTRIC_MASS": "ringbalance.scene.eccentric_models",
         "EccentricScene": "ringbalance.scene.eccentric_models",
+        "scene_lines": "ringbalance.scene.describe",
         "with_chamber": "ringbalance.scene.chamber_file.loading",
+        "with_values": "ringbalance.scene.changes",
     }
 )
 

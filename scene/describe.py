@@ -13,6 +13,7 @@ from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Bend, Scene
+from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 from ringbalance.scene.units import DIMENSIONS, format_quantity
 
@@ -143,6 +144,32 @@ def scene_fault(scene: Scene, path: str, *, problem: str, allowed: str) -> Fault
     return Fault(file=scene.file, table=table, key=key, value=written, problem=problem, allowed=allowed)
 
 
+_MAIN: Final = (
+    ("disc.chambers", "disc.inner_radius", "disc.outer_radius", "disc.axial_width"),
+    ("liquid.name", "liquid.density", "tube.bore", "tube.length"),
+    ("gas.pressure", "rotor.speed", "rotor.influence_coefficient"),
+    ("controller.kind", "controller.limit", "run.seed"),
+)
+_ECCENTRIC_MAIN: Final = (
+    ("rotor.mass", "rotor.stiffness", "rotor.damping"),
+    ("imbalance.mass", "imbalance.radius", "masses.mass", "masses.guide_radius"),
+    ("supervisor.limit", "run.seed"),
+)
+
+
+def scene_lines(scene: AnyScene) -> Iterator[str]:
+    """Main values of a scene with their keys, for its text in a terminal."""
+    for paths in _MAIN if isinstance(scene, Scene) else _ECCENTRIC_MAIN:
+        yield ", ".join(f"{path} {_short(scene, path)}" for path in paths)
+
+
+def _short(scene: AnyScene, path: str) -> str:
+    value, unit = _value(scene, path), usual_unit(path)
+    if isinstance(value, float):
+        return f"{in_usual_unit(path, value):.4g} {unit}".rstrip()
+    return str(value)
+
+
 def _rows(scene: Scene, group: str, line: _Line) -> Iterator[Row]:
     value = _value(scene, line.path)
     if value is None and not line.shown.absent:
@@ -160,7 +187,7 @@ def _rows(scene: Scene, group: str, line: _Line) -> Iterator[Row]:
     )
 
 
-def _value(scene: Scene, path: str) -> Any:
+def _value(scene: AnyScene, path: str) -> Any:
     value: Any = scene
     for part in path.split("."):
         value = getattr(value, part)

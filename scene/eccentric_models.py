@@ -149,7 +149,7 @@ class EccentricSensor:
     step: Annotated[PositiveTime, standard("1 ms", "time between two samples, the step of the whole loop")]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class EccentricScene(SceneFile):
     """All that a run with two eccentric masses needs, in SI units."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import MISSING, fields, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import MISSING, fields
 from importlib import resources
 from os import PathLike
 from pathlib import Path, PurePath
-from typing import Any
+from typing import Any, Final
 
 from ringbalance.scene import deferred
 from ringbalance.scene.chamber_file.keys import MeshKeys
@@ -19,7 +19,7 @@ from ringbalance.scene.keys.schema import BALANCERS, LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.liquids import with_liquid
 from ringbalance.scene.models import InputUncertainty
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.origins import ShownOrigin
+from ringbalance.scene.origins import CheckedValues, ShownOrigin
 from ringbalance.scene.rules import shape, validity, working
 from ringbalance.scene.rules.check import failed_checks
 from ringbalance.scene.rules.fitted import fitted_faults
@@ -28,6 +28,8 @@ from ringbalance.scene.toml_reading import read_toml
 _LARGEST_FILE = 2**20
 _DECIDE_NOTHING = ("requirement.", "measured.", "rotor.mass", "liquid.source")
 """Values that no result depends on."""
+CHANGED: Final = ", changed"
+"""Behind the name of a file some of whose values were changed since."""
 
 
 def load_scene(path: str | PathLike[str]) -> AnyScene:
@@ -56,12 +58,33 @@ def scene_from(*, content: bytes, file: str, folder: Path | None = None) -> AnyS
     Args: `folder`: from which files that it names are looked for; that of `file` by default.
     Raises: SceneError: anything in it is wrong; all of it is said at once.
     """
-    document = _document(content, file)
-    if _kind(document) == "liquid_ring":
-        folder = Path(file).parent if folder is None else folder
-        reading, found = _read_liquid_ring(document, file=file, folder=folder)
-    else:
-        reading, found = _read_eccentric_mass(document, file=file)
+    return scene_of(
+        _document(content, file),
+        file=file,
+        source=PurePath(file).name,
+        folder=(Path(file).parent if folder is None else folder).absolute(),
+        sha256=lambda: hashlib.sha256(content).hexdigest(),
+        derived={},
+    )
+
+
+def scene_of(
+    document: Mapping[str, Any],
+    *,
+    file: str,
+    source: str,
+    folder: Path,
+    sha256: Callable[[], str],
+    derived: Mapping[str, Any],
+) -> AnyScene:
+    """The scene of a document as TOML has it.
+
+    Args: `file`: for messages. `folder`: of the mesh that it may name. `sha256`: called when all is well.
+        `derived`: values by path that this mesh gives, where they are known; empty: it is read.
+    Raises: SceneError: anything in it is wrong; all of it is said at once.
+    """
+    read = _read_liquid_ring if _kind(document) == "liquid_ring" else _read_eccentric_mass
+    reading, found = read(document, file=file, folder=folder, derived=derived)
     found = (*found, *_origin_faults(reading, found), *fitted_faults(reading))
     if found:
         raise SceneError(_sorted(found, reading.schema))
@@ -69,15 +92,17 @@ def scene_from(*, content: bytes, file: str, folder: Path | None = None) -> AnyS
         **_records(reading),
         "name": reading.values["name"],
         "tolerance": reading.values["accuracy.tolerance"],
-        "source": PurePath(file).name,
+        "source": source,
         "file": file,
-        "sha256": hashlib.sha256(content).hexdigest(),
+        "sha256": sha256(),
         "values_sha256": _values_hash(reading),
         "defaulted": _defaulted(reading),
         "origins": tuple(_origins(reading)),
         "uncertainty": tuple(_uncertainty(reading)),
     }
-    scene: AnyScene = reading.schema.scene(**parts)
+    of_mesh = {path: reading.values[path] for path in reading.derived}
+    checked = CheckedValues(document=document, folder=folder, parts=parts, derived=of_mesh)
+    scene: AnyScene = reading.schema.scene(**parts, checked=checked)
     return scene
 
 
@@ -166,12 +191,13 @@ def _origin_faults(reading: Reading, found: Iterable[Fault]) -> Iterator[Fault]:
 
 
 def _read_liquid_ring(
-    document: Mapping[str, Any], *, file: str, folder: Path
+    document: Mapping[str, Any], *, file: str, folder: Path, derived: Mapping[str, Any]
 ) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file, schema=LIQUID_RING)
-    reading = replace(reading, folder=folder)
-    if any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
-        reading, mesh_faults = deferred.with_chamber(reading)
+    if derived:
+        reading = reading.following(derived)
+    elif any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
+        reading, mesh_faults = deferred.with_chamber(reading, folder=folder)
         faults = (*faults, *mesh_faults)
     reading, liquid_faults = with_liquid(reading.completed())
     failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS, *validity.CHECKS))
@@ -179,7 +205,9 @@ def _read_liquid_ring(
     return reading, (*faults, *reading.missing_faults(), *liquid_faults, *failed, *uncertain)
 
 
-def _read_eccentric_mass(document: Mapping[str, Any], *, file: str) -> tuple[Reading, tuple[Fault, ...]]:
+def _read_eccentric_mass(
+    document: Mapping[str, Any], *, file: str, **_: object
+) -> tuple[Reading, tuple[Fault, ...]]:
     reading, faults = read_document(document, file=file, schema=deferred.ECCENTRIC_MASS)
     reading = reading.completed()
     return reading, (*faults, *reading.missing_faults(), *failed_checks(reading, deferred.CHECKS))

@@ -396,7 +396,7 @@ class InputUncertainty:
         return self.half_width * (abs(value) if self.relative else 1.0)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Scene(SceneFile):
     """All that a run needs, in SI units."""
 

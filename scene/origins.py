@@ -5,13 +5,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, cast
 
+from ringbalance.scene import deferred
 from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
 from ringbalance.scene.keys.fields import Bounds, OneLine, number, numbers, whole
 from ringbalance.scene.loop_models import RunSettings
+from ringbalance.scene.results import summary_text
 
 Number = Annotated[float, number(Bounds())]
 Numbers = Annotated[tuple[float, ...], numbers()]
@@ -92,6 +96,20 @@ KEY_OF_FIELD = {
 """Path of the key from which a field of another name is read."""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class CheckedValues:
+    """What was read and checked: a record that differs was changed without a check."""
+
+    document: Mapping[str, Any]
+    """Of the scene file, as TOML has it."""
+    folder: Path
+    """Absolute; from which a mesh is read."""
+    parts: Mapping[str, object]
+    """Fields of the scene by name, without this one."""
+    derived: Mapping[str, Any]
+    """Values that the mesh of a chamber gives, SI, by path."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SceneFile:
     """What scenes of both kinds of balancer have."""
@@ -115,6 +133,24 @@ class SceneFile:
     """Joint distribution of the inputs that were fitted together."""
     origins: tuple[tuple[str, ShownOrigin], ...] = ()
     """Origin of each key by path; empty for a scene that was not read from a file."""
+    checked: CheckedValues | None = field(default=None, compare=False, repr=False)
+    """None for a scene that was not read from a file."""
+
+    def __repr__(self) -> str:
+        """Name, file and hash; the values are its fields."""
+        lines = deferred.scene_lines(self)
+        return summary_text((f"Scene {self.name!r} ({self.source}, SHA-256 {self.sha256[:12]})", *lines))
+
+    def with_values(self, values: Mapping[str, object], *, origin: Origin = "given") -> Self:
+        """The scene with other values, checked as a file is checked, with hashes of its own.
+
+        What follows from a changed value, such as a default, follows again.
+        Args: `values`: by path in a scene file, such as "tube.bore": text with a unit ("2 mm"), or a number
+            in SI; None takes a key away. `origin`: of all of them.
+        Raises: SceneError: everything that is wrong with the result; or this record was itself changed in
+            another way.
+        """
+        return cast(Self, deferred.with_values(self, values, origin=origin))
 
     def origin_of(self, path: str) -> ShownOrigin:
         """Where the value at a path such as "tube.bore" comes from.

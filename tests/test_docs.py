@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import subprocess
+import sys
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +14,6 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.cli import COMMANDS
-from ringbalance.controller.document import simulation_document
-from ringbalance.controller.line_runs import line_runs_document
-from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.document import results_document
@@ -26,7 +26,6 @@ PAGES = (
 )
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 FENCE = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
-CODE = re.compile(r"`([a-zA-Z0-9_.]+)`")
 
 
 def text(page: str) -> str:
@@ -36,23 +35,6 @@ def text(page: str) -> str:
 def fenced(page: str, language: str) -> str:
     """The first block of code of a language."""
     return next(str(body) for name, body in FENCE.findall(text(page)) if name == language)
-
-
-def first_column(page: str, heading: str) -> list[str]:
-    """Words in code type in the first column of the tables below a heading."""
-    section = text(page).split(f"## {heading}\n")[1].split("\n## ")[0]
-    cells = [line.split("|")[1] for line in section.splitlines() if line.startswith("|")]
-    return [word for cell in cells for word in CODE.findall(cell)]
-
-
-def has_path(document: Mapping[str, Any], path: str) -> bool:
-    """Whether `a.b` stands in nested mappings."""
-    here: Any = document
-    for part in path.split("."):
-        if not isinstance(here, Mapping) or part not in here:
-            return False
-        here = here[part]
-    return True
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -93,20 +75,38 @@ def test_the_readme_s_python_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     assert names["run"].amplitude.size > 1
 
 
-def test_the_promised_keys_of_calibrate_are_there(paper_scene: Scene) -> None:
-    document = calibration_document(rb.calibrate(paper_scene))
-    keys = first_column("docs/commands.md", "`calibrate --json`")
-    assert len(keys) > 20
-    assert [key for key in keys if not has_path(document, key)] == []
+def test_the_page_on_python_runs() -> None:
+    """Each block in turn, in a process of its own, because the pool starts others."""
+    blocks = [body for language, body in FENCE.findall(text("docs/python.md")) if language == "python"]
+    checks = (
+        "assert [flow.velocity.shape, len(designs), len(again)] == [(2,), 3, 3]\n"
+        "assert reasons and 0.05 < lever_arm < 0.1\n"
+        "assert velocities == [design.operating_point.velocity for design in again]\n"
+        "assert 'OneChamber' in repr(own) and own.injections\n"
+        "assert slower.law == 'Throttled' and 'tube inertia' in slower.status\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", "".join(blocks) + checks],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+    )
+    assert done.returncode == 0, done.stderr
 
 
-def test_the_promised_keys_of_simulate_are_there(paper_scene: Scene) -> None:
-    run = rb.simulate(paper_scene, flow_law=rb.paper_law(paper_scene))
-    keys = first_column("docs/commands.md", "`simulate --json`")
-    assert len(keys) > 8
-    # The command adds the runs at the ends of a gas line's range.
-    document = simulation_document(run) | {"gas_line_runs": line_runs_document(())}
-    assert [key for key in keys if not has_path(document, key)] == []
+def test_names_that_pages_mention_exist() -> None:
+    """`ringbalance.room.module` and `ringbalance.room.module.name`, and `rb.name`."""
+    for page in PAGES:
+        for path in re.findall(r"(?<![\w.-])ringbalance((?:\.[a-zA-Z_]\w*)+)", text(page)):
+            parts = path.lstrip(".").split(".")
+            found: Any = rb
+            for depth, part in enumerate(parts, start=1):
+                inside = ".".join(["ringbalance", *parts[:depth]])
+                is_module = hasattr(found, "__path__") and find_spec(inside) is not None
+                found = import_module(inside) if is_module else getattr(found, part)
+        for name in re.findall(r"\brb\.([a-zA-Z_]\w*)", text(page)):
+            assert name in rb.__all__, f"{page}: rb.{name}"
 
 
 def test_the_promised_keys_of_verify_are_there(paper_scene: Scene) -> None:

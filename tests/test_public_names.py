@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +37,7 @@ def test_an_unknown_name_is_refused() -> None:
 
 def test_a_saved_law_runs_as_the_fresh_one(paper_scene: Scene, tmp_path: Path) -> None:
     """What the README shows: calibrate, evaluate, save, load, simulate."""
-    scene = dataclasses.replace(paper_scene, run=dataclasses.replace(paper_scene.run, time_limit=5.0))
+    scene = paper_scene.with_values({"run.time_limit": "5 s"})
     law = rb.calibrate(scene).flow_law
     flow = law.evaluate(fill_ratio=[0.1, 0.25], gas_pressure=0.7e6)
     assert flow.velocity.shape == (2,)
@@ -51,7 +50,7 @@ def test_a_saved_law_runs_as_the_fresh_one(paper_scene: Scene, tmp_path: Path) -
 
 
 def test_simulate_models_the_terms_asked_for(paper_scene: Scene) -> None:
-    scene = dataclasses.replace(paper_scene, run=dataclasses.replace(paper_scene.run, time_limit=2.0))
+    scene = paper_scene.with_values({"run.time_limit": "2 s"})
     law = rb.calibrate(scene).flow_law
     assert rb.simulate(scene, flow_law=law, modelled=[]).terms_modelled == ()
     assert rb.simulate(scene, flow_law=law, modelled=["tube inertia"]).terms_modelled == ("tube inertia",)
@@ -59,4 +58,14 @@ def test_simulate_models_the_terms_asked_for(paper_scene: Scene) -> None:
         rb.simulate(scene, flow_law=law, modelled=["surface tension"])
     eccentric = rb.load_scene(rb.bundled_scene("driven_masses_small"))
     with pytest.raises(ValueError, match="leave modelled out"):
-        rb.simulate(eccentric, modelled=["tube inertia"])  # type: ignore[arg-type]
+        rb.simulate(eccentric, modelled=["tube inertia"])  # type: ignore[call-overload]
+
+
+def test_star_and_dir_give_the_interface_and_nothing_else() -> None:
+    names: dict[str, object] = {}
+    exec("from ringbalance import *", names)
+    names.pop("__builtins__")
+    assert set(names) == set(rb.__all__) == set(rb._HOME)
+    assert dir(rb) == sorted(rb.__all__)
+    studies = {"calibrate", "simulate", "tune", "fit", "compare", "trade", "extremes", "plot"}
+    assert studies | {"write_report", "load_law"} <= set(names)

@@ -9,7 +9,6 @@ equal fills, so a bore follows from a flow law and the other values of the scene
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 from scipy.optimize import brentq
 
@@ -49,7 +48,7 @@ def bore(scene: Scene, model_of: Callable[[Scene], BalancerModel]) -> float:
     """Bore, m, at which the rate is that of Fig. 7."""
 
     def excess(diameter: float) -> float:
-        changed = replace(scene, tube=replace(scene.tube, bore=diameter))
+        changed = scene.with_values({"tube.bore": diameter})
         return rate(changed, model_of(changed))[0] - RATE
 
     return float(brentq(excess, SHORTEST, LONGEST, xtol=1e-7))

@@ -32,7 +32,7 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
     kept = _thinned(run)
     return {
         "balancer": run.balancer,
-        "scene": run.scene,
+        "scene": {"name": run.scene, "source": run.source, "sha256": run.sha256},
         "settled": run.settled,
         "settling_time_s": run.settling_time,
         "outcome": run.outcome.value,

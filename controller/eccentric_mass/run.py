@@ -53,6 +53,8 @@ def simulate_eccentric(
     return EccentricRun(
         balancer="eccentric_mass",
         scene=scene.name,
+        source=scene.source,
+        sha256=scene.sha256,
         outcome=outcome,
         settled=settled,
         settling_time=facts.settling_time if settled else None,

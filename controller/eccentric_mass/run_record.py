@@ -11,6 +11,7 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.run_loop import Record
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
+from ringbalance.scene.results import CommandResult
 
 _NOTHING: Final = 1e-6
 """Share of the limit below which a vibration is round-off."""
@@ -59,14 +60,21 @@ class StageSpan:
     """s."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class EccentricRun:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class EccentricRun(CommandResult):
     """One run of the whole strategy on the plant."""
+
+    _document = "ringbalance.controller.eccentric_mass.document:eccentric_document"
+    _summary = "ringbalance.controller.summary:eccentric_lines"
 
     balancer: str
     """ "eccentric_mass"."""
     scene: str
     """Its name."""
+    source: str
+    """File name of the scene without its folder."""
+    sha256: str
+    """Of the scene."""
     outcome: EccentricOutcome
     settled: bool
     """Whether the amplitude ends at or below the limit and stays there."""

@@ -21,6 +21,7 @@ from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Sta
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
 from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene.results import CommandResult
 from ringbalance.scene.uncertain import eccentric_drawn
 
 RUNS: Final = 40
@@ -43,9 +44,12 @@ class _EccentricSettling:
     """Status of one run that ended in the most frequent way without settling; empty: all settled."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class EccentricTuning:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class EccentricTuning(CommandResult):
     """What is recommended for the drives of eccentric masses."""
+
+    _document = "ringbalance.controller.tuning.eccentric:eccentric_tuning_document"
+    _summary = "ringbalance.controller.summary:eccentric_tuning_lines"
 
     scene: EccentricScene
     """As given."""
@@ -54,6 +58,11 @@ class EccentricTuning:
     """Keys that the runs had lowered or raised to the recommended value, SI."""
     settling: _EccentricSettling | None
     """None: not asked for, or the masses are locked."""
+
+    @property
+    def recommended_scene(self) -> EccentricScene:
+        """The scene with the values that the runs had, checked, with a hash of its own."""
+        return self.scene.with_values(self.tuned, origin="inferred")
 
     @property
     def succeeded(self) -> bool:

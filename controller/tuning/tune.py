@@ -38,12 +38,18 @@ from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, l
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed, neglected_in_injections
 from ringbalance.scene.arrays import finite
+from ringbalance.scene.changes import rechecked
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.results import CommandResult
 
 
-@dataclass(frozen=True, kw_only=True)
-class Tuning:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tuning(CommandResult):
     """What is recommended for a scene's controller under a law."""
+
+    _document = "ringbalance.controller.tuning.tune:tuning_document"
+    _summary = "ringbalance.controller.summary:tuning_lines"
 
     scene: Scene
     """With what is recommended."""
@@ -79,6 +85,11 @@ class Tuning:
     settling: SettlingTimes | None
     models_used: tuple[ModelUsed, ...]
     status: str
+
+    @property
+    def recommended_scene(self) -> AnyScene:
+        """The scene with what is recommended, checked, with a hash of its own."""
+        return rechecked(self.scene)
 
     @property
     def succeeded(self) -> bool:

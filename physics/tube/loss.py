@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -90,11 +89,11 @@ def tube_loss(scene: Scene, velocity: npt.ArrayLike) -> TubeLoss:
         reynolds=state.reynolds,
         rotation_reynolds=float(state.rotation_reynolds),
         k=_estimate(right, parts, bool(np.any(outside))),
-        terms=MappingProxyType(dict(right.terms)),
-        uncertainty_parts=MappingProxyType(dict(parts)),
+        terms=dict(right.terms),
+        uncertainty_parts=dict(parts),
         flow_state=flow_states(state),
         in_range=np.asarray(~outside),
-        range_notes=MappingProxyType(dict(notes)),
+        range_notes=dict(notes),
         state=right,
     )
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, save_record
+from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, law_text, save_record
 from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty
 from ringbalance.reduced_model.tube.heads import TubeHeads
@@ -83,6 +83,9 @@ class CalibratedLaw:
     variants: tuple[CalibratedLaw, ...] = ()
     """Laws without uncertainties of a device that is lower, then higher, by the expanded uncertainty (95 %)
     along each direction of the inputs that were fitted together; `inputs` and the rest have the others."""
+
+    def __repr__(self) -> str:
+        return law_text(self)
 
     @property
     def density(self) -> float:

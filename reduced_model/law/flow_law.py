@@ -6,6 +6,7 @@ A law's file is JSON: records by their type and field names, floats by their sho
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from enum import IntEnum
@@ -17,6 +18,7 @@ import numpy.typing as npt
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, clipped
 from ringbalance.scene.platform.files import write_whole
+from ringbalance.scene.results import summary_text
 
 _FILL_SLACK: Final = 1e-9
 """Fill ratios this far outside the range are taken as its end: integrators land there by round-off."""
@@ -137,6 +139,19 @@ def _within(fill_ratio: npt.ArrayLike, largest: float, name: str) -> FloatArray:
     if not ((x >= -_FILL_SLACK) & (x <= largest + _FILL_SLACK)).all():
         raise ValueError(f"{name} must lie within [0, {largest:g}]")
     return clipped(x, 0.0, largest)
+
+
+def law_text(law: Any) -> str:
+    """What a complete law is made for, in a few lines."""
+    bore = 1e3 * math.sqrt(4 * law.tube_area / math.pi)
+    return summary_text(
+        (
+            f"Flow law {law.name!r}",
+            f"fill ratios 0 to {law.max_fill_ratio:g} of chambers of {1e6 * law.chamber_volume:.4g} ml",
+            f"tube of {bore:.4g} mm bore, liquid of {law.density:.4g} kg/m^3",
+            "velocity in the tube: evaluate(fill_ratio=, gas_pressure=)",
+        )
+    )
 
 
 FORMAT: Final = "ringbalance law"

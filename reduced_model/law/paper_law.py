@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.building import tube_path
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, save_record
+from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, law_text, save_record
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
@@ -79,6 +79,9 @@ class PaperLaw:
     return_pressure: float | None = None
     """Hydrostatic pressure of a vented chamber above which liquid leaves it against a vented one, Pa; None:
     never, as the paper has it."""
+
+    def __repr__(self) -> str:
+        return law_text(self)
 
     @property
     def name(self) -> str:

@@ -99,6 +99,8 @@ DARK: Final = {
     **{f"--fig-map-{step}": shade for step, shade in enumerate(_MAP_DARK)},
 }
 
+_FONT: Final = "DejaVu Sans, Arial, sans-serif"
+"""Of figures that are files."""
 _TEXT: Final = 8.8
 """Size of all text, pt: 8 pt where two narrow figures share the width of an A4 page, 13 px on a screen."""
 _RC: Final = {
@@ -168,17 +170,33 @@ class Drawing:
     wide: bool = False
     """Whether it takes the page's whole width."""
 
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height, pt."""
+        box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', self.svg)
+        if box is None:
+            raise ValueError(f"the figure {self.name} has no viewBox")
+        return float(box[1]), float(box[2])
+
     def standalone(self) -> str:
-        """The figure as a file of its own, which follows the viewer's light or dark scheme."""
+        """The figure as a file of its own, in the colours of a light page."""
+        return as_file(self.svg, *self.size)
 
-        def block(colours: dict[str, str]) -> str:
-            return "".join(f"{key}:{value};" for key, value in colours.items())
 
-        font = "--fig-font:system-ui,'Segoe UI',Roboto,'Helvetica Neue',Arial,sans-serif;"
-        dark = f"@media(prefers-color-scheme:dark){{svg{{{block(DARK)}}}}}"
-        style = f"<style>svg{{{font}{block(LIGHT)}}}{dark}</style>"
-        start = self.svg.index(">") + 1
-        return f'<?xml version="1.0" encoding="UTF-8"?>\n{self.svg[:start]}{style}{self.svg[start:]}\n'
+def as_file(body: str, width: float, height: float) -> str:
+    """An SVG file of svg elements; word processors, LaTeX and printers know neither variables nor schemes.
+
+    Args: `width`, `height`: pt.
+    """
+    body = body.replace("var(--fig-font)", _FONT)
+    for variable, colour in LIGHT.items():
+        body = body.replace(f"var({variable})", colour)
+    size = f'width="{width:g}pt" height="{height:g}pt" viewBox="0 0 {width:g} {height:g}"'
+    links = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<svg {links} {size}>\n'
+        f'<rect width="100%" height="100%" fill="{LIGHT["--fig-surface"]}"/>\n{body}\n</svg>\n'
+    )
 
 
 WIDE: Final = 7.5

@@ -49,7 +49,7 @@ _READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(
 _FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
 
 
-def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
+def with_chamber(reading: Reading, *, folder: Path) -> tuple[Reading, tuple[Fault, ...]]:
     """The reading with the geometry and the dimensions of the mesh that it names, and all errors of it."""
     keys = [f"disc.{key}" for key in keys_of(MeshKeys)]
     if not reading.given("disc.mesh"):
@@ -59,7 +59,7 @@ def with_chamber(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:
     if unit or reading.broken & set(keys) or not reading.known("accuracy.tolerance"):
         return unknown, (*superfluous, *unit)
     try:
-        known = _following(reading, *_chamber(reading))
+        known = _following(reading, *_chamber(reading, folder))
     except (MeshFileError, MemoryError) as error:
         return unknown, (*superfluous, *_mesh_faults(reading, error))
     return (unknown, superfluous) if superfluous else (known, ())
@@ -105,10 +105,10 @@ def _following(reading: Reading, geometry: ChamberGeometry, found: Placed) -> Re
     return reading.following({**values, "disc.geometry": geometry})
 
 
-def _chamber(reading: Reading) -> tuple[ChamberGeometry, Placed]:
+def _chamber(reading: Reading, folder: Path) -> tuple[ChamberGeometry, Placed]:
     """The mesh of a scene. Raises: MeshFileError: with all that is wrong with it."""
     name = reading.values["disc.mesh"]
-    path = reading.folder / name
+    path = folder / name
     content = _content_of(path)
     unit = _STEP_UNIT if _is_step(path) else reading.values["disc.mesh_unit"]
     contents = _contents_of(path, content, tolerance=reading.values["accuracy.tolerance"])

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import Any, Literal
 
 from ringbalance.scene.faults import MISSING, Fault, closest, did_you_mean, toml_key, toml_text
@@ -49,8 +49,6 @@ class Reading:
     """What such a file can hold."""
     derived: frozenset[str] = frozenset()
     """Paths of values that another file gives, which this one names."""
-    folder: Path = Path()
-    """Of the file, from which others that it names are looked for."""
 
     def adding(self, values: Mapping[str, Any]) -> Reading:
         """Copy with more values, SI, by path."""

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-import ringbalance as rb
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.cli import _calibration_view
 from ringbalance.reduced_model.documents import REMEDIES, RowStatus, _row_status, calibration_document
 from ringbalance.scene import Scene
@@ -69,7 +68,7 @@ def test_both_tables_have_the_same_rings_whatever_is_modelled(table_1_scene: Sce
     slow = replace(table_1_scene, rotor=replace(table_1_scene.rotor, speed=50.0))
     found = {}
     for tolerance in (0.5, 1e-4):
-        calibration = rb.calibrate(replace(slow, tolerance=tolerance))
+        calibration = calibrate(replace(slow, tolerance=tolerance))
         document = calibration_document(calibration)
         rows, columns = document["chamber"]["row_status"], document["law"]["column_status"]
         assert [s == "no_ring" for s in rows] == [s == "no_ring" for s in columns]
@@ -90,7 +89,7 @@ def test_table_and_document_mark_the_row(
     scene = changed(table_1_scene, crest=crest)
     environment = replace(scene.environment, gravity=9.80665, shaft="horizontal")
     scene = replace(scene, rotor=replace(scene.rotor, speed=speed), environment=environment)
-    calibration = rb.calibrate(scene)
+    calibration = calibrate(scene)
     states = calibration_document(calibration)["chamber"]["row_status"]
     assert states[0] == "ok"
     assert expected in states

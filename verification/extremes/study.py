@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.scene.results import CommandResult
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import MAP_PREFIX
 from ringbalance.verification.extremes.design import Base, Point, design
@@ -45,9 +46,12 @@ SIZES: Final[Mapping[Level, Size]] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Extremes:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Extremes(CommandResult):
     """What was found."""
+
+    _document = "ringbalance.verification.extremes.study:Extremes.document"
+    _summary = "ringbalance.verification.extremes.study:Extremes.lines"
 
     points: tuple[Point, ...]
     judgements: tuple[Judgement, ...]
@@ -60,6 +64,14 @@ class _Extremes:
         """Judgements of the designed set, the sweeps and the maps."""
         parts: list[Sweep | StabilityMap] = [*self.sweeps, *self.maps]
         return self.judgements + tuple(j for part in parts for j in part.judgements)
+
+    def lines(self) -> Iterator[str]:
+        """For a terminal: how the points ended."""
+        everything = self.everything
+        yield f"Limits of validity: {len(everything)} points"
+        yield ", ".join(f"{count} {ending}" for ending, count in counted(everything).items() if count)
+        yield f"invariants violated at {self.broken()} points"
+        yield f"largest residual {max((j.residual for j in everything), default=0.0):.2g}"
 
     def document(self) -> Record:
         """What was found as plain numbers, lists and texts."""
@@ -103,7 +115,7 @@ def find_extremes(
     workers: int = 1,
     progress: Progress | None = None,
     kept: Path | None = None,
-) -> _Extremes:
+) -> Extremes:
     """Look at a scene's extremes, with the same result for any number of workers.
 
     Args: `kept`: file from which an interrupted designed set resumes.
@@ -116,7 +128,7 @@ def find_extremes(
     points = design(count=size.points, seed=SEED)
     # First, so that a kept file that cannot be used is known at once.
     judgements = base.judged(points, workers=workers, progress=told("designed set"), kept=kept)
-    return _Extremes(
+    return Extremes(
         points=points,
         judgements=judgements,
         sweeps=sweeps(base, count=size.sweep, fineness=size.fineness, workers=workers, progress=told("axes")),
@@ -140,7 +152,7 @@ def counted(judgements: Sequence[Judgement]) -> dict[str, int]:
     return {str(ending): numbers[ending] for ending in Ending}
 
 
-def _violations(extremes: _Extremes) -> list[Record]:
+def _violations(extremes: Extremes) -> list[Record]:
     found = [
         {"point": dict(point), "violations": list(judgement.violations)}
         for point, judgement in zip(extremes.points, extremes.judgements, strict=True)

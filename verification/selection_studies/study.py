@@ -13,6 +13,7 @@ from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.selection.estimates import term_estimates
 from ringbalance.reduced_model.selection.registry import models_used
 from ringbalance.scene.models import Scene
+from ringbalance.scene.results import CommandResult
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.selection_studies.chambers import chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import TOLERANCES, Choice, choose
@@ -62,9 +63,12 @@ def hierarchies_of(scene: Scene, quantities: Sequence[str]) -> Iterator[ModelHie
         yield from (hierarchy(book) for hierarchy in flow)
 
 
-@dataclass(frozen=True, kw_only=True)
-class TradeStudy:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class TradeStudy(CommandResult):
     """All model hierarchies of one scene, measured."""
+
+    _document = "ringbalance.verification.selection_studies.study:TradeStudy.document"
+    _summary = "ringbalance.verification.selection_studies.study:TradeStudy.lines"
 
     scene: Scene
     trades: tuple[Trade, ...]
@@ -73,6 +77,15 @@ class TradeStudy:
     costs: CostModel
     refit: CostModel | None
     """Fitted to this run's times; None when nothing was timed."""
+
+    def lines(self) -> Iterator[str]:
+        """For a terminal: the models chosen for each quantity."""
+        yield f"Speed against accuracy of {self.scene.name} ({self.scene.source})"
+        for trade in self.trades:
+            title, choices = trade.hierarchy.title, self.choices[trade.hierarchy.quantity]
+            if choices:
+                chosen = choices[-1]
+                yield f"{title}: {chosen.fidelity.name} at {chosen.tolerance:.0e}, {chosen.cost:.2g} s"
 
     def document(self) -> Record:
         """Plain numbers and texts; all but `times` is the same on every machine."""

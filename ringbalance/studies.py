@@ -1,0 +1,203 @@
+"""The longer studies as a Python user calls them: fit, trade, extremes, pictures, report and cases."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+from ringbalance.identification.criticism.review import Review
+from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.data.reading import read_observations
+from ringbalance.identification.documents import fit_document
+from ringbalance.identification.fitting import Loss
+from ringbalance.identification.fitting import fit as fit_scene
+from ringbalance.identification.next_measurement import NextMeasurement, next_measurement
+from ringbalance.identification.parameters import FitError
+from ringbalance.identification.result import FitResult, FittedParameter
+from ringbalance.reports.cli import draw_pictures
+from ringbalance.reports.extremes_cli import base_of
+from ringbalance.reports.report import Report
+from ringbalance.reports.report import write_report as write_scene_report
+from ringbalance.scene import AnyScene, SceneError
+from ringbalance.scene.changes import checked_scene, document_of
+from ringbalance.scene.describe import in_usual_unit, usual_unit
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.results import CommandResult
+from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
+from ringbalance.verification.result import CaseResult
+from ringbalance.verification.runner import run_cases as run_scene_cases
+from ringbalance.verification.selection_studies.study import TradeStudy, trade_study
+
+Level = Literal["light", "heavy"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Fit(CommandResult):
+    """A fit with the tests of its residuals and the measurement that would help most."""
+
+    _document = "ringbalance.studies:Fit.document"
+    _summary = "ringbalance.studies:Fit.lines"
+
+    result: FitResult
+    data: tuple[Observations, ...]
+    review: Review
+    next_measurement: NextMeasurement
+
+    @property
+    def parameters(self) -> tuple[FittedParameter, ...]:
+        """Each with its value and its interval (95 %), SI, and whether the data identify it."""
+        return self.result.parameters
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the fit describes the data, and no other law does so better."""
+        return self.review.holds
+
+    def document(self) -> dict[str, Any]:
+        """What `ringbalance fit --json` prints."""
+        return fit_document(self.result, data=self.data, told=self.review, following=self.next_measurement)
+
+    def lines(self) -> Iterator[str]:
+        """For a terminal: each parameter, and whether the fit describes the data."""
+        scene = self.result.optimum.residuals.problem.scene
+        rows = sum(len(each) for each in self.data)
+        yield f"Fit of {scene.name} ({scene.source}) to {rows} measurements in {len(self.data)} files"
+        for each in self.parameters:
+            value, low, high = (in_usual_unit(each.path, x) for x in (each.value, *each.interval))
+            ends = f"{low:.4g} to {high:.4g} {usual_unit(each.path)}".rstrip()
+            yield f"{each.name} {value:.4g} (95 %: {ends}; {each.verdict.value})"
+        yield self.review.criticism.text
+
+
+def fit(
+    scene: AnyScene,
+    data: str | PathLike[str] | Sequence[str | PathLike[str]],
+    *,
+    parameters: Sequence[str] | None = None,
+    loss: Loss = "linear",
+    next: str | None = None,
+) -> Fit:
+    """Fit parameters of a built disc to files of measurements, with intervals and what the data identify.
+
+    Args: `data`: one file or several, one kind of measurement in each. `parameters`: names; default those
+        that the kinds of data inform. `loss`: "soft_l1" counts outliers less. `next`: the parameter for which
+        to find the next measurement; default the one that the data identify least.
+    Raises: SceneError: a scene, a file or a parameter that cannot be used.
+    """
+    scene = checked_scene(scene)
+    files = [data] if isinstance(data, str | PathLike) else data
+    observations = read_observations([Path(each) for each in files], scene=scene)
+    try:
+        result = fit_scene(scene, data=observations, parameters=parameters, loss=loss)
+    except FitError as error:
+        raise SceneError.of_file(scene.file, str(error)) from error
+    if next is not None and next not in (names := [each.name for each in result.parameters]):
+        problem = "this parameter is not fitted"
+        raise SceneError.of_option(option="next", value=next, problem=problem, allowed=", ".join(names))
+    return Fit(
+        result=result,
+        data=observations,
+        review=Review.of(result),
+        next_measurement=next_measurement(result, next),
+    )
+
+
+def trade(
+    scene: AnyScene, *, level: Level = "heavy", progress: Callable[[str], None] | None = None
+) -> TradeStudy:
+    """Measure speed against accuracy on a scene, and choose its models for each tolerance.
+
+    Args: `level`: "light" leaves out the settling time, which takes whole runs of the loop. `progress`:
+        called with each quantity's name.
+    Raises: SceneError: a scene that cannot be used.
+    """
+    return trade_study(liquid_ring_scene(checked_scene(scene)), level=level, progress=progress)
+
+
+def extremes(
+    scene: AnyScene,
+    *,
+    level: Level = "light",
+    workers: int = 1,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Extremes:
+    """Find where results of a scene stop, what is said beyond, and whether the invariants hold inside.
+
+    Args: `level`: "heavy" judges thousands of points. `workers`: processes. `progress`: called with what is
+        being done, the points done and their number.
+    Raises: SceneError: a scene that cannot be used, or whose chamber is imported.
+    """
+    base = base_of(liquid_ring_scene(checked_scene(scene)))
+    return find_extremes(base, size=SIZES[level], workers=workers, progress=progress)
+
+
+def plot(scene: AnyScene, out: str | PathLike[str]) -> tuple[Path, ...]:
+    """Draw the 3-D pictures of a scene into a folder, and its fields for ParaView.
+
+    Without OpenGL the fields alone are written, with a warning.
+    Returns: The files.
+    Raises: SceneError: a scene that cannot be used. OSError: the folder cannot be written.
+    """
+    pictures = draw_pictures(liquid_ring_scene(checked_scene(scene)), Path(out))
+    if not pictures["drawn"]:
+        warnings.warn(pictures["text"], RuntimeWarning, stacklevel=2)
+    folders = Path(out) / "figures", Path(out) / "fields"
+    return tuple(path for folder in folders for path in sorted(folder.glob("*.*")))
+
+
+def write_report(
+    scene: AnyScene,
+    out: str | PathLike[str],
+    *,
+    level: Level = "light",
+    workers: int = 1,
+    progress: Callable[[str], None] | None = None,
+    interactive: bool = False,
+) -> Report:
+    """Verify, calibrate, simulate and draw a scene into one folder.
+
+    Args: `level`: "heavy" also runs the cases that take long. `workers`: processes, this one included.
+        `progress`: called with what is being done. `interactive`: whether view.html is written, too.
+    Raises: SceneError: a scene that cannot be used; nothing is written.
+    Raises: OSError: the folder cannot be written.
+    """
+    scene = checked_scene(scene)
+    return write_scene_report(
+        scene,
+        Path(out),
+        level=level,
+        scene_text=toml_bytes(document_of(scene)).decode(),
+        workers=workers,
+        progress=progress,
+        interactive=interactive,
+    )
+
+
+def run_cases(
+    case_ids: Sequence[str] = (),
+    *,
+    scene: AnyScene,
+    level: Level = "light",
+    mutations: bool = False,
+    workers: int = 1,
+    progress: Callable[[CaseResult], None] | None = None,
+) -> tuple[CaseResult, ...]:
+    """Run several verification cases, or all, and return their results in the order asked for.
+
+    Args: `level`: "light" leaves heavy cases `not run`. `mutations`: also with each case's mutations.
+        `workers`: processes, this one included. `progress`: called with each result, in order.
+    Raises: KeyError: an unknown case. SceneError: a balancer without liquid.
+    """
+    return run_scene_cases(
+        case_ids,
+        scene=checked_scene(scene),
+        level=level,
+        mutations=mutations,
+        workers=workers,
+        progress=progress,
+    )

@@ -1,0 +1,209 @@
+"""A scene with other values: its document changed, and read again with every check that a file passes.
+
+A record that was changed in any other way still has the hash, the origins and the derived defaults of its
+file, and nothing has checked it: `checked_scene` refuses it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from copy import deepcopy
+from dataclasses import fields, is_dataclass
+from typing import Any, Final, cast
+
+from ringbalance.scene import deferred
+from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.faults import Fault, SceneError, toml_text
+from ringbalance.scene.keys.declaration import Entries, Key
+from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.loader import CHANGED, scene_of
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile
+from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.units import DIMENSIONS
+
+_OF_MESH: Final = ("disc", "accuracy.tolerance")
+"""Paths on which a mesh, or the meshing of a solid, depends."""
+_OF_CHECKS: Final = (*_OF_MESH, "tube.port_radius", "gas.inlet_radius")
+"""Paths with which a mesh is compared as it is read."""
+_NO_KEYS: Final = frozenset({"tube.models"})
+"""Fields of records that no key of a scene file sets; calculations choose them."""
+
+
+def with_values(scene: SceneFile, values: Mapping[str, object], *, origin: Origin = "given") -> AnyScene:
+    """The scene whose document has other values.
+
+    Args: `values`: by path, see `SceneFile.with_values`. `origin`: of all of them.
+    Raises: SceneError: everything that is wrong with the result, or a scene that `checked_scene` refuses.
+    """
+    return _changed(scene, _known(checked_scene(scene)), values, origin)
+
+
+def _changed(
+    scene: SceneFile, known: CheckedValues, values: Mapping[str, object], origin: Origin
+) -> AnyScene:
+    schema = LIQUID_RING if isinstance(scene, Scene) else deferred.ECCENTRIC_MASS
+    document = deepcopy(dict(known.document))
+    for path, value in values.items():
+        _place(document, path, value, schema=schema, origin=origin)
+    if document == known.document:
+        return cast("AnyScene", scene)
+    changed = scene_of(
+        document,
+        file=scene.file,
+        source=scene.source.removesuffix(CHANGED) + CHANGED,
+        folder=known.folder,
+        sha256=lambda: hashlib.sha256(toml_bytes(document)).hexdigest(),
+        derived={} if _concerned(_OF_CHECKS, values) else known.derived,
+    )
+    if not _concerned(_OF_MESH, values) and _mesh_of(changed) != _mesh_of(scene):
+        fault = Fault(
+            file=scene.file,
+            table="disc",
+            key="mesh",
+            value=toml_text(document["disc"]["mesh"]),
+            problem="the file has changed since the scene was read",
+            allowed="ringbalance.load_scene(path) again",
+        )
+        raise SceneError([fault])
+    return changed
+
+
+def _concerned(concern: Iterable[str], values: Iterable[str]) -> bool:
+    return any(path == each or path.startswith(f"{each}.") for path in values for each in concern)
+
+
+def _mesh_of(scene: SceneFile) -> str:
+    """SHA-256 of the mesh of a chamber; empty without one."""
+    geometry = scene.disc.geometry if isinstance(scene, Scene) else None
+    return "" if geometry is None else geometry.digest
+
+
+def rechecked(scene: AnyScene) -> AnyScene:
+    """A scene that a calculation has changed, such as a tuned one, as `with_values` would have made it.
+
+    The changed values have the origin "inferred".
+    Raises: SceneError: a changed value that no scene file could have.
+    """
+    values = dict(_changed_values(scene))
+    return _changed(scene, _known(scene), values, "inferred") if values else scene
+
+
+def checked_scene(scene: SceneFile) -> AnyScene:
+    """The same scene, when its values are those that were checked as it was read or changed.
+
+    Raises: SceneError: a record that was made or changed in another way, with each value that differs.
+    Raises: TypeError: no scene.
+    """
+    if not isinstance(scene, SceneFile):
+        what = type(scene).__name__
+        raise TypeError(f"a scene is needed, such as ringbalance.load_scene(path), and not {what}")
+    faults = [_unchecked(scene, path, value) for path, value in _changed_values(scene)]
+    if faults:
+        raise SceneError(faults)
+    return cast("AnyScene", scene)
+
+
+def document_of(scene: SceneFile) -> Mapping[str, Any]:
+    """The scene's document, as TOML has it. Raises: SceneError: a scene that was not read."""
+    return _known(scene).document
+
+
+def _known(scene: SceneFile) -> CheckedValues:
+    """Raises: SceneError: a record that was not read."""
+    if scene.checked is None:
+        allowed = "ringbalance.load_scene(path), and with_values to change what it gives"
+        raise SceneError.of_file(scene.file, "this scene was made without the checks of a file", allowed)
+    return scene.checked
+
+
+def _unchecked(scene: SceneFile, path: str, value: object) -> Fault:
+    table, _, key = path.rpartition(".")
+    return Fault(
+        file=scene.file,
+        table=table,
+        key=key,
+        value=toml_text(value if isinstance(value, str | float | int) or value is None else str(value)),
+        problem="the record was changed, so nothing has checked it and its hash is that of another scene",
+        allowed=f'scene.with_values({{"{path}": ...}}), which checks as a file is checked',
+    )
+
+
+def _changed_values(scene: SceneFile) -> Iterator[tuple[str, object]]:
+    """Path and value of each key whose value is not the one that was checked."""
+    for name, before in _known(scene).parts.items():
+        now = getattr(scene, name)
+        if now is before:
+            continue
+        if is_dataclass(now) and type(now) is type(before):
+            for field in fields(now):
+                path, value = f"{name}.{field.name}", getattr(now, field.name)
+                if path not in _NO_KEYS and not _same(value, getattr(before, field.name)):
+                    yield KEY_OF_FIELD.get(path, path), value
+        elif now != before:
+            yield KEY_OF_FIELD.get(name, name), now
+
+
+def _same(now: object, before: object) -> bool:
+    # Two meshes are equal when they name the same file, whatever their nodes are.
+    return now is before or (not isinstance(now, ChamberGeometry) and now == before)
+
+
+def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema, origin: Origin) -> None:
+    """Put a value into a document, or take it away for None; reading refuses what no key takes."""
+    *steps, name = path.split(".")
+    content, keys = document, schema.top
+    for place, step in enumerate(steps):
+        default = keys[step].presence.default if step in keys else None
+        keys = _inside(schema, steps[: place + 1])
+        inside = content.setdefault(step, dict(default) if isinstance(default, Mapping) else {})
+        if not isinstance(inside, dict):
+            content[".".join((*steps[place:], name))] = value
+            return
+        content = inside
+    if value is None and (name in keys or path in schema.tables):
+        content.pop(name, None)
+    else:
+        takes = (
+            schema.tables[path].keys if path in schema.tables else keys[name].takes if name in keys else None
+        )
+        content[name] = _written(value, takes)
+    if steps and ORIGIN not in (name, *steps[1:]):
+        _note_origin(document[steps[0]], (*steps[1:], name)[0], None if value is None else origin)
+
+
+def _inside(schema: Schema, steps: list[str]) -> Mapping[str, Key]:
+    """Keys of the table at a place; none where there is no table."""
+    keys = schema.tables[steps[0]].keys if steps[0] in schema.tables else {}
+    for step in steps[1:]:
+        takes = keys[step].takes if step in keys else None
+        keys = takes.keys if isinstance(takes, Entries) else {}
+    return keys
+
+
+def _note_origin(table: dict[str, Any], key: str, origin: Origin | None) -> None:
+    """Of a changed value; what stood there was said of the value before."""
+    stated = dict(table.get(ORIGIN, {})) if isinstance(table.get(ORIGIN, {}), Mapping) else {}
+    stated.pop(key, None)
+    if origin is not None and origin != "given":
+        stated[key] = origin
+    table.pop(ORIGIN, None)
+    if stated:
+        table[ORIGIN] = stated
+
+
+def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> Any:
+    """A value as a scene file would have it: a number for a quantity with a unit is one in SI."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, Mapping):
+        keys = takes.keys if isinstance(takes, Entries) else takes if isinstance(takes, Mapping) else {}
+        return {key: _written(each, keys[key].takes if key in keys else None) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_written(each, takes) for each in value]
+    dimension = takes.dimension if isinstance(takes, Reader) else None
+    if dimension is None or isinstance(value, bool) or not isinstance(value, int | float):
+        return value
+    return f"{value!r} {next(iter(DIMENSIONS[dimension].units))}"

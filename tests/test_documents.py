@@ -1,0 +1,201 @@
+"""What the commands print with `--json`: every key is documented, every documented key is printed, and
+`to_dict()` of what the functions of the same names answer is the same document.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+import ringbalance as rb
+from ringbalance.cli import main
+from ringbalance.controller.tuning.eccentric import eccentric_tuning_document, tune_eccentric
+from ringbalance.reports.extremes_cli import base_of
+from ringbalance.scene.changes import document_of
+from ringbalance.scene.narrowing import eccentric_scene, liquid_ring_scene
+from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.verification.extremes.study import Size, find_extremes
+
+PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "commands.md"
+SHARED: Final = "Keys that several commands have"
+PAPER, DRIVEN = (str(rb.bundled_scene(name)) for name in ("liquid_ring_paper", "driven_masses_small"))
+MEASUREMENTS: Final = Path(PAPER).parent / "measurements"
+BY_NAME: Final = {
+    *("tube.terms", "tube.uncertainty_parts", "fill_ratio", "tuned", "gain", "outcomes"),
+    *("held", "pulls", "cost_model.seconds", "quantities.rungs.models", "quantities.rungs.work"),
+    *("quantities.rungs.fixed_work", "quantities.choices.models", "times.rungs", "times.refit_seconds"),
+    *("numbers", "tables.columns", "tables.units", "endings", "loop_endings", "violations.point"),
+}
+"""Whose keys are names of what the scene, the fit or the case has."""
+INPUTS: Final = re.compile(r"budgets\.\w+\.inputs")
+"""Whose keys are those of the scene."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Scenes: the paper's with a short time limit, and with a gas line."""
+    found = tmp_path_factory.mktemp("scenes")
+    short = rb.load_scene(PAPER).with_values({"run.time_limit": "6 s"})
+    line = {"gas.conductance": "2 l/(s*bar)", "gas.critical_ratio": 0.3, "gas.valve_lag": "5 ms"}
+    for name, scene in (("short", short), ("line", short.with_values(line))):
+        (found / f"{name}.toml").write_bytes(toml_bytes(document_of(scene)))
+    return found
+
+
+@pytest.fixture
+def printed(capsys: pytest.CaptureFixture[str]) -> Any:
+    """Runs a command with `--json`, once in this module for each set of words."""
+
+    def run(*words: object) -> Any:
+        return json.loads(_printed(tuple(map(str, words)), capsys))
+
+    return run
+
+
+_KEPT: Final[dict[tuple[str, ...], str]] = {}
+
+
+def _printed(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> str:
+    if words not in _KEPT:
+        capsys.readouterr()
+        main([*words, "--json"])
+        _KEPT[words] = capsys.readouterr().out
+    return _KEPT[words]
+
+
+@cache
+def rows(heading: str) -> dict[str, tuple[set[str], set[str]]]:
+    """By top-level key: words in code type of its rows, and paths in their first column."""
+    section = PAGE.read_text(encoding="utf-8").split(f"## {heading}\n")[1].split("\n## ")[0]
+    found: dict[str, tuple[set[str], set[str]]] = {}
+    for line in section.splitlines():
+        cells = re.split(r"(?<!\\)\|", line)
+        if line.startswith("| `"):
+            paths = re.findall(r"`([^`]+)`", cells[1])
+            for path in paths:
+                words, firsts = found.setdefault(re.split(r"\.|\[", path)[0], (set(), set()))
+                words |= {word.split(".")[-1].split("]")[-1] for word in re.findall(r"`([^`]+)`", line)}
+                firsts.add(path.replace("[]", ""))
+    return found
+
+
+def paths(value: Any, place: str = "") -> Iterator[tuple[str, str]]:
+    """Place and key of every entry of nested tables and lists; keys that are names count as "*"."""
+    if isinstance(value, dict):
+        for key, inside in value.items():
+            known = "*" if place in BY_NAME or INPUTS.fullmatch(place) else key
+            yield place, known
+            yield from paths(inside, f"{place}.{known}" if place else known)
+    elif isinstance(value, list):
+        for each in value:
+            if isinstance(each, dict | list):
+                yield from paths(each, place)
+
+
+def compare(heading: str, documents: list[Any]) -> None:
+    """Every key that is printed is in the tables, and every path of the first columns is printed."""
+    own, shared = rows(heading), rows(SHARED)
+    printed = {pair for document in documents for pair in paths(document)}
+    missing = []
+    for place, key in printed:
+        top = (place or key).split(".")[0]
+        words = own.get(top, (set(), set()))[0] | (shared[top][0] if top in own and top in shared else set())
+        if key != "*" and key not in words:
+            missing.append(f"{place}.{key}".strip("."))
+    assert sorted(missing) == []
+    there = {f"{place}.{key}".strip(".") for place, key in printed}
+    promised = {path for _, firsts in own.values() for path in firsts}
+    assert sorted(promised - there) == []
+
+
+def test_keys_of_calibrate(folder: Path, printed: Any) -> None:
+    scenes = (PAPER, folder / "line.toml", rb.bundled_scene("imported_chamber"))
+    compare("`calibrate --json`", [printed("calibrate", scene) for scene in scenes])
+
+
+def test_keys_of_simulate(folder: Path, printed: Any) -> None:
+    found = [printed("simulate", folder / f"{name}.toml") for name in ("short", "line")]
+    compare("`simulate --json`", found)
+    assert [len(each["gas_line_runs"]) for each in found] == [2, 0]
+
+
+def test_keys_of_simulate_of_eccentric_masses(printed: Any) -> None:
+    compare("`simulate --json` of eccentric masses", [printed("simulate", DRIVEN)])
+
+
+def test_keys_of_tune(folder: Path, printed: Any) -> None:
+    compare("`tune --json`", [printed("tune", folder / f"{name}.toml") for name in ("short", "line")])
+
+
+def test_keys_of_tune_of_eccentric_masses() -> None:
+    tuning = tune_eccentric(eccentric_scene(rb.load_scene(DRIVEN)), runs=1)
+    compare("`tune --json` of eccentric masses", [eccentric_tuning_document(tuning)])
+
+
+def test_keys_of_fit(printed: Any) -> None:
+    compare("`fit --json`", [printed("fit", PAPER, MEASUREMENTS / "trial_weight.csv")])
+
+
+def test_keys_of_compare(folder: Path, printed: Any) -> None:
+    compare("`compare --json`", [printed("compare", folder / "short.toml", folder / "line.toml")])
+
+
+def test_keys_of_trade(printed: Any) -> None:
+    compare("`trade --json`", [printed("trade", PAPER, "--level", "light")])
+
+
+def test_keys_of_verify(printed: Any) -> None:
+    cases = ("manufactured_2d", "claim_01_volume")
+    compare("`verify --json`", [printed("verify", *cases, "--mutations")])
+
+
+@pytest.mark.heavy
+def test_keys_of_extremes() -> None:
+    base = base_of(liquid_ring_scene(rb.load_scene(PAPER)))
+    found = find_extremes(base, size=Size(points=1, sweep=2, fineness=1.0, grid=2))
+    violated = found.document() | {"violations": [{"point": {"speed": 1.0}, "violations": []}]}
+    compare("`extremes --json`", [violated])
+
+
+def test_keys_of_cache(printed: Any) -> None:
+    compare("`cache --json`", [printed("cache")])
+
+
+@pytest.mark.parametrize("words", [("calibrate", PAPER), ("simulate", DRIVEN)])
+def test_each_command_names_its_scene(words: tuple[str, str], printed: Any) -> None:
+    scene = rb.load_scene(words[1])
+    expected = {"name": scene.name, "source": scene.source, "sha256": scene.sha256}
+    assert printed(*words)["scene"] == expected
+
+
+def as_json(result: Any) -> Any:
+    """What `to_dict` gives as it reads back from JSON."""
+    return json.loads(json.dumps(result.to_dict(), allow_nan=False))
+
+
+@pytest.mark.parametrize("name", ["short", "line"])
+def test_to_dict_is_what_the_command_prints(name: str, folder: Path, printed: Any) -> None:
+    path = folder / f"{name}.toml"
+    scene = rb.load_scene(path)
+    assert as_json(rb.calibrate(scene)) == printed("calibrate", path)
+    run = printed("simulate", path)
+    assert as_json(rb.simulate(scene)) == run
+    assert run["scene"] == {"name": scene.name, "source": path.name, "sha256": scene.sha256}
+    assert as_json(rb.tune(scene)) == printed("tune", path)
+
+
+def test_to_dict_of_studies_is_what_the_command_prints(folder: Path, printed: Any) -> None:
+    data, short, line = MEASUREMENTS / "trial_weight.csv", folder / "short.toml", folder / "line.toml"
+    scene = rb.load_scene(PAPER)
+    assert as_json(rb.fit(scene, data)) == printed("fit", PAPER, data)
+    compared = rb.compare(rb.load_scene(short), rb.load_scene(line))
+    assert as_json(compared) == printed("compare", short, line)
+    timed = as_json(rb.trade(scene, level="light")) | {"times": None}
+    assert timed == printed("trade", PAPER, "--level", "light") | {"times": None}
+    assert as_json(rb.simulate(rb.load_scene(DRIVEN))) == printed("simulate", DRIVEN)

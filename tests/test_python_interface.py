@@ -1,0 +1,183 @@
+"""Results that leave the process or stand in a notebook, and algorithms, sensors and laws of one's own."""
+
+from __future__ import annotations
+
+import cmath
+import copy
+import json
+import math
+import pickle
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ringbalance as rb
+from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import eccentric_scene, liquid_ring_scene
+
+MEASUREMENTS = rb.bundled_scene("liquid_ring_paper").parent / "measurements"
+LONGEST_TEXT = 12
+"""Lines; statuses take what they need on one."""
+
+
+@cache
+def short() -> Scene:
+    """The paper's scene, for six seconds."""
+    scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+    return liquid_ring_scene(scene).with_values({"run.time_limit": "6 s"})
+
+
+@cache
+def driven() -> rb.EccentricScene:
+    """Two eccentric masses, until shortly after the start."""
+    scene = eccentric_scene(rb.load_scene(rb.bundled_scene("driven_masses_small")))
+    return scene.with_values({"run.time_limit": 2.0})
+
+
+ANSWERS: dict[str, Callable[[], Any]] = {
+    "scene": short,
+    "eccentric scene": driven,
+    "calibration": lambda: rb.calibrate(short()),
+    "law": lambda: rb.calibrate(short()).flow_law,
+    "paper's law": lambda: rb.paper_law(short()),
+    "run": lambda: rb.simulate(short(), flow_law=rb.paper_law(short())),
+    "eccentric run": lambda: rb.simulate(driven()),
+    "tuning": lambda: rb.tune(short(), flow_law=rb.paper_law(short())),
+    "fit": lambda: rb.fit(short(), MEASUREMENTS / "trial_weight.csv"),
+    "comparison": lambda: rb.compare(short(), short()),
+}
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_answers_pickle_copy_and_print_shortly(name: str) -> None:
+    answer = ANSWERS[name]()
+    text = repr(answer)
+    assert 2 <= len(text.splitlines()) <= LONGEST_TEXT
+    assert len(text) < 1500
+    for again in (pickle.loads(pickle.dumps(answer)), copy.deepcopy(answer)):
+        assert repr(again) == text
+        if hasattr(answer, "to_dict"):
+            assert json.dumps(again.to_dict()) == json.dumps(answer.to_dict())
+
+
+def test_a_pool_gives_calibrations_back() -> None:
+    scenes = [short().with_values({"tube.bore": bore}) for bore in ("1.4 mm", "1.6 mm")]
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        found = list(pool.map(rb.calibrate, scenes))
+    for scene, calibration in zip(scenes, found, strict=True):
+        assert calibration.to_dict() == rb.calibrate(scene).to_dict()
+
+
+def test_what_tune_recommends_is_a_scene_that_runs() -> None:
+    tuning = rb.tune(short(), flow_law=rb.paper_law(short()))
+    scene = liquid_ring_scene(tuning.recommended_scene)
+    assert scene.controller == tuning.scene.controller
+    assert scene.sha256 != short().sha256
+    assert scene.origin_of("controller.proportional") == "inferred"
+    assert rb.simulate(scene, flow_law=rb.paper_law(scene)).scene == scene
+
+
+class Wrapped:
+    """The scene's own algorithm under another name."""
+
+    def __init__(self, weaker: float) -> None:
+        settings = {"controller.proportional": short().controller.proportional * weaker}
+        self.inner = controller_of(short().with_values(settings))
+        self.rises_tolerated = self.inner.rises_tolerated
+
+    def start(self) -> Any:
+        return self.inner.start()
+
+    def step(self, state: Any, measurement: rb.Measurement | None) -> tuple[Any, rb.Command]:
+        return self.inner.step(state, measurement)
+
+
+def test_an_algorithm_of_one_s_own_runs_and_is_named() -> None:
+    law = rb.paper_law(short())
+    own = rb.simulate(short(), flow_law=law, controller=Wrapped(1.0))
+    usual = rb.simulate(short(), flow_law=law)
+    np.testing.assert_array_equal(own.amplitude, usual.amplitude[: own.amplitude.size])
+    assert own.to_dict()["controller"] == "Wrapped"
+    assert own.to_dict()["gas_line_runs"] == []
+    assert usual.to_dict()["controller"] == "target_vector"
+
+
+@pytest.mark.parametrize("weaker", [1e-2, 1e-4, 0.3])
+def test_no_advice_is_given_on_settings_that_an_own_algorithm_does_not_have(weaker: float) -> None:
+    run = rb.simulate(short(), flow_law=rb.paper_law(short()), controller=Wrapped(weaker))
+    assert not run.settled
+    for key in ("proportional", "integral_time", "gas_time_offset"):
+        assert key not in run.status
+
+
+def test_a_sensor_of_one_s_own_is_what_the_algorithm_sees() -> None:
+    times: list[float] = []
+
+    def twice(time: float, vibration: complex) -> rb.Measurement:
+        return rb.Measurement(time=time, amplitude=2 * abs(vibration), phase=cmath.phase(vibration))
+
+    run = rb.simulate(
+        short(),
+        flow_law=rb.paper_law(short()),
+        sensor=twice,
+        progress=lambda time, limit: times.append(time / limit),
+    )
+    first = run.samples[0].measurement
+    assert first is not None
+    assert first.amplitude == pytest.approx(2 * run.amplitude[0], rel=1e-12)
+    assert times == sorted(times)
+    assert times[0] == 0.0
+    assert math.isclose(times[-1] * 6, run.samples[-1].time)
+
+
+class Slower:
+    """The calibrated law with a part of its velocity."""
+
+    name = "calibrated"
+
+    def __init__(self, part: float) -> None:
+        self.law, self.part = rb.calibrate(short()).flow_law, part
+
+    def evaluate(self, **conditions: Any) -> rb.Flow:
+        flow = self.law.evaluate(**conditions)
+        return replace(flow, velocity=self.part * flow.velocity)
+
+
+def test_what_a_law_of_one_s_own_does_not_give_is_said() -> None:
+    law = rb.calibrate(short()).flow_law
+    alone = rb.simulate(short(), flow_law=law, modelled=[])
+    own = rb.simulate(short(), flow_law=Slower(1.0))
+    assert own.model.moment is not None
+    assert own.law == "Slower"
+    np.testing.assert_allclose(own.amplitude[-1], alone.amplitude[-1], rtol=0.05, atol=1e-8)
+    unmodelled = {row.term for row in own.models_used if "no forces" in row.why}
+    assert "tube inertia" in unmodelled
+    for word in (*unmodelled, "moment", "chamber_volume", "density"):
+        assert word in own.status
+    half = rb.simulate(short(), flow_law=Slower(0.5))
+    rates = [run.to_dict()["vibration_rate_m_per_s"] for run in (half, own)]
+    assert rates[0] == pytest.approx(rates[1] / 2, rel=1e-9)
+    with pytest.raises(TypeError, match="evaluate"):
+        rb.simulate(short(), flow_law=object())  # type: ignore[call-overload]
+
+
+def test_eccentric_masses_have_their_own_strategy_and_both_are_tuned(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="controller"):
+        rb.simulate(driven(), controller=Wrapped(1.0))  # type: ignore[call-overload]
+    locked = driven().with_values({"supervisor.strategy": "locked"})
+    tuning = rb.tune(locked)
+    assert isinstance(tuning, rb.EccentricTuning)
+    assert tuning.recommended_scene.supervisor.strategy == "locked"
+    for key, value in tuning.tuned.items():
+        table, _, name = key.partition(".")
+        assert getattr(getattr(tuning.recommended_scene, table), name) == value
+    with pytest.raises(rb.SceneError):
+        rb.fit(short(), tmp_path / "none.csv")

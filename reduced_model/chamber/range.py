@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume, liquid_area, surface_radius, wall_radius
+from ringbalance.mesh.geometry import chamber_volume, liquid_area, surface_radius
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.results import Status, StatusCode
@@ -69,7 +69,7 @@ def compression(scene: Scene, fills: FloatArray) -> FloatArray:
         density=scene.liquid.density,
         angular_velocity=scene.rotor.speed,
         inner=surface_radius(disc=scene.disc, fill_ratio=fills),
-        outer=wall_radius(disc=scene.disc),
+        outer=scene.disc.outer_radius,
     )
     pressure = column + max(scene.gas.pressure, 0.0) * pressure_factor(scene)
     return np.asarray(pressure / bulk_modulus(scene.liquid))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ringbalance.mesh.geometry import surface_radius, wall_radius
+from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.building import column_pressure, tube_path
 from ringbalance.scene.models import Scene
 
@@ -24,7 +24,7 @@ class Holding:
     @classmethod
     def of(cls, scene: Scene, *, fill_ratio: float) -> Holding:
         """By hydrostatics, gravity left out. Args: `fill_ratio`: the largest that runs reach."""
-        path, wall = tube_path(scene), wall_radius(disc=scene.disc)
+        path, wall = tube_path(scene), scene.disc.outer_radius
         fullest = float(surface_radius(disc=scene.disc, fill_ratio=fill_ratio))
         level = column_pressure(scene=scene, radius=fullest)
         pull = scene.liquid.density * scene.rotor.speed**2 / 2

@@ -36,10 +36,12 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _times(scene: Scene, gains: tuple[float, ...]) -> FloatArray:
     """Settling time, s, shape (gains, periods); the phase of the start makes no difference to this law."""
-    settings = {"integral_time": None, "derivative_time": 0.0}
     return np.array(
         [
-            [slowest_within(scene, [run]) for run in runs_with(scene, proportional=gain, **settings)]
+            [
+                slowest_within(scene, [run])
+                for run in runs_with(scene, proportional=gain, integral_time=None, derivative_time=0.0)
+            ]
             for gain in gains
         ]
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.cases.driven_fig6_effort.case import STEP, efforts
@@ -25,9 +27,9 @@ def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> E
 
 def over_weight(effort: FloatArray) -> FloatArray:
     """Effort at the largest over that at the smallest q/r, shape (mass ratios, speed ratios)."""
-    return effort[:, -1] / effort[:, 0]
+    return np.asarray(effort[:, -1] / effort[:, 0], dtype=np.float64)
 
 
 def over_mass(effort: FloatArray) -> FloatArray:
     """Effort at the larger over that at the smaller mass ratio, shape (weight ratios, speed ratios)."""
-    return effort[0] / effort[1]
+    return np.asarray(effort[0] / effort[1], dtype=np.float64)

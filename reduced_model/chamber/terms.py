@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
+from ringbalance.mesh.geometry import chamber_volume, half_angle, head_square, surface_radius, wall_square
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE
 from ringbalance.reduced_model.chamber.values import (
     by_closed_form,
@@ -93,8 +93,11 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
     drawn = drawing_shares(scene.disc, fills[wet])
     aside = np.hypot(1.0, share_across(scene.disc, fills[wet])) - 1
     tension = capillary_share(scene, fills[wet])
+    a = surface_radius(disc=scene.disc, fill_ratio=fills[wet])
+    # The same pressure of surface tension is more of a mean over a wall that is nearer to the surface.
+    nearer = head_square(disc=scene.disc, surface_radius=a) / wall_square(disc=scene.disc, surface_radius=a)
     shares = {
-        "pressures": tension["pressures"] + common + drawn.wall_pressure,
+        "pressures": nearer * tension["pressures"] + common + drawn.wall_pressure,
         "heads": tension["pressures"] + common + drawn.hydrostatic_pressure,
         "moments": tension["moments"] + common + (drawn.moment + aside),
     }

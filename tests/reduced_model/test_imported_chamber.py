@@ -62,10 +62,19 @@ def test_its_check_notices_a_pressure_that_is_off(scene: Scene, monkeypatch: pyt
         pressure = replace(ring.wall_pressure, value=1.001 * ring.wall_pressure.value)
         return replace(ring, wall_pressure=pressure)
 
+    sound = calibrate_chamber(scene)
     monkeypatch.setattr(deferred, "solved_ring", spoiled, raising=False)
-    check = calibrate_chamber(scene).check
-    assert not check.status.ok
-    assert check.excess == pytest.approx(1e-3, rel=0.1)
+    found = calibrate_chamber(scene)
+    assert not found.check.status.ok
+    assert found.check.excess == pytest.approx(1e-3, rel=0.1)
+    # It counts where it was noticed, and nowhere else.
+    wall = found.wall_pressure
+    assert not wall.status.ok
+    np.testing.assert_allclose(wall.numerical[1:] / wall.value[1:], found.check.excess, rtol=1e-6)
+    assert found.moment_per_mass.status == sound.moment_per_mass.status
+    assert found.moment_per_mass.uncertainty == sound.moment_per_mass.uncertainty
+    for name in ("moment", "hydrostatic_pressure"):
+        np.testing.assert_array_equal(getattr(found, name).uncertainty, getattr(sound, name).uncertainty)
 
 
 def test_only_what_the_size_exceeds_that_along_the_middle_by_is_uncertain(scene: Scene) -> None:

@@ -203,11 +203,9 @@ def _law_faults(calibration: Calibration) -> Iterator[str]:
             primed=primed,
         ).velocity
         slack = ROUND_OFF + 1e-9 * np.abs(velocity).max()
-        # A tube without a crest is taken to hold its liquid while there is no gas at all, as in Eq. 18.
-        driven = velocity[:, 1:] if law.path.hump_pressure is None else velocity
         if not np.all(np.isfinite(velocity)):
             yield "a velocity of the law is not finite"
-        elif np.any(np.diff(driven, axis=1) < -slack):
+        elif np.any(np.diff(velocity, axis=1) < -slack):
             yield f"the velocity falls as the gas pressure grows ({'primed' if primed else 'empty'} tube)"
 
 

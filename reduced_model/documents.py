@@ -200,7 +200,7 @@ def chamber_status(calibration: Calibration) -> tuple[RowStatus, ...]:
     scene, chamber = calibration.scene, calibration.chamber
     fills, computed = chamber.reported_fill_ratio, chamber.ring.closed[list(chamber.reported)]
     closed = computed & closed_ring(scene, fills)
-    return _row_status(scene, fill_ratio=fills, closed=closed, fullest=fills)
+    return _row_status(scene, fill_ratio=fills, closed=closed)
 
 
 def velocity_status(calibration: Calibration, fill_ratio: FloatArray) -> tuple[RowStatus, ...]:
@@ -337,14 +337,15 @@ def _row_status(
     *,
     fill_ratio: FloatArray,
     closed: BoolArray,
-    fullest: FloatArray,
+    fullest: FloatArray | None = None,
     residual: float = 0.0,
 ) -> tuple[RowStatus, ...]:
     """Status of each fill ratio x; an empty chamber is limited by its residual liquid alone.
 
     NO_RING: not `closed` under gravity. PORT_UNCOVERED: a >= r_p. OVER_CREST: a <= r_m. GAS_DRAWN: x below
-    `residual`, for what flows out of the chamber. LIQUID_COMPRESSED: by `fullest` of the chambers that count.
-    With the radii a of the concentric surface, r_p of the port and r_m of the crest, or r_p without one.
+    `residual`, for what flows out of the chamber. LIQUID_COMPRESSED: at `fullest`, the fuller chamber of a
+    pair, or at x. With the radii a of the concentric surface, r_p of the port and r_m of the crest, or r_p
+    without one.
     """
     level, crest = surface_radius(disc=scene.disc, fill_ratio=fill_ratio), scene.tube.hump_radius
     inside = level <= (scene.tube.port_radius if crest is None else crest)
@@ -353,7 +354,10 @@ def _row_status(
         ((level >= scene.tube.port_radius) & (fill_ratio > 0), RowStatus.PORT_UNCOVERED),
         (inside & (fill_ratio > 0), RowStatus.OVER_CREST),
         (fill_ratio < residual, RowStatus.GAS_DRAWN),
-        (compression(scene, fullest) > LARGEST_COMPRESSION, RowStatus.LIQUID_COMPRESSED),
+        (
+            compression(scene, fill_ratio if fullest is None else fullest) > LARGEST_COMPRESSION,
+            RowStatus.LIQUID_COMPRESSED,
+        ),
     )
     return tuple(
         next((status for where, status in limits if where[row]), RowStatus.OK)

@@ -97,7 +97,7 @@ def sloshing_response(
 
     def on_mesh(radius: float, counts: tuple[int, int]) -> FloatArray:
         system = sloshing_system(disc=disc, surface_radius=radius, cells=counts)
-        return _answers(system, np.array([frequency_ratio]), ekman)[0]
+        return np.asarray(_answers(system, np.array([frequency_ratio]), ekman)[0])
 
     found = np.array([[on_mesh(float(a), counts) for counts in meshes] for a in radii])
     widths = _half_widths(found, meshes)

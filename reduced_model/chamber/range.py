@@ -116,7 +116,7 @@ def _waves(scene: Scene, fills: FloatArray) -> Status:
     return Status(
         code=StatusCode.OUT_OF_RANGE,
         text=(
-            f"{sector}at a fill ratio of {fills[worst]:.3g} waves would reach about {swing[worst]:.2g} "
+            f"{sector}at a fill ratio of {fills[worst]:.3g} waves may reach about {swing[worst]:.2g} "
             "of the ring's depth, too high for linear sloshing, the finest model: avoid that fill, or turn "
             "faster"
         ),

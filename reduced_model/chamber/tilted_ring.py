@@ -36,7 +36,7 @@ _OPEN_POINTS: Final = 200
 _STEPS: Final = (12, 60)
 """At most, of Newton's method on a closed ring, and within bounds where the wall is dry."""
 _KINKED: Final = 12
-"""Steps after which bounds are halved, should kinks send Newton's method to and fro."""
+"""Steps after which bounds are halved, should kinks keep Newton's method from arriving."""
 _DRY_ROUND_OFF: Final = 1e-13
 """Of an area, over R2^2, where the wall is dry."""
 _TURN: Final = (8, 96)

@@ -162,7 +162,7 @@ def test_a_ring_that_leaves_part_of_the_wall_dry_holds_its_liquid(
 
 
 def test_a_ring_near_its_limiting_speed_costs_no_more_than_some_seconds(table_1_scene: models.Scene) -> None:
-    """At 250 rpm with every term modelled; once it took fourteen, as each part found each ring anew."""
+    """At 250 rpm with every term modelled; once it took fourteen, as each part solved each ring again."""
     rotor = dataclasses.replace(table_1_scene.rotor, speed=250 * math.pi / 30)
     slow = dataclasses.replace(table_1_scene, tolerance=1e-6, rotor=rotor)
     begin = time.process_time()

@@ -167,13 +167,6 @@ SINGLE: dict[str, Broken] = {
     ),
     "negative gravity": _one("environment.gravity", "-9.81 m/s^2", "at least 0", "m/s^2"),
     "standing still": _one("rotor.speed", "0 rpm", "above 0", "rpm"),
-    "faster than any disc": _one(
-        "rotor.speed", "300000 rpm", "1398 m/s, which no disc withstands", "at most 2.145e+05 rpm"
-    ),
-    "faster than a gas column": Broken(
-        {"rotor.speed": "45000 rpm", "gas.measured_at": "shaft"},
-        (Expected("rotor", "speed", '"45000 rpm"', "from one on the shaft", "at most 4.399e+04 rpm"),),
-    ),
     "influence of a length": _one("rotor.influence_coefficient", "1 um", "unit of length", "um/(g*mm)"),
     "vibration without phase": Broken(
         {"rotor.initial_vibration": {"amplitude": "10 um"}},

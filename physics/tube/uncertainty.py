@@ -61,7 +61,7 @@ _CREEPING: Final = 0.2
 _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
 _LARGEST_ERROR: Final = 0.5
-"""Of k, by one cause."""
+"""Of k, by what simpler models leave out."""
 DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of what development adds, over rotation's extra friction on one developing length.
 
@@ -129,8 +129,9 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     e(Re) = (U/1.96) (n cos ln Re + m sin ln Re) of each cause, n and m its two parts: a random function of
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
     a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
-    measured smooth tubes have.  U of one cause counts for half of k at most: a simpler model may be off by
-    far more at velocities that the scene never has, and no error makes a loss a gain.
+    measured smooth tubes have.
+    What simpler models leave out counts for half of k at most: they may be off by far more at velocities that
+    the scene never has, and no error makes a loss a gain.
     """
     if not tube.models.errors:
         return state
@@ -139,7 +140,7 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     for cause, even, odd in tube.models.errors:
         if cause not in parts:
             continue
-        width = _limited(parts[cause], _LARGEST_ERROR * state.k)
+        width = _limited(parts[cause], _LARGEST_ERROR * state.k) if cause == SIMPLER else parts[cause]
         error = width / NORMAL_95 * (even * np.cos(angle) + odd * np.sin(angle))
         term = "decree" if "decree" in terms else (MODEL_CAUSES | _BUILT_TERMS)[cause]
         if term == "bends":

@@ -56,7 +56,7 @@ TUBE_INPUTS: Final = (
     "speed",
 )
 """Quantities of a scene that k depends on."""
-_BUILT_TERMS: Final = {cause: term for cause, (term, _) in BUILT_CAUSES.items()}
+_TERMS: Final = {**MODEL_CAUSES, **{cause: term for cause, (term, _) in BUILT_CAUSES.items()}}
 _CREEPING: Final = 0.2
 _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
@@ -142,7 +142,7 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
             continue
         width = _limited(parts[cause], _LARGEST_ERROR * state.k) if cause == SIMPLER else parts[cause]
         error = width / NORMAL_95 * (even * np.cos(angle) + odd * np.sin(angle))
-        term = "decree" if "decree" in terms else (MODEL_CAUSES | _BUILT_TERMS)[cause]
+        term = "decree" if "decree" in terms else _TERMS[cause]
         if term == "bends":
             bends = tuple(k * (1 + error / terms[term]) for k in bends)
         terms[term] = terms[term] + error

@@ -193,7 +193,7 @@ def _in_proportion(block: Block, rows: _Rows, predicted: FloatArray) -> FloatArr
 def _unwhitened(problem: Problem, values: FloatArray) -> list[FloatArray]:
     """Columns of numbers, file by file, before L^-1."""
     parts = np.split(values, np.cumsum([b.measured.size for b in problem.blocks])[:-1])
-    return [np.linalg.solve(b.whiten, p) for b, p in zip(problem.blocks, parts, strict=True)]
+    return [np.asarray(np.linalg.solve(b.whiten, p)) for b, p in zip(problem.blocks, parts, strict=True)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -57,12 +57,12 @@ TUBE_INPUTS: Final = (
     "speed",
 )
 """Quantities of a scene that k depends on."""
-_BUILT_TERMS: Final = {cause: term for cause, (term, _) in BUILT_CAUSES.items()}
+_TERMS: Final = {**MODEL_CAUSES, **{cause: term for cause, (term, _) in BUILT_CAUSES.items()}}
 _CREEPING: Final = 0.2
 _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
 _LARGEST_ERROR: Final = 0.5
-"""Of k, by one cause."""
+"""Of k, by what simpler models leave out."""
 DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of what development adds, over rotation's extra friction on one developing length.
 
@@ -143,8 +143,9 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     e(Re) = (U/1.96) (n cos ln Re + m sin ln Re) of each cause, n and m its two parts: a random function of
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
     a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
-    measured smooth tubes have.  U of one cause counts for half of k at most: a simpler model may be off by
-    far more at velocities that the scene never has, and no error makes a loss a gain.
+    measured smooth tubes have.
+    What simpler models leave out counts for half of k at most: they may be off by far more at velocities that
+    the scene never has, and no error makes a loss a gain.
     """
     if not tube.model_errors:
         return state
@@ -153,9 +154,11 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     for each in tube.model_errors:
         if each.cause not in parts:
             continue
-        width = _limited(parts[each.cause], _LARGEST_ERROR * state.k)
+        width = parts[each.cause]
+        if each.cause == SIMPLER:
+            width = _limited(width, _LARGEST_ERROR * state.k)
         error = width / NORMAL_95 * (each.even * np.cos(angle) + each.odd * np.sin(angle))
-        term = "decree" if "decree" in terms else (MODEL_CAUSES | _BUILT_TERMS)[each.cause]
+        term = "decree" if "decree" in terms else _TERMS[each.cause]
         if term == "bends":
             bends = tuple(k * (1 + error / terms[term]) for k in bends)
         terms[term] = terms[term] + error

@@ -31,7 +31,7 @@ from ringbalance.scene.keys.fields import (
 )
 from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.tube_models import FINEST_MODELS, ModelError, TubeModels
+from ringbalance.scene.tube_models import FINEST_MODELS, ModelErrors, TubeModels
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -273,15 +273,7 @@ class Tube:
         UNCERTAIN,
         Shown("drag coefficient k", absent="calculated"),
     ]
-    model_errors: Annotated[
-        tuple[ModelError, ...],
-        standard(
-            [],
-            "corrections of the tube's models, in standard deviations of each model's stated uncertainty; "
-            "`ringbalance fit` writes them",
-        ),
-        Listed('[{ cause = "friction correlation", even = 0.4, odd = -0.1 }, ...]'),
-    ] = ()
+    model_errors: ModelErrors = ()
     models: TubeModels = FINEST_MODELS
     """Of its loss; no key."""
 

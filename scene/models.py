@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.fitted import GaugeCorrection
 from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, Shown, derived, needed, standard, unused
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.fields import (
@@ -297,6 +298,7 @@ class Gas:
         UNCERTAIN,
         Shown("gas pressure", "MPa", note="gauge"),
     ]
+    gauge_correction: GaugeCorrection = 0.0
     measured_at: Annotated[
         PressurePlace,
         standard(

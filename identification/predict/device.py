@@ -53,6 +53,8 @@ class Models:
     """Whether the chamber's values hold gravity."""
     velocity: float
     """Of a primed tube at equal fills, m/s."""
+    gas_pressure: float
+    """Of the scene that is fitted, gauge, Pa: by what another one's differs the gauge of the data is off."""
     other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
     """Makes another law of the scene's, to be compared with it."""
 
@@ -62,7 +64,12 @@ class Models:
         tube = tube_models(scene)
         gravity = mean_gravity(scene) > scene.tolerance
         law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
-        return cls(tube=tube, gravity=gravity, velocity=_primed_velocity(law, scene))
+        return cls(
+            tube=tube,
+            gravity=gravity,
+            velocity=_primed_velocity(law, scene),
+            gas_pressure=scene.gas.pressure - scene.gas.gauge_correction,
+        )
 
 
 def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
@@ -126,11 +133,12 @@ class Device:
     def injected(self, *, fill: float, chamber: int, pressure: float, gas_time: float) -> float:
         """Fill of chamber 0 of a pair at rest after gas into one of its chambers, and all that follows.
 
-        Args: `fill`: x of chamber 0 before. `chamber`: 0 or 1. `pressure`: of the supply, gauge, Pa.
+        Args: `fill`: x of chamber 0 before. `chamber`: 0 or 1. `pressure`: of the supply, as the gauge shows
+            it, Pa.
             `gas_time`: from the command to open to the command to close, s.
         """
         plant, work = self._plant, np.zeros(WORKSPACE)
-        plant["gas_pressure"] = pressure
+        plant["gas_pressure"] = pressure + self.scene.gas.pressure - self.models.gas_pressure
         motion = packed(plant, fill=fill, primed=False, motion=Motion())
         # Of a shorter time the model would have nothing left to start.
         left = max(gas_time - self._delay, _LEAST_LEFT * gas_time)

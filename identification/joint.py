@@ -21,6 +21,7 @@ from ringbalance.identification.likelihood import Problem
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.result import Joint
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.tube_models import LARGEST_ERROR
 from ringbalance.scene.uncertain import NORMAL_95
@@ -65,8 +66,11 @@ def _pulled(
         scene = changed(scene, name, pull * held[name])
     there = replace(problem, scene=scene)
     models = models_for(there.scene_at(t))
-    other = getattr(problem.models, "other", None)
-    return replace(there, models=models if other is None else replace(models, other=other))
+    before = problem.models
+    if models is None or before is None:
+        return there
+    # What the gauge of the data is off by stays that against the scene that is fitted.
+    return replace(there, models=replace(models, gas_pressure=before.gas_pressure, other=before.other))
 
 
 def joint_of(best: Optimum, held: Mapping[str, float]) -> Joint:
@@ -110,4 +114,8 @@ def scene_as_fitted(best: Optimum, held: Mapping[str, float]) -> AnyScene:
     for (name, sd), step in zip(held.items(), steps.tolist(), strict=True):
         scene = changed(scene, name, step * sd)
     as_fitted: AnyScene = replace(residuals.problem, scene=scene).scene_at(best.t)
-    return as_fitted
+    if not isinstance(as_fitted, Scene):
+        return as_fitted
+    gas = as_fitted.gas
+    off = gas.pressure - residuals.problem.models.gas_pressure
+    return replace(as_fitted, gas=replace(gas, gauge_correction=off))

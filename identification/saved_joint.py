@@ -99,6 +99,8 @@ def put_joint(
         _put_width(document, place, each.standard_deviation, _value(scene, each.name))
     if isinstance(scene, Scene):
         _put_errors(document, scene)
+        if any(each.name == "pressure" for each in (*pulled, *joint) if each in pulled or not each.held):
+            place_of("gas.gauge_correction", document).put(document, scene.gas.gauge_correction)
     document["fitted"] = {"quantities": list(_quantities(document, joint))}
 
 

@@ -10,12 +10,23 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.keys.declaration import Listed, needed, standard
-from ringbalance.scene.keys.fields import POSITIVE, OneLine, number, numbers
+from ringbalance.scene.keys.fields import POSITIVE, OneLine, number, numbers, quantity
 from ringbalance.scene.units import unit_factor
 
 NO_UNIT: Final = "1"
 MODEL: Final = "model: "
 """What the name of an error of a model begins with; the rest is its cause and, of k's, its part."""
+
+
+GaugeCorrection = Annotated[
+    float,
+    quantity("pressure"),
+    standard(
+        "0 kPa",
+        "`pressure` less what the gauge shows of it, which `ringbalance fit` adds to the gas pressures of "
+        "measurements, and writes",
+    ),
+]
 
 
 @dataclass(frozen=True, kw_only=True)

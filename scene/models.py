@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.fitted import GaugeCorrection
 from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, Shown, derived, needed, standard, unused
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.fields import (
@@ -31,7 +32,7 @@ from ringbalance.scene.keys.fields import (
 )
 from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.tube_models import FINEST_MODELS, ModelError, TubeModels
+from ringbalance.scene.tube_models import FINEST_MODELS, ModelErrors, TubeModels
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -284,15 +285,7 @@ class Tube:
         UNCERTAIN,
         Shown("factor on the draw-down depth"),
     ] = 1.0
-    model_errors: Annotated[
-        tuple[ModelError, ...],
-        standard(
-            [],
-            "corrections of the tube's models, in standard deviations of each model's stated uncertainty; "
-            "`ringbalance fit` writes them",
-        ),
-        Listed('[{ cause = "friction correlation", even = 0.4, odd = -0.1 }, ...]'),
-    ] = ()
+    model_errors: ModelErrors = ()
     models: TubeModels = FINEST_MODELS
     """Of its loss; no key."""
 
@@ -316,6 +309,7 @@ class Gas:
         UNCERTAIN,
         Shown("gas pressure", "MPa", note="gauge"),
     ]
+    gauge_correction: GaugeCorrection = 0.0
     measured_at: Annotated[
         PressurePlace,
         standard(

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal, cast, get_args
 
-from ringbalance.scene.keys.declaration import needed, standard
+from ringbalance.scene.keys.declaration import Listed, needed, standard
 from ringbalance.scene.keys.fields import Bounds, number
 
 LEFT_OUT: Final = "left out"
@@ -44,6 +44,10 @@ ErrorCause = Literal[
     "ends",
     "bends",
     "left out",
+    "friction as built",
+    "rotation as built",
+    "entrance as built",
+    "bends as built",
     "clearing of the crest",
     "pressure of the cavity",
     "start of the flow",
@@ -81,3 +85,14 @@ class ModelError:
             raise ValueError(f"{name!r} names no error of a model")
         cause = cast(ErrorCause, match[1])
         return cls(cause=cause, odd=size) if match[2] == "odd" else cls(cause=cause, even=size)
+
+
+ModelErrors = Annotated[
+    tuple[ModelError, ...],
+    standard(
+        [],
+        "corrections of the tube's models, in standard deviations of each model's stated uncertainty; "
+        "`ringbalance fit` writes them",
+    ),
+    Listed('[{ cause = "friction correlation", even = 0.4, odd = -0.1 }, ...]'),
+]

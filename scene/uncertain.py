@@ -167,10 +167,13 @@ def eccentric_drawn(scene: EccentricScene, random: np.random.Generator) -> Eccen
     """
     together = {each.quantity for each in scene.fitted.quantities}
     for uncertain in scene.uncertainty:
-        if any(name.split("[")[0] == uncertain.quantity for name in together):
-            continue
         move = _drawn(uncertain, random.standard_normal() / NORMAL_95)
-        scene = eccentric_moved(scene, uncertain.quantity, move)
+        if uncertain.quantity in together:
+            continue
+        both = [f"{uncertain.quantity}[{place}]" for place in (0, 1)]
+        alone = [name for name in both if name not in together]
+        for path in [uncertain.quantity] if len(alone) == len(both) else alone:
+            scene = eccentric_moved(scene, path, move)
     for each, change in zip(scene.fitted.quantities, scene.fitted.drawn(random).tolist(), strict=True):
         scene = eccentric_moved(scene, each.quantity, partial(_by, change, each.unit in _ANGLES))
     return scene

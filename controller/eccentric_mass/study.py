@@ -249,7 +249,7 @@ def _moved_runs(scene: EccentricScene) -> dict[str, list[Judged]]:
 
 def _drawn_runs(scene: EccentricScene) -> list[Judged]:
     """What runs come to with all stated inputs, and the noise, drawn at once; empty: none is stated."""
-    if not scene.uncertainty:
+    if not scene.uncertainty and not scene.fitted.quantities:
         return []
     settings, seed = StrategySettings.of(scene), scene.run.seed
     plants = (

@@ -66,7 +66,10 @@ class Models:
         gravity = mean_gravity(scene) > scene.tolerance
         law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
         return cls(
-            tube=tube, gravity=gravity, velocity=_primed_velocity(law, scene), gas_pressure=scene.gas.pressure
+            tube=tube,
+            gravity=gravity,
+            velocity=_primed_velocity(law, scene),
+            gas_pressure=scene.gas.pressure - scene.gas.gauge_correction,
         )
 
 

@@ -74,7 +74,7 @@ def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
 
     def laws(turned: FloatArray | None = None) -> tuple[CalibratedLaw, ...]:
         sides = direction_sides(scene, turned=turned).values()
-        return tuple(nominal_law(side, gravity=gravity) for both in sides for side in both)
+        return tuple(_variant(scene, side, gravity=gravity) for both in sides for side in both)
 
     pressure = _VARIED_PRESSURES * scene.gas.pressure
     fill = _VARIED_FILLS[:, None] * scene.disc.max_fill_ratio
@@ -84,6 +84,12 @@ def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
     changes = (velocities[1::2] - velocities[::2]).T
     _, size, turned = np.linalg.svd(changes, full_matrices=False)
     return laws(turned[size > _LITTLE * size[0]].T) if size[0] > 0 else ()
+
+
+def _variant(scene: Scene, side: Scene, *, gravity: bool) -> CalibratedLaw:
+    """Law of a scene beside another one; gas pressures are asked for as that has them."""
+    law, asked = nominal_law(side, gravity=gravity), scene.gas.pressure
+    return replace(law, gas_factor=law.gas_factor * side.gas.pressure / asked) if asked else law
 
 
 def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:

@@ -259,7 +259,7 @@ def test_what_needs_a_liquid_refuses_eccentric_masses(function: Callable[[Any], 
 def test_keys_are_fields(table: str) -> None:
     """A key reaches the record's field of its name; nothing is written in a file and then ignored."""
     assert _keys(table) == {field.name for field in fields(RECORDS[table])}
-    assert set(TABLES) == {*RECORDS, "accuracy", "uncertainty", "measured"}
+    assert set(TABLES) == {*RECORDS, "accuracy", "uncertainty", "fitted", "measured"}
 
 
 _PATHS = [(table, key) for table in TABLES for key in sorted(_keys(table))]

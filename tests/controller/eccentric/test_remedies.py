@@ -306,7 +306,7 @@ def test_random_scenes_end_with_a_status_and_a_remedy_that_works(number: int) ->
 def test_no_remedy_asks_for_a_run_that_would_be_refused() -> None:
     """Drives of a time constant far below the sample: the stages' times would need too many steps."""
     fast = changed(bundled("driven_masses_small"), "motor", resistance=0.02, maximum_voltage=None)
-    short = changed(changed(fast, "run", time_limit=0.5), "supervisor", start=0.45)
+    short = changed(changed(fast, "run", time_limit=0.5), "supervisor", start=0.5)
     longest = longest_run(short)
     with pytest.raises(SceneError):
         check_substeps(changed(short, "run", time_limit=1.01 * longest))

@@ -73,7 +73,7 @@ def ellipse(scene: EccentricScene, number: int) -> tuple[float, float]:
     # The scene's own imbalance is drawn as well; what is not known of the rotor is a share of it.
     share = PlantParameters.of(plant).unbalance / PlantParameters.of(scene).unbalance
     whole = noise + share**2 * np.asarray(told["imbalance_rotor_covariance"])
-    return tuple(float(error @ np.linalg.solve(each, error)) for each in (whole, noise))
+    return float(error @ np.linalg.solve(whole, error)), float(error @ np.linalg.solve(noise, error))
 
 
 def estimating(name: str) -> EccentricScene:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
+from ringbalance.controller import deferred
 from ringbalance.controller.compare_rotor import OneRotor, own_scene
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import advised
@@ -93,8 +94,8 @@ class Side:
 class Comparison(CommandResult):
     """Two balancers on one rotor."""
 
-    _document = "ringbalance.controller.compare:Comparison.document"
-    _summary = "ringbalance.controller.summary:comparison_lines"
+    _deferred: ClassVar[Any] = deferred
+    _summary: ClassVar[str] = "comparison_lines"
 
     rotor: OneRotor
     """That of the first scene."""
@@ -102,6 +103,10 @@ class Comparison(CommandResult):
     """s, from the start of balancing, of every run: the longer time limit of both scenes."""
     sides: tuple[Side, Side]
     """In the order of the scenes."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `document`."""
+        return self.document()
 
     def document(self) -> dict[str, Any]:
         """All as a JSON document in SI; lists run along `scenes`; null: not settled."""

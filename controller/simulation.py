@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from itertools import pairwise
-from typing import Final
+from typing import Any, ClassVar, Final
 
+from ringbalance.controller import deferred
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.formulas import has_risen, has_turned
 from ringbalance.controller.liquid_ring.plant import Operation
@@ -177,8 +178,9 @@ class Injection:
 class Simulation(CommandResult):
     """One closed-loop run."""
 
-    _document = "ringbalance.controller.line_runs:command_document"
-    _summary = "ringbalance.controller.summary:simulation_lines"
+    _deferred: ClassVar[Any] = deferred
+    _document: ClassVar[str] = "command_document"
+    _summary: ClassVar[str] = "simulation_lines"
 
     scene: Scene
     model: BalancerModel

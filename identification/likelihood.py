@@ -43,6 +43,7 @@ class Block:
     """One file of measurements, its errors made independent."""
 
     observations: Observations
+    kind: PredictedKind
     measured: FloatArray
     """y, shape (n,)."""
     whiten: FloatArray
@@ -50,10 +51,11 @@ class Block:
     free: FloatArray
     """B, shape (n, m)."""
 
-    @property
-    def kind(self) -> PredictedKind:
-        """How the data are predicted."""
-        return PREDICTED[self.observations.kind]
+    def __reduce__(self) -> Any:
+        """Pickled as its measurements; functions of a kind have no name by which another process has them."""
+        if self.kind is not PREDICTED[self.observations.kind]:
+            return super().__reduce__()
+        return Block.of, (self.observations,)
 
     @property
     def group(self) -> str:
@@ -72,6 +74,7 @@ class Block:
         lower = np.linalg.cholesky(kind.covariance(observations))
         return cls(
             observations=observations,
+            kind=kind,
             measured=kind.measured(observations),
             whiten=np.linalg.inv(lower),
             free=np.zeros((len(lower), 0)) if kind.free is None else kind.free(observations),

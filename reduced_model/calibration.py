@@ -11,12 +11,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.loss import VELOCITIES, TubeLoss, tube_loss
+from ringbalance.reduced_model import deferred
 from ringbalance.reduced_model.budget import Budget, budgets
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.gravity import check_ring
@@ -49,8 +50,9 @@ IDENTIFIABILITY: Final = (
 class Calibration(CommandResult):
     """Everything that `calibrate` finds out about a scene's balancer."""
 
-    _document = "ringbalance.reduced_model.documents:calibration_document"
-    _summary = "ringbalance.reduced_model.summary:calibration_lines"
+    _deferred: ClassVar[Any] = deferred
+    _document: ClassVar[str] = "calibration_document"
+    _summary: ClassVar[str] = "calibration_lines"
 
     scene: Scene
     """With the models of the tube's loss that its tolerance asks for."""

@@ -10,6 +10,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ringbalance.calibration import calibrate as calibrate
+    from ringbalance.calibration import paper_law as paper_law
     from ringbalance.controller.algorithms.algorithm import Command as Command
     from ringbalance.controller.algorithms.algorithm import Controller as Controller
     from ringbalance.controller.algorithms.algorithm import Measurement as Measurement
@@ -20,9 +22,7 @@ if TYPE_CHECKING:
     from ringbalance.controller.simulation import Simulation as Simulation
     from ringbalance.controller.tuning.eccentric import EccentricTuning as EccentricTuning
     from ringbalance.controller.tuning.tune import Tuning as Tuning
-    from ringbalance.face import calibrate as calibrate
     from ringbalance.face import compare as compare
-    from ringbalance.face import paper_law as paper_law
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
     from ringbalance.reduced_model.calibration import Calibration as Calibration
@@ -73,13 +73,13 @@ _HOME = {
     "Tuning": "ringbalance.controller.tuning.tune",
     "ValveCommand": "ringbalance.controller.algorithms.algorithm",
     "bundled_scene": "ringbalance.scene",
-    "calibrate": "ringbalance.face",
+    "calibrate": "ringbalance.calibration",
     "compare": "ringbalance.face",
     "extremes": "ringbalance.studies",
     "fit": "ringbalance.studies",
     "load_law": "ringbalance.reduced_model.law.loading",
     "load_scene": "ringbalance.scene",
-    "paper_law": "ringbalance.face",
+    "paper_law": "ringbalance.calibration",
     "plot": "ringbalance.studies",
     "run_cases": "ringbalance.studies",
     "simulate": "ringbalance.face",

@@ -19,14 +19,13 @@ from ringbalance.controller.terms import can_carry
 from ringbalance.controller.tuning.eccentric import EccentricTuning, tune_eccentric
 from ringbalance.controller.tuning.tune import Tuning
 from ringbalance.controller.tuning.tune import tune as tune_scene
-from ringbalance.reduced_model.calibration import Calibration, calibrated_model
 from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
+from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.completing import completed_model, lacking
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.law.paper_law import paper_law as paper_law_of
 from ringbalance.reduced_model.selection.registry import IN_INJECTIONS, NOT_MODELLED
 from ringbalance.scene import AnyScene, EccentricScene, Scene
 from ringbalance.scene.changes import checked_scene
@@ -39,22 +38,6 @@ class GivesVelocities(Protocol):
     def evaluate(self) -> Callable[..., Flow]:
         """Flow for `fill_ratio`, `opposite_fill_ratio`, `gas_pressure` and `primed`, see `FlowLaw`."""
         ...
-
-
-def calibrate(scene: AnyScene) -> Calibration:
-    """Calibrate a scene's balancer: lambda, k(u) and the flow law, with uncertainties.
-
-    Raises: SceneError: a rotor too slow for the liquid to form a ring, or a balancer without liquid.
-    """
-    return calibrate_scene(checked_scene(scene))
-
-
-def paper_law(scene: AnyScene) -> PaperLaw:
-    """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
-
-    Raises: SceneError: a balancer without liquid.
-    """
-    return paper_law_of(checked_scene(scene))
 
 
 @overload

@@ -40,9 +40,6 @@ Level = Literal["light", "heavy"]
 class Fit(CommandResult):
     """A fit with the tests of its residuals and the measurement that would help most."""
 
-    _document = "ringbalance.studies:Fit.document"
-    _summary = "ringbalance.studies:Fit.lines"
-
     result: FitResult
     data: tuple[Observations, ...]
     review: Review
@@ -57,6 +54,10 @@ class Fit(CommandResult):
     def succeeded(self) -> bool:
         """Whether the fit describes the data, and no other law does so better."""
         return self.review.holds
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `document`."""
+        return self.document()
 
     def document(self) -> dict[str, Any]:
         """What `ringbalance fit --json` prints."""

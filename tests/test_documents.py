@@ -26,10 +26,12 @@ PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "commands.md"
 SHARED: Final = "Keys that several commands have"
 PAPER, DRIVEN = (str(rb.bundled_scene(name)) for name in ("liquid_ring_paper", "driven_masses_small"))
 MEASUREMENTS: Final = Path(PAPER).parent / "measurements"
+MODELS: Final = "rungs"
 BY_NAME: Final = {
     *("tube.terms", "tube.uncertainty_parts", "fill_ratio", "tuned", "gain", "outcomes"),
-    *("held", "pulls", "cost_model.seconds", "quantities.rungs.models", "quantities.rungs.work"),
-    *("quantities.rungs.fixed_work", "quantities.choices.models", "times.rungs", "times.refit_seconds"),
+    *("held", "pulls", "cost_model.seconds", "quantities.choices.models", "times.refit_seconds"),
+    *(f"quantities.{MODELS}.{each}" for each in ("models", "work", "fixed_work")),
+    f"times.{MODELS}",
     *("numbers", "tables.columns", "tables.units", "endings", "loop_endings", "violations.point"),
 }
 """Whose keys are names of what the scene, the fit or the case has."""

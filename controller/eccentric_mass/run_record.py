@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
+from ringbalance.controller import deferred
 from ringbalance.controller.eccentric_mass.run_loop import Record
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
@@ -64,8 +65,9 @@ class StageSpan:
 class EccentricRun(CommandResult):
     """One run of the whole strategy on the plant."""
 
-    _document = "ringbalance.controller.eccentric_mass.document:eccentric_document"
-    _summary = "ringbalance.controller.summary:eccentric_lines"
+    _deferred: ClassVar[Any] = deferred
+    _document: ClassVar[str] = "eccentric_document"
+    _summary: ClassVar[str] = "eccentric_lines"
 
     balancer: str
     """ "eccentric_mass"."""

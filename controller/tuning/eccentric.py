@@ -7,13 +7,14 @@ import statistics
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ringbalance.controller import deferred
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
@@ -48,8 +49,9 @@ class _EccentricSettling:
 class EccentricTuning(CommandResult):
     """What is recommended for the drives of eccentric masses."""
 
-    _document = "ringbalance.controller.tuning.eccentric:eccentric_tuning_document"
-    _summary = "ringbalance.controller.summary:eccentric_tuning_lines"
+    _deferred: ClassVar[Any] = deferred
+    _document: ClassVar[str] = "eccentric_tuning_document"
+    _summary: ClassVar[str] = "eccentric_tuning_lines"
 
     scene: EccentricScene
     """As given."""

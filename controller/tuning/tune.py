@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from ringbalance.controller import deferred
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.checks import check_settings
 from ringbalance.controller.liquid_ring.plant import DiscState
@@ -48,8 +49,9 @@ from ringbalance.scene.results import CommandResult
 class Tuning(CommandResult):
     """What is recommended for a scene's controller under a law."""
 
-    _document = "ringbalance.controller.tuning.tune:tuning_document"
-    _summary = "ringbalance.controller.summary:tuning_lines"
+    _deferred: ClassVar[Any] = deferred
+    _document: ClassVar[str] = "tuning_document"
+    _summary: ClassVar[str] = "tuning_lines"
 
     scene: Scene
     """With what is recommended."""

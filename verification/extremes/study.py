@@ -50,9 +50,6 @@ SIZES: Final[Mapping[Level, Size]] = {
 class Extremes(CommandResult):
     """What was found."""
 
-    _document = "ringbalance.verification.extremes.study:Extremes.document"
-    _summary = "ringbalance.verification.extremes.study:Extremes.lines"
-
     points: tuple[Point, ...]
     judgements: tuple[Judgement, ...]
     """Of the designed set, in the order of its points."""
@@ -72,6 +69,10 @@ class Extremes(CommandResult):
         yield ", ".join(f"{count} {ending}" for ending, count in counted(everything).items() if count)
         yield f"invariants violated at {self.broken()} points"
         yield f"largest residual {max((j.residual for j in everything), default=0.0):.2g}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `document`."""
+        return self.document()
 
     def document(self) -> Record:
         """What was found as plain numbers, lists and texts."""

@@ -67,9 +67,6 @@ def hierarchies_of(scene: Scene, quantities: Sequence[str]) -> Iterator[ModelHie
 class TradeStudy(CommandResult):
     """All model hierarchies of one scene, measured."""
 
-    _document = "ringbalance.verification.selection_studies.study:TradeStudy.document"
-    _summary = "ringbalance.verification.selection_studies.study:TradeStudy.lines"
-
     scene: Scene
     trades: tuple[Trade, ...]
     choices: Mapping[str, tuple[Choice, ...]]
@@ -86,6 +83,10 @@ class TradeStudy(CommandResult):
             if choices:
                 chosen = choices[-1]
                 yield f"{title}: {chosen.fidelity.name} at {chosen.tolerance:.0e}, {chosen.cost:.2g} s"
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `document`."""
+        return self.document()
 
     def document(self) -> Record:
         """Plain numbers and texts; all but `times` is the same on every machine."""

@@ -1,0 +1,30 @@
+"""Documents and texts of results, loaded when first used: they import what they describe.
+
+`from ringbalance.controller import deferred`, then `deferred.command_document(...)`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any, Final
+
+_HOME: Final = MappingProxyType(
+    {
+        "command_document": "ringbalance.controller.line_runs",
+        "comparison_lines": "ringbalance.controller.summary",
+        "eccentric_document": "ringbalance.controller.eccentric_mass.document",
+        "eccentric_lines": "ringbalance.controller.summary",
+        "eccentric_tuning_document": "ringbalance.controller.tuning.eccentric",
+        "eccentric_tuning_lines": "ringbalance.controller.summary",
+        "simulation_lines": "ringbalance.controller.summary",
+        "tuning_document": "ringbalance.controller.tuning.tune",
+        "tuning_lines": "ringbalance.controller.summary",
+    }
+)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)

@@ -1,0 +1,26 @@
+"""Calibration and the paper's law as a Python user calls them: they load none of the closed loop."""
+
+from __future__ import annotations
+
+from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
+from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.reduced_model.law.paper_law import paper_law as paper_law_of
+from ringbalance.scene.changes import checked_scene
+from ringbalance.scene.narrowing import AnyScene
+
+
+def calibrate(scene: AnyScene) -> Calibration:
+    """Calibrate a scene's balancer: lambda, k(u) and the flow law, with uncertainties.
+
+    Raises: SceneError: a rotor too slow for the liquid to form a ring, or a balancer without liquid.
+    """
+    return calibrate_scene(checked_scene(scene))
+
+
+def paper_law(scene: AnyScene) -> PaperLaw:
+    """The paper's flow law for a scene, with k = 50 unless the scene fixes it.
+
+    Raises: SceneError: a balancer without liquid.
+    """
+    return paper_law_of(checked_scene(scene))

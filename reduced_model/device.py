@@ -15,7 +15,7 @@ from ringbalance.physics.tube.draw_down import port_depth
 from ringbalance.physics.tube.uncertainty import TUBE_INPUTS
 from ringbalance.reduced_model.chamber.inputs import chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.law.building import tube_path
-from ringbalance.reduced_model.operating.residual import first_stalled
+from ringbalance.reduced_model.operating.residual import NEARLY_EMPTY, first_stalled
 from ringbalance.reduced_model.tube.heads import log_heads
 from ringbalance.reduced_model.tube.regime import (
     ColumnFlow,
@@ -153,7 +153,7 @@ class Device:
             )
             return np.asarray(can_flow(ends=self._ends(own, other), crest=crest, primed=held))
 
-        return first_stalled(moves, start=top / 2) or 0.0
+        return first_stalled(moves, start=top / 2, end=NEARLY_EMPTY * top) or 0.0
 
 
 def device_of(

@@ -277,11 +277,7 @@ class Tube:
     draw_down_factor: Annotated[
         float,
         number(POSITIVE),
-        standard(
-            1.0,
-            "depth of the liquid over a port at which gas enters it, over the calculated one; unless "
-            "[uncertainty] states another, 30 % uncertain",
-        ),
+        standard(1.0, "depth over a port at which gas enters it, over the calculated one, 30 % uncertain"),
         UNCERTAIN,
         Shown("factor on the draw-down depth"),
     ] = 1.0

@@ -39,7 +39,7 @@ def rim_depth(*, flow_rate: npt.ArrayLike, acceleration: float, bore: float) -> 
     The flow over a rim of length pi d is at most that at critical depth 2 h/3,
     Q = pi d (2/3)^1.5 sqrt(g_c) h^1.5. Of a deeper layer more would fall into the port than the tube takes:
     it stays drowned.
-    Args: as `point_sink_depth`; `bore`: d, m.
+    Args: as `point_sink_depth`; `bore`: d of the round port, m.
     Source: the broad-crested weir, bent into a circle. That the level over an outlet which lets gas in
         follows from the flow alone, and that such a model bounds the level over one that runs full: abstract
         of Proc. IMechE 198 (1984), doi:10.1243/PIME_PROC_1984_198_016_02.

@@ -25,8 +25,8 @@ _PIECES: Final = 32
 _STALL_SAMPLES: Final = 65
 _STALL_ROUNDS: Final = 4
 """Of refinement, each to a 64th: 1e-8 of a fill is left."""
-_NEARLY_EMPTY: Final = 1e-6
-"""Fill ratio at which a chamber's last liquid is looked at."""
+NEARLY_EMPTY: Final = 1e-6
+"""Share of a pair's liquid with which a chamber's last liquid is looked at."""
 _NOTHING: Final = 1e-9
 """Below this a fill ratio is not told from zero."""
 FACTOR: Final = "draw_down_factor"
@@ -219,13 +219,11 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float) -> fl
         return flow.velocity > 0
 
     lowest = max(0.0, total - law.max_fill_ratio)
-    stopped = first_stalled(moves, start=total / 2, end=max(lowest, _NEARLY_EMPTY))
+    stopped = first_stalled(moves, start=total / 2, end=max(lowest, NEARLY_EMPTY * total))
     return lowest if stopped is None else stopped
 
 
-def first_stalled(
-    moves: Callable[[FloatArray], BoolArray], *, start: float, end: float = _NEARLY_EMPTY
-) -> float | None:
+def first_stalled(moves: Callable[[FloatArray], BoolArray], *, start: float, end: float) -> float | None:
     """Fill from `start` down to `end` at which liquid first stops moving; None where it moves at all."""
     for _ in range(_STALL_ROUNDS):
         fills = np.linspace(start, end, _STALL_SAMPLES)

@@ -102,11 +102,11 @@ def test_a_law_with_fitted_inputs_is_read_back_as_it_was(paper_scene: Scene, tmp
     law = calibrate(fitted(paper_scene, 0.9)).flow_law
     again = load_law(law.save(tmp_path / "law.json"))
     assert isinstance(again, CalibratedLaw)
-    widths = [
+    stored, read = (
         each.evaluate(fill_ratio=np.array([0.1, 0.25, 0.4]), gas_pressure=5e5).uncertainty
         for each in (law, again)
-    ]
-    assert np.array_equal(*widths)
+    )
+    assert np.array_equal(stored, read)
     assert len(again.variants) == len(law.variants) > 0
 
 

@@ -112,7 +112,9 @@ def test_the_angle_of_the_moment_is_reported(scene: Scene) -> None:
 
 
 def test_a_gas_pressure_at_which_nothing_flows(scene: Scene) -> None:
-    """No gas is drawn into a port on the wall before a chamber is empty: a pair can use all its liquid."""
+    """No gas is drawn into a port on the wall, but no liquid leaves a chamber either: a pair can use none."""
     found = calibrate(replace(scene, gas=replace(scene.gas, pressure=0.1e6)))
     assert found.residual.fill_ratio == 0
-    assert found.budgets["usable_moment"].value == pytest.approx(found.residual.pair_moment)
+    assert found.residual.least_fill_ratio == pytest.approx(scene.disc.initial_fill)
+    assert found.budgets["usable_moment"].value == found.residual.reach == 0
+    assert found.residual.pair_moment > 0

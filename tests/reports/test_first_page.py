@@ -332,7 +332,7 @@ def test_the_decision_counts_and_names(evidence: Record) -> None:
     told = decision(requirements(evidence))
     assert (
         told
-        == f"{len(rows) - 1} of {len(rows)} requirements are met; not met: correction capacity of one pair."
+        == f"{len(rows) - 1} of {len(rows)} requirements are met; not met: correction capacity in any direction."
     )
 
 

@@ -11,11 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.liquid_ring.integrators import quadrature
-from ringbalance.controller.loop import simulate
-from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene

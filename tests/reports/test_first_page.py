@@ -331,8 +331,8 @@ def test_the_decision_counts_and_names(evidence: Record) -> None:
     evidence["summary"]["needed_moment_kg_m"] = 1.0
     told = decision(requirements(evidence))
     assert (
-        told == f"{len(rows) - 1} of {len(rows)} requirements are met; "
-        "not met: correction capacity in any direction."
+        told == f"{len(rows) - 1} of {len(rows)} requirements are met; not met: correction capacity in any "
+        "direction."
     )
 
 

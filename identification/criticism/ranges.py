@@ -24,7 +24,7 @@ _FAR_VIBRATION: Final = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class OutOfRange:
+class ComparedColumn:
     """One column of one file."""
 
     file: str
@@ -32,16 +32,18 @@ class OutOfRange:
     unit: str
     """Of the template; empty for a number without one."""
     ratio: float
-    """Median of the column over the nearer end of the scene's range."""
+    """Median of the column over the nearer end of the scene's range; one within it."""
+    fails: bool
+    """Whether it lies so far off that a unit is wrong, or the machine another one."""
     text: str
 
 
-def out_of_range(problem: Problem) -> tuple[OutOfRange, ...]:
-    """Columns that lie far from what a liquid-ring scene has; other scenes have no such ranges yet."""
-    return tuple(_far(problem)) if isinstance(problem.scene, Scene) else ()
+def compared_columns(problem: Problem) -> tuple[ComparedColumn, ...]:
+    """Columns against what a liquid-ring scene has; other scenes have no such ranges yet."""
+    return tuple(_compared(problem)) if isinstance(problem.scene, Scene) else ()
 
 
-def _far(problem: Problem) -> Iterator[OutOfRange]:
+def _compared(problem: Problem) -> Iterator[ComparedColumn]:
     for block in problem.blocks:
         observations = block.observations
         ranges = _ranges(problem.scene, observations.kind)
@@ -53,25 +55,25 @@ def _far(problem: Problem) -> Iterator[OutOfRange]:
             middle = float(np.median(np.abs(values[values != 0])))
             ratio = middle / high if middle > high else middle / low if middle < low else 1.0
             limit = _FAR_VIBRATION if column.amplitude else FAR
-            if not 1 / limit <= ratio <= limit:
-                yield OutOfRange(
-                    file=observations.file,
-                    column=column.name,
-                    unit=column.unit,
-                    ratio=ratio,
-                    text=_text(observations.file, column, middle, ratio),
-                )
+            yield ComparedColumn(
+                file=observations.file,
+                column=column.name,
+                unit=column.unit,
+                ratio=ratio,
+                fails=not 1 / limit <= ratio <= limit,
+                text=_text(observations.file, column, middle, ratio),
+            )
 
 
 def _text(file: str, column: Column, middle: float, ratio: float) -> str:
-    values = [
-        format_quantity(value, column.dimension or "", column.unit, digits=3)
-        for value in (middle, middle / ratio)
-    ]
-    return (
-        f"{column.head} in {Path(file).name} is {values[0]} in the middle of its values, {ratio:.2g} times "
-        f"the {values[1]} of the scene"
-    )
+    here = f"{column.head} in {Path(file).name} is {_shown(column, middle)} in the middle of its values"
+    if ratio == 1.0:
+        return f"{here}, as the scene has it"
+    return f"{here}, {ratio:.2g} times the {_shown(column, middle / ratio)} of the scene"
+
+
+def _shown(column: Column, value: float) -> str:
+    return format_quantity(value, column.dimension or "", column.unit, digits=3)
 
 
 def _ranges(scene: Scene, kind: str) -> Mapping[str, tuple[float, float]]:

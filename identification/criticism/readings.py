@@ -6,7 +6,7 @@ does not explain.  So every file is read otherwise too, and the likelihoods of b
     -2 ln L = sum (e/s)^2 + priors + 2 sum n_g ln s_g + ln det A'A - 2 ln det L^-1 - 2 ln |dy'/dy|,
 
 restricted to what parameters, held inputs and free unknowns leave (A their slopes), the noise of each group
-estimated anew, y' what was measured as the other reading has it.  The other reading is fitted linearly from
+estimated again, y' what was measured as the other reading has it.  The other reading is fitted linearly from
 the scene, so that it loses a little by curvature; the given one from its optimum.  Both know that lambda
 follows from the geometry: without that, peak to peak in one file is a lambda of two.
 A reading is named from a gain of `DECISIVE` on: with some thirty readings, and one file in a hundred that is

@@ -14,7 +14,7 @@ import numpy as np
 from ringbalance.identification.criticism.explained import Explained, shares_explained
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.patterns import Criticism, LinearFit
-from ringbalance.identification.criticism.ranges import OutOfRange, out_of_range
+from ringbalance.identification.criticism.ranges import ComparedColumn, compared_columns
 from ringbalance.identification.criticism.readings import Reading, other_readings
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.measurements import Observations
@@ -61,15 +61,15 @@ class Review:
     """Of each file, what the fit explains of it."""
     readings: tuple[Reading, ...] = ()
     """Other readings of the files, the likeliest first."""
-    ranges: tuple[OutOfRange, ...] = ()
-    """Columns far from what the scene has."""
+    ranges: tuple[ComparedColumn, ...] = ()
+    """Columns against what the scene has."""
 
     @property
     def _read_wrongly(self) -> tuple[str, ...]:
         """What speaks against the files as they stand, each in one sentence."""
         named = [each.text for each in self.readings if each.named]
         unexplained = [each.text for each in self.explained if each.fails]
-        return (*named, *unexplained, *(each.text for each in self.ranges))
+        return (*named, *unexplained, *(each.text for each in self.ranges if each.fails))
 
     @property
     def describes(self) -> bool:
@@ -105,7 +105,7 @@ class Review:
             laws=tuple(_comparisons(result, found)),
             explained=shares_explained(best),
             readings=other_readings(best),
-            ranges=out_of_range(best.residuals.problem),
+            ranges=compared_columns(best.residuals.problem),
         )
 
 

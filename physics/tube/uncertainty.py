@@ -46,6 +46,8 @@ TUBE_INPUTS: Final = (
 _CREEPING: Final = 0.2
 _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
+_LARGEST_ERROR: Final = 0.5
+"""Of k, by what simpler models leave out."""
 DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of what development adds, over rotation's extra friction on one developing length.
 
@@ -127,20 +129,30 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
     a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
     measured smooth tubes have.
+    What simpler models leave out counts for half of k at most: they may be off by far more at velocities that
+    the scene never has, and no error makes a loss a gain.
     """
     if not tube.model_errors:
         return state
     parts, terms, bends = model_parts(tube=tube, state=state), dict(state.terms), state.bends
+    angle = np.log(state.reynolds)
     for each in tube.model_errors:
         if each.cause not in parts:
             continue
-        angle = np.log(state.reynolds)
-        error = parts[each.cause] / NORMAL_95 * (each.even * np.cos(angle) + each.odd * np.sin(angle))
+        width = parts[each.cause]
+        if each.cause == SIMPLER:
+            width = _limited(width, _LARGEST_ERROR * state.k)
+        error = width / NORMAL_95 * (each.even * np.cos(angle) + each.odd * np.sin(angle))
         term = "decree" if "decree" in terms else MODEL_CAUSES[each.cause]
         if term == "bends":
             bends = tuple(k * (1 + error / terms[term]) for k in bends)
         terms[term] = terms[term] + error
     return replace(state, terms=terms, bends=bends)
+
+
+def _limited(width: FloatArray, largest: FloatArray) -> FloatArray:
+    """A half-width that stays below another one, and is unchanged while it is small against that."""
+    return np.asarray(width * (1 + (width / largest) ** 4) ** -0.25)
 
 
 def corrected_state(scene: Scene, velocity: npt.ArrayLike) -> TubeState:

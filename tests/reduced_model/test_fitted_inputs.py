@@ -106,7 +106,7 @@ def test_a_law_with_fitted_inputs_is_read_back_as_it_was(paper_scene: Scene, tmp
         each.evaluate(fill_ratio=np.array([0.1, 0.25, 0.4]), gas_pressure=5e5).uncertainty
         for each in (law, again)
     ]
-    assert np.array_equal(*widths)
+    assert np.array_equal(widths[0], widths[1])
     assert len(again.variants) == len(law.variants) > 0
 
 

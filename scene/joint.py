@@ -13,7 +13,7 @@ from typing import Any, Final, TypeVar, get_args
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.fitted import MODEL
+from ringbalance.scene.fitted import MODEL, Fitted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import LARGEST_ERROR, ErrorCause, ModelError
 from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, half_widths, shifted
@@ -24,6 +24,14 @@ DIRECTION: Final = f"{FITTED} "
 """What the names of directions begin with; a number follows."""
 
 Sides = tuple[Scene, Scene]
+
+
+def without_fitted(scene: Scene) -> Scene:
+    """The scene with its models as published and its inputs independent, for comparing models with models.
+
+    Corrections are those of the models that were fitted, and hold for no others.
+    """
+    return replace(scene, tube=replace(scene.tube, model_errors=()), fitted=Fitted())
 
 
 def independent_half_widths(scene: Scene) -> Mapping[str, float]:

@@ -144,13 +144,13 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
     a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
     measured smooth tubes have.
-    What simpler models leave out counts for half of k at most: they may be off by far more at velocities that
-    the scene never has, and no error makes a loss a gain.
+    What simpler models leave out, and errors of a constant k, count for half of k at most: they may be off by
+    far more at velocities that the scene never has, and no error makes a loss a gain.
     """
     if not tube.model_errors:
         return state
     parts, terms, bends = _all_parts(tube, state), dict(state.terms), state.bends
-    angle = np.log(state.reynolds)
+    angle, lumped = np.log(state.reynolds), np.zeros(state.k.shape)
     for each in tube.model_errors:
         if each.cause not in parts:
             continue
@@ -158,10 +158,15 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
         if each.cause == SIMPLER:
             width = _limited(width, _LARGEST_ERROR * state.k)
         error = width / NORMAL_95 * (each.even * np.cos(angle) + each.odd * np.sin(angle))
-        term = "decree" if "decree" in terms else _TERMS[each.cause]
+        if "decree" in terms:
+            lumped = lumped + error
+            continue
+        term = _TERMS[each.cause]
         if term == "bends":
             bends = tuple(k * (1 + error / terms[term]) for k in bends)
         terms[term] = terms[term] + error
+    if "decree" in terms:
+        terms["decree"] = terms["decree"] + _limited(lumped, _LARGEST_ERROR * state.k)
     return replace(state, terms=terms, bends=bends)
 
 

@@ -22,6 +22,7 @@ from ringbalance.reduced_model.tube.heads import TABLE_VELOCITIES
 from ringbalance.reduced_model.tube.path import crest_span, head_behind_crest
 from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.joint import without_fitted
 from ringbalance.scene.models import InputUncertainty, Scene, Tube
 
 _STEP: Final = 1e-5
@@ -269,7 +270,7 @@ def _parts(
 
     nu = batch.kinematic_viscosity
 
-    at_hand = replace(scene, tube=tube, uncertainty=(*stated, _EXACT_VISCOSITY))
+    at_hand = without_fitted(replace(scene, tube=tube, uncertainty=(*stated, _EXACT_VISCOSITY)))
     parts |= input_parts(at_hand, k_of=lambda moved: k_of(moved.tube, nu, moved.rotor.speed), k=state.k)
     if np.any(batch.relative_viscosity > 0):
         factors = (np.maximum(1 - batch.relative_viscosity, 0.1), 1 + batch.relative_viscosity)

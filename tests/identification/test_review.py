@@ -136,7 +136,8 @@ def test_the_expected_gain_is_that_of_fits_made_again(
     Noise is given, so that an interval depends on the draw through curvature alone: within 5 %.
     """
     data, first, told = four
-    offered = _offered_rows(first.scene, "transfer", data)
+    best = first.optimum
+    offered = _offered_rows(best.residuals.problem.scene_at(best.t), "transfer", data)
     chosen = next(g for g in told.gains if g.candidate == _words_of(offered, row))
     volume = PREDICTED["transfer"].predict(first.scene, offered, Models.of(paper_scene))
     more = replace(some(offered, [row], volume=volume[[row]]), file="more.csv")

@@ -12,6 +12,7 @@ import numpy as np
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.selection.estimates import term_estimates
 from ringbalance.reduced_model.selection.registry import models_used
+from ringbalance.scene.joint import without_fitted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.results import CommandResult
 from ringbalance.verification.evidence import Level
@@ -119,6 +120,7 @@ def trade_study(
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     """
     check_ring(scene)
+    scene = without_fitted(scene)
     light, costs = level == "light", committed_costs()
     trades, chosen = [], {}
     clock = Clock(repeats=1, memory=False) if light else Clock()

@@ -26,7 +26,7 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.uncertain import NORMAL_95, eccentric_moved
+from ringbalance.scene.uncertain import NORMAL_95, eccentric_value, eccentric_with
 
 _LONGEST_STEPS = 2_000
 """Steps in which an estimation is repeated; with fewer than the filter takes, each carries less noise."""
@@ -61,9 +61,9 @@ def rotor_covariance(
 
     middle = estimated(scene)
     for each in stated:
-        plant = eccentric_moved(
-            scene, each.quantity, lambda value, each=each: value + each.absolute(value) / NORMAL_95
-        )
+        value = eccentric_value(scene, each.quantity)
+        off = value + each.absolute(value) / NORMAL_95
+        plant = eccentric_with(scene, off, name=each.quantity)
         change = estimated(plant) - middle
         found += np.outer(change, change)
     return found

@@ -129,8 +129,14 @@ def _rotor_covariance(scene: EccentricScene, record: Record, speed: FloatArray) 
     estimating = np.flatnonzero(record.stage == int(Stage.IMBALANCE))
     if estimating.size == 0:
         return np.zeros((2, 2))
-    imbalance = complex(*record.imbalance[-1])
-    return rotor_covariance(scene, imbalance=imbalance, speed=float(speed[estimating[-1]]))
+    step = scene.sensor.step
+    return rotor_covariance(
+        scene,
+        imbalance=complex(*record.imbalance[-1]),
+        speed=float(speed[estimating[-1]]),
+        begin=float(estimating[0]) * step,
+        duration=estimating.size * step,
+    )
 
 
 def _left(record: Record, amplitude: FloatArray, limit: float) -> int | None:

@@ -71,10 +71,16 @@ class RunFacts:
         kept = self.settling_time is not None and self.left is None
         if self.cause is Cause.BALANCED:
             return EccentricOutcome.SETTLED if kept else EccentricOutcome.RISES_AGAIN
-        if self.cause is Cause.SPEED_CHANGED and kept:
+        if kept and (self.cause is Cause.SPEED_CHANGED or self._corrects_within_limit):
             return EccentricOutcome.SETTLED
         cause = _cause(self)
         return EccentricOutcome.TIME_LIMIT if cause is Cause.NONE else EccentricOutcome(cause.name.lower())
+
+    @property
+    def _corrects_within_limit(self) -> bool:
+        """Whether the run ended while what was measured to be within the limit was made better still."""
+        correcting = self.stage in {Stage.CHECK, Stage.CORRECTION}
+        return correcting and self.findings.objective <= self.scene.supervisor.limit
 
     @property
     def by_euler(self) -> bool:

@@ -71,6 +71,16 @@ def test_a_step_leaves_what_the_wrong_influence_leaves() -> None:
     assert run.settled
 
 
+def test_a_run_that_ends_while_it_corrects_what_is_within_the_limit_is_settled() -> None:
+    """Balanced to within a loose limit at the first check, and cut off in the correction that follows."""
+    paper = at_constant_speed(bundled("eccentric_mass_paper"), time_limit=20.0)
+    told = StrategySettings.of(changed(paper, "supervisor", limit=1e-3))
+    plant = changed(changed(paper, "supervisor", limit=1e-3), "rotor", stiffness=1.01 * paper.rotor.stiffness)
+    run = simulate_eccentric(plant, settings=told)
+    assert names(run)[-2:] == ["correction", "check"]
+    assert run.settled
+
+
 def test_a_wrong_influence_is_met_by_smaller_steps() -> None:
     """A stiffness of 0.55 of what is believed: whole steps would not converge, and the run still settles."""
     paper = at_constant_speed(bundled("washing_machine"), time_limit=200.0)

@@ -82,7 +82,7 @@ def estimating(name: str) -> EccentricScene:
 
 @pytest.mark.parametrize("name", ["washing_machine", "eccentric_mass_paper"])
 def test_the_imbalances_interval_holds_what_is_not_known_of_the_rotor(name: str) -> None:
-    """To first order; stated for 95 %, and the ellipses of the noise alone hold next to none."""
+    """Stated for 95 %; the ellipses of the noise alone hold next to none."""
     found = [ellipse(estimating(name), number) for number in range(6)]
     bound = chi2.ppf(0.95, 2)
     assert sum(whole < bound for whole, _ in found) >= 4
@@ -124,6 +124,17 @@ def test_a_comparison_gives_a_machine_the_same_filter_in_either_place() -> None:
     for name in ("velocity_walk", "unbalance_walk", "assumed_stiffness"):
         here, there = getattr(one.imbalance_filter, name), getattr(other.imbalance_filter, name)
         assert here == pytest.approx(there, rel=1e-3)
+
+
+@pytest.mark.parametrize("weight", [1e5, 1e6, 1e7])
+def test_a_held_regulator_is_stable_for_a_step_that_goes_with_its_fastest_pole(weight: float) -> None:
+    """At high weights k_d is sqrt(0.1) k_p; J/k_d is the fastest time constant, and with a margin of two the
+    longest hold."""
+    scene = changed(bundled("eccentric_mass_paper"), "lqr", state_weight=weight)
+    regulator, plant = RecommendedGains.of(scene).regulator, PlantParameters.of(scene)
+    inertia = plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / plant.mass
+    assert not regulator.stable
+    assert regulator.recommended_step == pytest.approx(inertia / math.sqrt(0.1 * weight), rel=0.2)
 
 
 @pytest.mark.parametrize("gain", [200.0, 2e4, 5e5])

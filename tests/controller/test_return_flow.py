@@ -24,7 +24,7 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.selection.estimates import INERTIA
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import load_scene
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import HumpGas, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 
 STRAIGHT = """
@@ -163,7 +163,7 @@ def test_levels_run_back_as_newton_says(tmp_path: Path, law: str, inertia: bool)
 
 @pytest.mark.parametrize("gas", ["vented", "trapped"])
 @pytest.mark.parametrize("inertia", [True, False])
-def test_no_crest_is_the_limit_of_a_crest_at_the_port(tmp_path: Path, inertia: bool, gas: str) -> None:
+def test_no_crest_is_the_limit_of_a_crest_at_the_port(tmp_path: Path, inertia: bool, gas: HumpGas) -> None:
     runs = []
     for crest in ("", "44.4 mm"):
         scene = scene_of(tmp_path, crest=crest)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
@@ -15,7 +15,6 @@ from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, runs_back_text
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.shortfall import liquid_not_driven, moment_missing
 from ringbalance.controller.simulation import (
     NOISE_DEVIATIONS,
@@ -104,17 +103,8 @@ class Facts:
 
     @property
     def drains(self) -> bool:
-        """Whether what still runs back, its pairs level, would take the vibration above the limit."""
-        if not any(self.runs_back):
-            return False
-        level = [
-            replace(pair, fill=pair.total / 2) if back else pair
-            for pair, back in zip(self.state.pairs, self.runs_back, strict=True)
-        ]
-        moment = disc_unbalance(
-            moment=self.plant.model.moment, fill_ratio=DiscState(pairs=tuple(level)).fills()
-        )
-        return abs(complex(self.scene.rotor.vibration(moment))) > self.scene.controller.limit
+        """Whether what still runs back would take the vibration above the limit."""
+        return self.plant.drains(self.state, self.runs_back, self.scene)
 
     @property
     def settling_time(self) -> float | None:
@@ -344,8 +334,7 @@ def _diverging(facts: Facts) -> str:
 
 
 def _drifting(facts: Facts) -> str:
-    why = runs_back_text(facts.scene, residual_fill=facts.plant.residual_fill)
-    return f"{_not_settled(facts)}, up to {facts.drift:.3g} in fill is lost between samples; {why}"
+    return f"{_not_settled(facts)}; {runs_back_text(facts.scene, residual_fill=facts.plant.residual_fill)}"
 
 
 def _too_short(facts: Facts) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,13 +13,13 @@ from ringbalance.controller.liquid_ring.interval import longest_opening, pass_ti
 from ringbalance.controller.liquid_ring.motion import Dynamics, PairState, Record, Switch
 from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL, opening_within
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer, floods
-from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.rotor import chamber_directions, disc_unbalance
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
-from ringbalance.scene.models import Disc
+from ringbalance.scene.models import Disc, Scene
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -280,6 +280,17 @@ class LiquidRing:
         highest = min(total - least, self.model.flow.max_fill_ratio)
         moment = self.model.moment.pair_vector(fill_ratio=highest, opposite_fill_ratio=total - highest)
         return complex(moment)
+
+    def drains(self, state: DiscState, runs_back: Sequence[bool], scene: Scene) -> bool:
+        """Whether the vibration would be above the limit, were the pairs level that still run back."""
+        if not any(runs_back):
+            return False
+        pairs = [
+            replace(pair, fill=pair.total / 2) if back else pair
+            for pair, back in zip(state.pairs, runs_back, strict=True)
+        ]
+        moment = disc_unbalance(moment=self.model.moment, fill_ratio=DiscState(pairs=tuple(pairs)).fills())
+        return abs(complex(scene.rotor.vibration(moment))) > scene.controller.limit
 
     def unreachable_vibration(
         self, *, state: DiscState, rotor: Rotor, least_fill: float | None = None

@@ -25,7 +25,9 @@ class Holding:
     def of(cls, scene: Scene, *, fill_ratio: float) -> Holding:
         """By hydrostatics, gravity left out. Args: `fill_ratio`: the largest that runs reach."""
         path, wall = tube_path(scene), scene.disc.outer_radius
-        fullest = float(surface_radius(disc=scene.disc, fill_ratio=fill_ratio))
+        fullest = float(
+            surface_radius(disc=scene.disc, fill_ratio=min(fill_ratio, scene.disc.max_fill_ratio))
+        )
         level = column_pressure(scene=scene, radius=fullest)
         pull = scene.liquid.density * scene.rotor.speed**2 / 2
         square = wall**2 - path.holding_pressure(level) / pull if pull > 0 else 0.0

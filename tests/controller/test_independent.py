@@ -87,8 +87,7 @@ class Second:
         k = tube.drag_coefficient or 0.0
         siphon = math.sqrt(2 * surplus / rho / (k + 1))
         if tube.hump_radius is None:
-            flows = max(p, q) > 0 and (primed or not back)
-            return (siphon, True) if flows else (0.0, False)
+            return siphon, True
         hump = self.depth(tube.hump_radius)
         cavity = self.scene.liquid.vapour_pressure - self.scene.gas.ambient_pressure
         margin = p - (q if other < self.port else cavity) + own - hump
@@ -140,7 +139,10 @@ class Second:
         def fills_up(_: float, state: np.ndarray) -> float:
             return 0.5 - self.flow(float(state[0]), total, p, primed=False)[1]
 
-        gone.terminal = fills_up.terminal = True  # type: ignore[attr-defined]
+        def stops(_: float, state: np.ndarray) -> float:
+            return math.copysign(1.0, start) * self.velocity(float(state[0]), total, p, primed=primed) - 1e-5
+
+        gone.terminal = fills_up.terminal = stops.terminal = True  # type: ignore[attr-defined]
         found = solve_ivp(
             lambda _, state: [-self.rate * self.velocity(float(state[0]), total, p, primed=primed)],
             (0.0, duration),
@@ -148,7 +150,7 @@ class Second:
             method="DOP853",
             rtol=1e-8,
             atol=1e-10,
-            events=gone if primed else (gone, fills_up),
+            events=(gone, stops) if primed else (gone, fills_up, stops),
         )
         if not primed and found.t_events[1].size:
             return self.after(float(found.y[0, -1]), total, p, duration - float(found.t[-1]), primed=True)
@@ -183,7 +185,7 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
                 )
                 worst = max(worst, abs(x - done.fill_after))
                 x, rest = done.fill_after, rest - done.duration
-            if primed[pair] and rest > 0:
+            if (primed[pair] or second.scene.tube.hump_radius is None) and rest > 0:
                 begun = x
                 x, primed[pair] = second.after(x, total, 0.0, rest, primed=True)
                 backward += x != begun
@@ -262,7 +264,7 @@ def test_a_run_is_that_of_a_second_model(case: tuple[str, Scene, Simulation]) ->
     worst, backward = replayed(run, second)
     assert worst < AGREEMENT
     assert len(run.injections) >= 2
-    assert (backward > 0) == (name == "two chambers at low speed level out")
+    assert (backward > 0) == (name == "two chambers at low speed level out" or scene.tube.hump_radius is None)
     # The vibration that goes with the fills at the end.
     letters = list(run.fill_ratio)
     k = scene.rotor.influence_coefficient * cmath.exp(-1j * scene.rotor.lag_angle)

@@ -136,8 +136,8 @@ def test_straight_tube_levels_out_with_the_gas_off(straight: CalibratedLaw, prim
     # The levels alone drive what the same gas pressure drives between equal ones.
     ends = straight.ends(fill_ratio=0.4)
     alike = straight.evaluate(fill_ratio=0.25, gas_pressure=float(ends.driving_pressure()), primed=primed)
-    one = float(alike.velocity)
-    np.testing.assert_allclose(off.velocity, [-one, 0.0, one], rtol=1e-12)
+    u = float(alike.velocity)
+    np.testing.assert_allclose(off.velocity, [-u, 0.0, u], rtol=1e-12)
 
 
 def test_hysteresis_a_running_column_needs_less_than_an_empty_tube(slow: CalibratedLaw) -> None:

@@ -37,7 +37,7 @@ class AgainstFit:
 
     @property
     def slope(self) -> float | None:
-        """Measured over fitted values, a line through zero weighted by noise; None where all fitted are zero."""
+        """Measured over fitted values, a line through zero weighted by noise; None for fitted zeros."""
         square = self._square
         return float(np.sum(self._weights * self.measured * self.fitted) / square) if square else None
 

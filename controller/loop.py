@@ -202,7 +202,7 @@ class _Run(Facts):
     def _held(self) -> bool:
         """Whether the amplitude has held; what the time limit has cut short would have ended otherwise."""
         held = not self.cut and has_held(self.time, self.since, self.scene.controller.hold_time)
-        held = held and not self.drains
+        held = held and not self.plant.drains(self.state, self.runs_back, self.scene)
         if held and self.held_since == math.inf:
             self.held_since = self.since
         return held

@@ -102,11 +102,6 @@ class Facts:
         )
 
     @property
-    def drains(self) -> bool:
-        """Whether what still runs back would take the vibration above the limit."""
-        return self.plant.drains(self.state, self.runs_back, self.scene)
-
-    @property
     def settling_time(self) -> float | None:
         """s, from which on the amplitude first held; None when it has not, or is not expected to stay."""
         if self.loop.stays and self.held_since < math.inf:
@@ -131,7 +126,7 @@ class Facts:
             return Outcome.SETTLED
         if self.beyond_disc > limit and not self.loop.unstable:
             return Outcome.CAPACITY_EXCEEDED
-        if self.drains:
+        if self.plant.drains(self.state, self.runs_back, self.scene):
             return Outcome.DRIFTING
         higher = self.final_amplitude > self.initial_amplitude + self.noise_floor
         if has_grown(self.cause, higher):

@@ -36,15 +36,19 @@ class AgainstFit:
     """Expanded (95 %), of all that was fitted together."""
 
     @property
-    def slope(self) -> float:
-        """Measured over fitted values, a line through zero weighted by the noise."""
-        weights = self._weights
-        return float(np.sum(weights * self.measured * self.fitted) / np.sum(weights * self.fitted**2))
+    def slope(self) -> float | None:
+        """Measured over fitted values, a line through zero weighted by noise; None for fitted zeros."""
+        square = self._square
+        return float(np.sum(self._weights * self.measured * self.fitted) / square) if square else None
 
     @property
-    def slope_uncertainty(self) -> float:
+    def slope_uncertainty(self) -> float | None:
         """Of the slope by the noise, expanded (95 %)."""
-        return float(NORMAL_95 / np.sqrt(np.sum(self._weights * self.fitted**2)))
+        return float(NORMAL_95 / np.sqrt(self._square)) if self._square else None
+
+    @property
+    def _square(self) -> float:
+        return float(np.sum(self._weights * self.fitted**2))
 
     @property
     def _weights(self) -> FloatArray:

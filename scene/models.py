@@ -32,7 +32,7 @@ from ringbalance.scene.keys.fields import (
 )
 from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.tube_models import FINEST_MODELS, ModelErrors, TubeModels
+from ringbalance.scene.tube_models import FINEST_MODELS, DrawDownFactor, ExtraLoss, ModelErrors, TubeModels
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -260,13 +260,7 @@ class Tube:
         Listed('[{ angle = "90 deg", radius = "3 mm" }, ...]'),
         Shown("bends"),
     ]
-    extra_loss: Annotated[
-        float,
-        number(NOT_NEGATIVE),
-        standard(0.0, "any further loss coefficient, on the velocity head in the tube"),
-        UNCERTAIN,
-        Shown("further loss coefficient"),
-    ]
+    extra_loss: ExtraLoss
     drag_coefficient: Annotated[
         float | None,
         number(POSITIVE),
@@ -274,13 +268,7 @@ class Tube:
         UNCERTAIN,
         Shown("drag coefficient k", absent="calculated"),
     ]
-    draw_down_factor: Annotated[
-        float,
-        number(POSITIVE),
-        standard(1.0, "depth over a port at which gas enters it, over the calculated one, 30 % uncertain"),
-        UNCERTAIN,
-        Shown("factor on the draw-down depth"),
-    ] = 1.0
+    draw_down_factor: DrawDownFactor = 1.0
     model_errors: ModelErrors = ()
     models: TubeModels = FINEST_MODELS
     """Of its loss; no key."""

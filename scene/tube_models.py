@@ -1,4 +1,4 @@
-"""Which model serves each part of the loss of a tube: chosen for a tolerance, so no key of a scene file."""
+"""Models of the loss of a tube, chosen for a tolerance, and the keys that correct them."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal, cast, get_args
 
-from ringbalance.scene.keys.declaration import Listed, needed, standard
-from ringbalance.scene.keys.fields import Bounds, number
+from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, Shown, needed, standard
+from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, Bounds, number
 
 LEFT_OUT: Final = "left out"
 CORRELATION: Final = "correlation"
@@ -95,4 +95,18 @@ ModelErrors = Annotated[
         "`ringbalance fit` writes them",
     ),
     Listed('[{ cause = "friction correlation", even = 0.4, odd = -0.1 }, ...]'),
+]
+ExtraLoss = Annotated[
+    float,
+    number(NOT_NEGATIVE),
+    standard(0.0, "any further loss coefficient, on the velocity head in the tube"),
+    UNCERTAIN,
+    Shown("further loss coefficient"),
+]
+DrawDownFactor = Annotated[
+    float,
+    number(POSITIVE),
+    standard(1.0, "depth over a port at which gas enters it, over the calculated one, 30 % uncertain"),
+    UNCERTAIN,
+    Shown("factor on the draw-down depth"),
 ]

@@ -141,7 +141,7 @@ def move(shared: Record, run: Record, time: float) -> float:
 
 @in_place
 def drains(shared: Record, run: Record) -> bool:
-    """Whether what still runs back would take the vibration above the limit, as `Facts.drains`."""
+    """Whether what still runs back would take the vibration above the limit, as `LiquidRing.drains`."""
     found = False
     for i in range(shared.chambers // 2):
         back = run.runs_back[i] > 0.0

@@ -97,7 +97,7 @@ class Ensemble:
             "law": self.law,
             "members": self.members,
             "seed": self.seed,
-            "spread_95": asdict(self.uncertainty_95),
+            "spread_95": self.uncertainty_95.document(),
             "left_out": [],
             "probability": {name: asdict(getattr(self, name)) for name in shares},
             "settling_time_s": {

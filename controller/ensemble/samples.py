@@ -68,6 +68,14 @@ class MemberUncertainty:
         """Relative, of the rate at which the vibration changes, by what was fitted together."""
         return math.hypot(*(self._together(RATE) + self._together(MOMENT) + self._together(INFLUENCE)))
 
+    def document(self) -> dict[str, Any]:
+        """As JSON takes it; of what was fitted together the root of the sum of squares of every row."""
+        plain = {name: value for name, value in vars(self).items() if name != "together"}
+        plain["gas_line"] = dict(self.gas_line)
+        if self.together is not None:
+            plain["together"] = np.hypot.reduce(self.together, axis=1).tolist()
+        return plain
+
     def _together(self, row: int) -> FloatArray:
         return np.zeros(0) if self.together is None else self.together[row]
 

@@ -104,4 +104,6 @@ def _range(found: AgainstFit, factor: float) -> tuple[float, float]:
 
 def _slope(found: AgainstFit) -> str:
     width = found.slope_uncertainty
+    if found.slope is None or width is None:
+        return "undefined"
     return f"{rounded(found.slope, width)} ± {rounded(width, width)}"

@@ -11,10 +11,11 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib.util import module_from_spec, spec_from_file_location
-from numbers import Real
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Final
+from typing import Any, Final, SupportsFloat, cast
+
+import numpy as np
 
 from ringbalance.verification.case import CaseDefinition, CaseError
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference, as_found
@@ -106,13 +107,13 @@ class _Code:
         self, where: str, values: Mapping[str, Any], kind: type, made: Callable[..., Any]
     ) -> Mapping[str, Any]:
         """Records by name, plain numbers made into such."""
-        for name, value in values.items():
-            if not isinstance(value, Real | kind):
+        plain = {name: _number(value) for name, value in values.items() if not isinstance(value, kind)}
+        for name, number in plain.items():
+            if number is None:
                 raise CaseError(
-                    f'{self.path}: {where} gives {_kind(value)} for "{name}", not a number or a '
+                    f'{self.path}: {where} gives {_kind(values[name])} for "{name}", not a number or a '
                     f"{kind.__name__}"
                 )
-        plain = {name: float(value) for name, value in values.items() if isinstance(value, Real)}
         return {**values, **made(**plain)}
 
     def _check_names(self, where: str, values: Mapping[str, Any], *, complete: bool) -> None:
@@ -166,6 +167,13 @@ def _loaded(path: Path) -> ModuleType:
     finally:
         sys.dont_write_bytecode = writes
     return module
+
+
+def _number(value: object) -> float | None:
+    """A number, of numpy's too; None for what is none."""
+    if isinstance(value, str) or not isinstance(value, SupportsFloat) or np.ndim(cast(Any, value)):
+        return None
+    return float(value)
 
 
 def _as_references(**values: float) -> Mapping[str, Reference]:

@@ -18,15 +18,15 @@ proportion to the prediction are ours.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.rotor import chamber_letters
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.criticism.misreadings import MISREADINGS, Misreading
+from ringbalance.identification.criticism.ranges import ComparedColumn
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.scene.arrays import FloatArray
@@ -42,9 +42,6 @@ _GEOMETRY: Final = 0.05
 """Standard deviation of ln lambda, where the scene states none."""
 _WIDE: Final = 1.0
 """The same of other parameters, in their own scales."""
-_LONGEST_TIME: Final = 10.0
-"""s, of an injection: seconds are looked for where milliseconds stand, and not hours."""
-Change = Callable[[Observations, Scene | None], Observations | None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,26 +57,16 @@ class Reading:
     text: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Kind:
-    """One way to misread a file."""
+def other_readings(best: Optimum, ranges: Sequence[ComparedColumn] = ()) -> tuple[Reading, ...]:
+    """Every other reading of the data, the likeliest first.
 
-    words: str
-    change: Change
-    settings: bool
-    """Whether it changes what was set, and so what is predicted."""
-    scale: float = 1.0
-    """dy'/dy."""
-    together: bool = True
-    """Whether all files may have been misread alike."""
-
-
-def other_readings(best: Optimum) -> tuple[Reading, ...]:
-    """Every other reading of the data, the likeliest first."""
-    compare = _Comparison.of(best)
+    Args: `ranges`: columns compared with the scene. Where those that a reading changes are far from it in all
+        of its files, it is named from the first gain on: a free loss takes up a pressure ten times too large.
+    """
+    compare, far = _Comparison.of(best), {(each.file, each.column) for each in ranges if each.fails}
     tried = [
         (code, chosen, compare.gain(kind, chosen))
-        for code, kind in _KINDS.items()
+        for code, kind in MISREADINGS.items()
         for chosen in _choices(compare.problem, kind)
     ]
     gains = sorted(
@@ -87,20 +74,32 @@ def other_readings(best: Optimum) -> tuple[Reading, ...]:
         key=lambda each: -each[0],
     )
     return tuple(
-        _reading(compare.problem, code, chosen, gain, named=bool(place == 0 and gain >= DECISIVE))
+        _reading(
+            compare.problem,
+            code,
+            chosen,
+            gain,
+            named=place == 0 and gain >= _asked(compare.problem, code, chosen, far),
+        )
         for place, (gain, code, chosen) in enumerate(gains)
     )
+
+
+def _asked(problem: Problem, code: str, chosen: Sequence[int], far: Collection[tuple[str, str]]) -> float:
+    """Gain of the log likelihood from which a reading is named."""
+    changed = [(problem.blocks[i].observations.file, MISREADINGS[code].column) for i in chosen]
+    return 0.0 if all(each in far for each in changed) else DECISIVE
 
 
 def _reading(problem: Problem, code: str, chosen: Sequence[int], gain: float, *, named: bool) -> Reading:
     files = tuple(problem.blocks[i].observations.file for i in chosen)
     names = " and ".join(Path(file).name for file in files)
     verdict = "would fit decisively better: " if named else ""
-    text = f"{names}: {_KINDS[code].words} {verdict}({gain:+.3g} of the log likelihood)"
+    text = f"{names}: {MISREADINGS[code].words} {verdict}({gain:+.3g} of the log likelihood)"
     return Reading(code=code, files=files, gain=gain, named=named, text=text)
 
 
-def _choices(problem: Problem, kind: _Kind) -> Iterator[tuple[int, ...]]:
+def _choices(problem: Problem, kind: Misreading) -> Iterator[tuple[int, ...]]:
     """Places of the files that are read otherwise: each that can be, and all of them."""
     scene = problem.scene if isinstance(problem.scene, Scene) else None
     able = [i for i, b in enumerate(problem.blocks) if kind.change(b.observations, scene) is not None]
@@ -125,6 +124,8 @@ class _Comparison:
     rows: tuple[_Rows, ...]
     given: float
     """-2 ln L of the files as they stand."""
+    pulled: FloatArray
+    """Held inputs at which predictions are made, in standard deviations."""
 
     @classmethod
     def of(cls, best: Optimum) -> _Comparison:
@@ -136,10 +137,13 @@ class _Comparison:
             _Rows(block=b, predicted=f[:, 0], slopes=s, held=h)
             for b, f, s, h in zip(problem.blocks, raw, slopes, held, strict=True)
         )
-        here = _Linear.at(problem, best.t, problem.at(best.t), best.of_prediction, best.residuals.held)
-        return cls(problem=problem, rows=rows, given=here.deviance())
+        pulled = best.residuals.pulled
+        here = _Linear.at(
+            problem, best.t, problem.at(best.t), best.of_prediction, best.residuals.held, pulled=pulled
+        )
+        return cls(problem=problem, rows=rows, given=here.deviance(), pulled=pulled)
 
-    def gain(self, kind: _Kind, chosen: Sequence[int]) -> float | None:
+    def gain(self, kind: Misreading, chosen: Sequence[int]) -> float | None:
         """Of the log likelihood, by reading some files otherwise; None where nothing can be predicted."""
         rows, jacobian = list(self.rows), 0.0
         for i in chosen:
@@ -155,11 +159,12 @@ class _Comparison:
             np.concatenate([r.block.whiten @ r.predicted for r in rows]),
             np.concatenate([r.block.whiten @ r.slopes for r in rows]),
             np.concatenate([r.block.whiten @ r.held for r in rows]),
+            pulled=self.pulled,
         ).deviance()
         gain = (self.given - found) / 2 + jacobian
         return gain if math.isfinite(gain) else None
 
-    def _changed(self, kind: _Kind, rows: _Rows) -> _Rows | None:
+    def _changed(self, kind: Misreading, rows: _Rows) -> _Rows | None:
         problem = self.problem
         scene = problem.scene if isinstance(problem.scene, Scene) else None
         observations = kind.change(rows.block.observations, scene)
@@ -211,7 +216,14 @@ class _Linear:
 
     @classmethod
     def at(
-        cls, problem: Problem, t: FloatArray, predicted: FloatArray, slopes: FloatArray, held: FloatArray
+        cls,
+        problem: Problem,
+        t: FloatArray,
+        predicted: FloatArray,
+        slopes: FloatArray,
+        held: FloatArray,
+        *,
+        pulled: FloatArray,
     ) -> _Linear:
         design = np.hstack([slopes, problem.free, held])
         rows = [(i, *_known(problem, i, float(t[i]))) for i in range(t.size)]
@@ -219,7 +231,7 @@ class _Linear:
         for i, slope, _ in rows:
             known[i, i] = slope
         known[t.size :, design.shape[1] - held.shape[1] :] = np.eye(held.shape[1])
-        apart = np.concatenate([[-off for _, _, off in rows], np.zeros(held.shape[1])])
+        apart = np.concatenate([[-off for _, _, off in rows], -pulled])
         return cls(
             problem=problem,
             apart=problem.measured - predicted,
@@ -274,124 +286,3 @@ def _known(problem: Problem, i: int, t: float) -> tuple[float, float]:
 
 def _size(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2))) or 1e-300
-
-
-def _with(observations: Observations, **columns: FloatArray) -> Observations:
-    return replace(observations, columns={**observations.columns, **columns})
-
-
-def _exchanged(observations: Observations, _: Scene | None) -> Observations | None:
-    """Columns of before and after, with their uncertainties."""
-    if observations.kind != "injection":
-        return None
-    other = {"before": "after", "after": "before"}
-
-    def swapped(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        named = {n: n.rsplit("_", 1) for n in values}
-        return {
-            f"{named[n][0]}_{other[named[n][1]]}" if named[n][-1] in other else n: v
-            for n, v in values.items()
-        }
-
-    return replace(
-        observations,
-        columns=swapped(observations.columns),
-        uncertainty=swapped(observations.uncertainty),
-    )
-
-
-def _turned(*names: str) -> Change:
-    """Angles of these names with the other sign."""
-
-    def change(observations: Observations, _: Scene | None) -> Observations | None:
-        chosen = {n: -v for n, v in observations.columns.items() if n.startswith(names)}
-        vibration = any(n.startswith("phase") for n in observations.columns)
-        return _with(observations, **chosen) if chosen and vibration else None
-
-    return change
-
-
-def _lettered(observations: Observations, scene: Scene | None) -> Observations | None:
-    """Chambers counted against the rotation from A."""
-    if scene is None or observations.kind != "injection" or scene.disc.chambers < 4:
-        return None
-    letters = chamber_letters(scene.disc.chambers)
-    count = len(letters)
-    numbers = [letters.index(letter) for letter in observations.chamber]
-    return replace(observations, chamber=np.array([letters[-i % count] for i in numbers]))
-
-
-def _amplitudes(factor: float) -> Change:
-    def change(observations: Observations, _: Scene | None) -> Observations | None:
-        columns = {n: factor * v for n, v in observations.columns.items() if n.startswith("amplitude")}
-        widths = {n: factor * v if n in columns else v for n, v in observations.uncertainty.items()}
-        return replace(_with(observations, **columns), uncertainty=widths) if columns else None
-
-    return change
-
-
-def _pressures(factor: float, *, absolute: bool = False) -> Change:
-    """Of the gas, in another unit, or less that of the surroundings."""
-
-    def change(observations: Observations, scene: Scene | None) -> Observations | None:
-        if scene is None or observations.kind not in ("injection", "transfer"):
-            return None
-        gauge = factor * observations.columns["pressure"]
-        gauge = gauge - scene.gas.ambient_pressure if absolute else gauge
-        return _with(observations, pressure=gauge) if np.all(gauge > 0) else None
-
-    return change
-
-
-def _seconds(observations: Observations, _: Scene | None) -> Observations | None:
-    if observations.kind not in ("injection", "transfer"):
-        return None
-    times = 1e3 * observations.columns["gas_time"]
-    return _with(observations, gas_time=times) if np.median(times) < _LONGEST_TIME else None
-
-
-_KINDS: Final[Mapping[str, _Kind]] = {
-    "before_and_after_exchanged": _Kind(
-        words="vibrations before and after exchanged", change=_exchanged, settings=False, together=False
-    ),
-    "phases_turned": _Kind(
-        words="phases with the other sign, against the rotation", change=_turned("phase"), settings=False
-    ),
-    "weights_turned": _Kind(
-        words="angles of the trial weights against the rotation", change=_turned("angle"), settings=True
-    ),
-    "chambers_turned": _Kind(words="chambers lettered against the rotation", change=_lettered, settings=True),
-    "amplitudes_halved": _Kind(
-        words="amplitudes half as large, such as peak to peak stated as zero to peak",
-        change=_amplitudes(0.5),
-        settings=False,
-        scale=0.5,
-    ),
-    "amplitudes_doubled": _Kind(
-        words="amplitudes twice as large, such as zero to peak stated as peak to peak",
-        change=_amplitudes(2.0),
-        settings=False,
-        scale=2.0,
-    ),
-    "pressures_tenth": _Kind(
-        words="gas pressures a tenth as large, such as bar stated as MPa",
-        change=_pressures(0.1),
-        settings=True,
-    ),
-    "pressures_tenfold": _Kind(
-        words="gas pressures ten times as large, such as MPa stated as bar",
-        change=_pressures(10.0),
-        settings=True,
-    ),
-    "pressures_absolute": _Kind(
-        words="gas pressures as absolute ones, less that of the surroundings",
-        change=_pressures(1.0, absolute=True),
-        settings=True,
-    ),
-    "times_in_seconds": _Kind(
-        words="valve-open times a thousand times as long, such as seconds stated as milliseconds",
-        change=_seconds,
-        settings=True,
-    ),
-}
-"""By code."""

@@ -100,12 +100,13 @@ class Review:
     def of(cls, result: FitResult) -> Review:
         """Test the residuals of a fit, read its data otherwise, and compare its law with others."""
         found, best = _at_solution(result), result.optimum
+        ranges = compared_columns(best.residuals.problem)
         return cls(
             criticism=Criticism.of(found.fit, found.covariates),
             laws=tuple(_comparisons(result, found)),
             explained=shares_explained(best),
-            readings=other_readings(best),
-            ranges=compared_columns(best.residuals.problem),
+            readings=other_readings(best, ranges),
+            ranges=ranges,
         )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -15,7 +14,6 @@ from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.uncertain import with_value
 
 NEAR: Final = 0.0025
 """Fill by which a run may stop elsewhere: half of one injection, a fiftieth of a fill of 0.25."""
@@ -38,30 +36,26 @@ def driven(scene: Scene, calibration: Calibration, *, share: float) -> Simulatio
     longest = moved / (scene.tube.area * float(flow.velocity))
     across = math.pi / 2 if calibration.residual.limited_by == "draw_down" else 0.0
     amplitude = share * calibration.residual.pair_moment * rotor.influence_coefficient
-    settings = replace(
-        scene.controller,
-        proportional=25 * longest / amplitude,
-        integral_time=None,
-        derivative_time=0.0,
-        maximum_gas_time=longest,
-        minimum_gas_time=1e-3 * longest,
-        limit=1e-3 * amplitude,
+    changed = scene.with_values(
+        {
+            "rotor.initial_vibration": {"amplitude": amplitude, "phase": across - rotor.lag_angle},
+            "sensor.amplitude_noise": 0.0,
+            "sensor.phase_noise": 0.0,
+            "controller.proportional": 25 * longest / amplitude,
+            "controller.integral_time": None,
+            "controller.derivative_time": 0.0,
+            "controller.maximum_gas_time": longest,
+            "controller.minimum_gas_time": 1e-3 * longest,
+            "controller.limit": 1e-3 * amplitude,
+            "run.time_limit": 1000.0,
+        }
     )
-    return ringbalance.simulate(
-        replace(
-            scene,
-            rotor=replace(rotor, initial_amplitude=amplitude, initial_phase=across - rotor.lag_angle),
-            sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0),
-            controller=settings,
-            run=replace(scene.run, time_limit=1000.0),
-        ),
-        flow_law=law,
-    )
+    return ringbalance.simulate(changed, flow_law=law)
 
 
 @pytest.mark.parametrize("pressure", [0.45e6, 0.5e6, 0.55e6, 0.7e6, 1.0e6])
 def test_a_chamber_empties_to_the_printed_fill(paper_scene: Scene, pressure: float) -> None:
-    scene = with_value(scene=paper_scene, quantity="pressure", value=pressure)
+    scene = paper_scene.with_values({"gas.pressure": pressure})
     found = ringbalance.calibrate(scene)
     # More than the gas can do at the lower pressures, than the disc can do at the others.
     stalls = pressure < 0.51e6

@@ -150,7 +150,7 @@ def test_the_command_takes_either_balancer(tmp_path: Path, capsys: pytest.Captur
     assert command(path) == 0
     assert "friction estimation" in capsys.readouterr().out
     assert isinstance(ringbalance.simulate(load_scene(path)), EccentricRun)
-    with pytest.raises(ValueError, match="no flow law"):
+    with pytest.raises(ValueError, match="leave flow_law out"):
         ringbalance.simulate(load_scene(path), flow_law=object())  # type: ignore[call-overload]
 
 

@@ -38,6 +38,10 @@ _TABLE_ERROR: Final = 1e-9
 _UNCERTAINTY_NODES: Final = 513
 _FIRST_NODES: Final = 129
 _NOMINAL_NODES: Final = 257
+_MOST_NODES: Final = 4097
+"""Of a refined table."""
+_RISE: Final = 1e-9
+"""Of ln of a head over ln u, below what tables resolve."""
 
 LogHead = Callable[[FloatArray], FloatArray]
 
@@ -71,7 +75,7 @@ class TubeHeads:
         start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
         found = [
             refined_table(function=head, start=start, stop=stop, tolerance=tolerance, first=first)
-            for head in log_heads(scene)[:3]
+            for head in (_growing(each) if scene.tube.model_errors else each for each in log_heads(scene)[:3])
         ]
         if any(np.any(np.diff(table.value) <= 0) for table, _ in found):
             raise ValueError(
@@ -129,6 +133,23 @@ def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -
     """
     safe = np.where(where, head, 1.0)
     return np.where(where, np.exp(table.inverse(np.log(safe))), 0.0)
+
+
+def _growing(head: LogHead) -> LogHead:
+    """A head with supposed errors of models, level where these make it fall.
+
+    The errors' sizes step where the flow turns turbulent, by which a head may fall within a percent of
+    velocity: that no model says, and no velocity would belong to it. Its largest value up to a velocity is
+    taken at the places of the finest table, rising by `_RISE` per unit of ln u.
+    """
+    places = np.linspace(*np.log(TABLE_VELOCITIES), _MOST_NODES)
+    highest = np.maximum.accumulate(head(places))
+
+    def growing(log_velocity: FloatArray) -> FloatArray:
+        below = np.clip(np.searchsorted(places, log_velocity, side="right") - 1, 0, None)
+        return np.asarray(np.maximum(head(log_velocity), highest[below]) + _RISE * log_velocity)
+
+    return growing
 
 
 def _widths(

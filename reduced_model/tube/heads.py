@@ -142,7 +142,8 @@ def _growing(head: LogHead) -> LogHead:
     velocity: that no model says, and no velocity would belong to it. Its largest value up to a velocity is
     taken at the places of the finest table, rising by `_RISE` per unit of ln u.
     """
-    places = np.linspace(*np.log(TABLE_VELOCITIES), _MOST_NODES)
+    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
+    places = np.linspace(start, stop, _MOST_NODES)
     highest = np.maximum.accumulate(head(places))
 
     def growing(log_velocity: FloatArray) -> FloatArray:

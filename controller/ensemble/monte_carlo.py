@@ -266,7 +266,7 @@ class _Tally:
         )
 
     def _quantiles(self) -> tuple[float | None, ...]:
-        """End of the bin, s, in which the last of that fraction of all members settled; None: fewer settled."""
+        """End of the bin in which the last of that fraction of all members settled, s; None: fewer did."""
         reached = np.cumsum(self.times)
         needed = np.ceil(np.array(self.quantiles) * self.members - _ROUND_OFF)
         ends = self.width * (1.0 + np.searchsorted(reached, needed))

@@ -80,7 +80,9 @@ def verify(
     try:
         chosen, more = _chosen(case_ids, {case.definition.id: case for case in own})
     except UnknownCaseError as error:
-        _say(error)
+        # A case whose text cannot be read is unknown, too.
+        for wrong in (*errors, error):
+            _say(wrong)
         return BAD_INPUT
     errors += more
     if list_:

@@ -29,6 +29,8 @@ Progress = Callable[[int, int], None]
 QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 TIME_BINS: Final = 20_000
 """In which settling times are counted; a quantile is known to a bin's width."""
+_ROUND_OFF: Final = 1e-9
+"""Of a fraction of all members, in members."""
 SHOWN_BINS: Final = 40
 MOST_COUNTED: Final = 10
 """Overshoots or misadjustments in one run that are still counted apart."""
@@ -264,8 +266,8 @@ class _Tally:
         )
 
     def _quantiles(self) -> tuple[float | None, ...]:
-        reached = np.concatenate([[0], np.cumsum(self.times)]) / self.members
-        edges = self.width * np.arange(TIME_BINS + 1)
-        return tuple(
-            float(np.interp(q, reached, edges)) if q <= reached[-1] else None for q in self.quantiles
-        )
+        """End of the bin in which the last of that fraction of all members settled, s; None: fewer did."""
+        reached = np.cumsum(self.times)
+        needed = np.ceil(np.array(self.quantiles) * self.members - _ROUND_OFF)
+        ends = self.width * (1.0 + np.searchsorted(reached, needed))
+        return tuple(float(end) if n <= reached[-1] else None for end, n in zip(ends, needed, strict=True))

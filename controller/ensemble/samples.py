@@ -18,6 +18,7 @@ from ringbalance.controller.ensemble.fitted_effects import (
     fitted_effects,
 )
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
+from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.operating.residual import FACTOR, Drawing
@@ -230,6 +231,15 @@ def _fitted(scene: Scene, quantity: str) -> bool:
     return any(each.key == quantity for each in scene.fitted.quantities)
 
 
+def starting_flow(scene: Scene, law: FlowLaw) -> Flow:
+    """Flow at equal fills under the scene's gas, from what the tube holds while the gas is off."""
+    x = scene.disc.initial_fill
+    rest = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=0.0, primed=True)
+    return law.evaluate(
+        fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=rest.primed
+    )
+
+
 def _velocity(scene: Scene, model: BalancerModel) -> tuple[float, str]:
     if isinstance(model.flow, PaperLaw):
         k = model.flow.drag_coefficient
@@ -237,10 +247,10 @@ def _velocity(scene: Scene, model: BalancerModel) -> tuple[float, str]:
         width = PAPER_DRAG_UNCERTAINTY * k if stated is None else stated
         why = "assumed: k within 10 %" if stated is None else "the scene's uncertainty of k"
         return width / (k + 1) / 2, why
-    x, law = scene.disc.initial_fill, model.flow
+    law = model.flow
     if isinstance(law, CalibratedLaw):
         law = replace(law, variants=())
-    flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=True)
+    flow = starting_flow(scene, law)
     u = abs(float(flow.velocity))
     return (float(flow.uncertainty) / u if u > 0 else 0.0), "the law's own, at equal fills"
 

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.ensemble.samples import MemberUncertainty
+from ringbalance.controller.ensemble.samples import MemberUncertainty, starting_flow
 from ringbalance.controller.tuning.loop_factor import LoopFactor, vibration_rates
 from ringbalance.reduced_model.device import HEAD_INPUTS, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -110,12 +110,8 @@ def _without_inputs(scene: Scene, model: BalancerModel) -> BalancerModel:
 
 
 def _velocity(scene: Scene, model: BalancerModel) -> float:
-    """At equal fills with a full tube, m/s."""
-    x = scene.disc.initial_fill
-    flow = model.flow.evaluate(
-        fill_ratio=x, opposite_fill_ratio=x, gas_pressure=scene.gas.pressure, primed=True
-    )
-    return abs(float(flow.velocity))
+    """At equal fills, m/s."""
+    return abs(float(starting_flow(scene, model.flow).velocity))
 
 
 def _input_effects(scene: Scene, model: BalancerModel) -> dict[str, float]:

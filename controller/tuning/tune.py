@@ -128,6 +128,8 @@ def tune(
             found = search(scene, model, known, base=best, settled=share, told=told)
             if found.best is not best:
                 best = found.best
+                if best.scene.gas.pressure != scene.gas.pressure:
+                    known = factor_uncertainty(best.scene, model)
                 told("settling times ...")
                 settling = settling_times(
                     best.scene, model, known.widths, members=members, runs=runs, told=told

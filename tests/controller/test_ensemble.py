@@ -268,6 +268,11 @@ def test_a_larger_ensemble_begins_with_the_smaller(scene: Scene, model: Balancer
     for q, found in zip(QUANTILES, counted.settling_quantiles, strict=True):
         known = np.quantile(b.settling_time, q, method="inverted_cdf")
         assert found == (None if math.isinf(known) else pytest.approx(float(known), abs=0.03))
+    # Of all that settle the last one counts, though no further one does until the end of the run.
+    settled = counted.settled.value
+    assert 0 < settled < 1
+    (last,) = simulate_ensemble(asked, model, 50, 1, quantiles=(settled,)).settling_quantiles
+    assert last == pytest.approx(float(b.settling_time[b.settled].max()), abs=0.03)
 
 
 def test_an_interrupt_ends_an_ensemble_at_once(scene: Scene, model: BalancerModel) -> None:

@@ -124,6 +124,16 @@ def test_a_device_solved_again_stands_for_its_law_made_again(paper_scene: Scene)
         assert found[quantity] == pytest.approx(effect, rel=0.05, abs=2e-4), quantity
 
 
+def test_the_velocity_is_as_uncertain_as_calibrate_says(paper_scene: Scene) -> None:
+    # The flow spills over the crest of an empty tube under this pressure, and does not carry the gas off.
+    asked = paper_scene.with_values({"gas.pressure": "0.345 MPa", "uncertainty": None})
+    velocity = rb.calibrate(asked).budgets["velocity"]
+    known = factor_uncertainty(asked, calibrated_model(asked))
+    parts = {part.name: part.uncertainty for part in known.parts}
+    # The same model errors at the same state; numerical and input parts are far below them.
+    assert parts["velocity"] == pytest.approx(velocity.total / velocity.value, rel=0.02)
+
+
 def test_simulate_names_the_gain_that_tune_recommends(paper_scene: Scene) -> None:
     law = paper_model(paper_scene)
     high = replace(

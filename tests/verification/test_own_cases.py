@@ -156,6 +156,14 @@ def test_a_wrong_text_is_one_sentence_and_stops_no_other(
         assert word in printed.err
 
 
+def test_a_case_asked_for_by_name_says_what_is_wrong_with_its_text(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _write(folder, "wrong", CODE, TEXT.replace("limit =", "limt ="))
+    assert verify("wrong", cases=folder) == 2
+    assert "wrong/case.toml" in capsys.readouterr().err.splitlines()[0]
+
+
 def test_a_folder_without_cases_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for place in (tmp_path, tmp_path / "missing"):
         assert verify("claim_12_correction_mass", cases=place) == 2

@@ -28,6 +28,8 @@ from ringbalance.reduced_model.tube.path import (
     reversed_tube,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.describe import scene_fault
+from ringbalance.scene.faults import SceneError, toml_text
 from ringbalance.scene.joint import independent_half_widths
 from ringbalance.scene.models import Scene, Tube
 
@@ -66,17 +68,19 @@ class TubeHeads:
     def exact(cls, scene: Scene, *, tolerance: float = _TABLE_ERROR, first: int = _FIRST_NODES) -> TubeHeads:
         """The heads without uncertainties, on some nodes at first and on more up to an error between them.
 
-        Raises: ValueError: as `TubeHeads.of`.
+        Raises: ValueError: as `TubeHeads.of`. SceneError: the scene's `model_errors` make no loss.
         """
         start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
+        heads = log_heads(scene)[:3]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            if not all(np.all(np.isfinite(head(np.linspace(start, stop, first)))) for head in heads):
+                raise _inconsistent(scene)
         found = [
             refined_table(function=head, start=start, stop=stop, tolerance=tolerance, first=first)
-            for head in log_heads(scene)[:3]
+            for head in heads
         ]
-        if any(np.any(np.diff(table.value) <= 0) for table, _ in found):
-            raise ValueError(
-                "the tube's head does not grow with the velocity: its loss terms are inconsistent"
-            )
+        if not all(np.all(np.diff(table.value) > 0) for table, _ in found):
+            raise _inconsistent(scene)
         between, *to_crest = (table for table, _ in found)
         exact = flat_table(start=start, stop=stop)
         return cls(
@@ -120,6 +124,18 @@ class TubeHeads:
         log_velocity = np.log(velocity) + np.linspace(-4.0, 4.0, 33)
         widths = _widths(scene, log_velocity, place=place, by_inputs=False)
         return replace(self, **widths)  # type: ignore[arg-type]
+
+
+def _inconsistent(scene: Scene) -> Exception:
+    """That the head falls where the velocity grows, by what the scene says of its models or by them alone."""
+    problem = "the tube's head does not grow with the velocity"
+    if not scene.tube.model_errors:
+        return ValueError(f"{problem}: its loss terms are inconsistent")
+    fault = scene_fault(
+        scene, "tube.model_errors", problem=f"with these corrections {problem}", allowed="smaller ones"
+    )
+    written = [{"cause": each.cause, "even": each.even, "odd": each.odd} for each in scene.tube.model_errors]
+    return SceneError([replace(fault, value=toml_text(written))])
 
 
 def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -> FloatArray:

@@ -132,10 +132,9 @@ def _uncertainty(reading: Reading) -> Iterator[InputUncertainty]:
         stated = reading.values.get(f"uncertainty.{key}")
         if stated is None or key == ORIGIN:
             continue
-        inside = (
-            {f"{key}.{name}": each for name, each in stated.items()} if isinstance(stated, dict) else None
-        )
-        for quantity, (width, relative) in (inside or {key: stated}).items():
+        of_table = isinstance(stated, dict)
+        widths = {f"{key}.{name}": each for name, each in stated.items()} if of_table else {key: stated}
+        for quantity, (width, relative) in widths.items():
             yield InputUncertainty(quantity=quantity, half_width=width, relative=relative)
 
 

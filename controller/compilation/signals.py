@@ -18,7 +18,18 @@ from typing import Any, Final
 
 Handler = Callable[[int, FrameType | None], Any]
 
-_NAMES: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK", "SIGALRM", "SIGUSR1", "SIGUSR2")
+_NAMES: Final = (
+    "SIGINT",
+    "SIGTERM",
+    "SIGHUP",
+    "SIGBREAK",
+    "SIGALRM",
+    "SIGPROF",
+    "SIGVTALRM",
+    "SIGXCPU",
+    "SIGUSR1",
+    "SIGUSR2",
+)
 SIGNALS: Final = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
 """Whose handlers may raise: those that end a program or limit its time."""
 

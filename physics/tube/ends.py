@@ -16,7 +16,7 @@ from fluids.fittings import entrance_distance, entrance_rounded, entrance_sharp
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.physics.splines import CubicSpline
 from ringbalance.physics.tube.friction import turbulent_share
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, clipped
 from ringbalance.scene.models import Tube
 
 LAMINAR_ENTRY_LENGTH: Final = 0.056
@@ -33,6 +33,8 @@ _DOMAIN = 1e-3
 """Relative: reservoir and tube are cut off at a distance, the edge is resolved down to 1e-4 of the bore."""
 _OUTSIDE = 0.3
 """Expanded uncertainty (95 %) of K added above the table, where steady laminar flow is not to be expected."""
+_FULL: Final = 2500.0
+"""Re at which it is whole, rising from the end of the table on: errors of k, a share of it, do not step."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,7 +84,7 @@ def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
     a = np.log1p(inside / _SCALE)
     value = table.scaled(a) * np.exp(table.power * a) / inside
     uncertainty_95 = np.interp(a, table.nodes, table.numerical) + table.interpolation_error * np.exp(a)
-    beyond = re > _LIMIT
+    beyond, risen = re > _LIMIT, clipped((re - _LIMIT) / (_FULL - _LIMIT), 0.0, 1.0)
     status = Status()
     if np.any(beyond):
         text = (
@@ -92,7 +94,7 @@ def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
     return Estimate(
         value=np.asarray(value, dtype=np.float64),
         uncertainty=np.asarray(
-            uncertainty_95 / inside + _DOMAIN * np.abs(value) + np.where(beyond, _OUTSIDE, 0.0),
+            uncertainty_95 / inside + _DOMAIN * np.abs(value) + _OUTSIDE * risen**2 * (3 - 2 * risen),
             dtype=np.float64,
         ),
         status=status,

@@ -28,6 +28,8 @@ from ringbalance.reduced_model.tube.path import (
     reversed_tube,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.describe import scene_fault
+from ringbalance.scene.faults import SceneError, toml_text
 from ringbalance.scene.joint import independent_half_widths
 from ringbalance.scene.models import Scene, Tube
 
@@ -40,6 +42,8 @@ _FIRST_NODES: Final = 129
 _NOMINAL_NODES: Final = 257
 _MOST_NODES: Final = 4097
 """Of a refined table."""
+_LEVELLED: Final = 0.05
+"""Of ln of a head: a few percent, a fraction of what such errors change it by."""
 _RISE: Final = 1e-9
 """Of ln of a head over ln u, below what tables resolve."""
 
@@ -70,17 +74,21 @@ class TubeHeads:
     def exact(cls, scene: Scene, *, tolerance: float = _TABLE_ERROR, first: int = _FIRST_NODES) -> TubeHeads:
         """The heads without uncertainties, on some nodes at first and on more up to an error between them.
 
-        Raises: ValueError: as `TubeHeads.of`.
+        Raises: ValueError: as `TubeHeads.of`. SceneError: the scene's `model_errors` make no loss.
         """
         start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
+        heads = log_heads(scene)[:3]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            if not all(np.all(np.isfinite(head(np.linspace(start, stop, first)))) for head in heads):
+                raise _inconsistent(scene)
+        if scene.tube.model_errors:
+            heads = [_growing(scene, head) for head in heads]
         found = [
             refined_table(function=head, start=start, stop=stop, tolerance=tolerance, first=first)
-            for head in (_growing(each) if scene.tube.model_errors else each for each in log_heads(scene)[:3])
+            for head in heads
         ]
-        if any(np.any(np.diff(table.value) <= 0) for table, _ in found):
-            raise ValueError(
-                "the tube's head does not grow with the velocity: its loss terms are inconsistent"
-            )
+        if not all(np.all(np.diff(table.value) > 0) for table, _ in found):
+            raise _inconsistent(scene)
         between, *to_crest = (table for table, _ in found)
         exact = flat_table(start=start, stop=stop)
         return cls(
@@ -126,6 +134,18 @@ class TubeHeads:
         return replace(self, **widths)  # type: ignore[arg-type]
 
 
+def _inconsistent(scene: Scene) -> Exception:
+    """That the head falls where the velocity grows, by what the scene says of its models or by them alone."""
+    problem = "the tube's head does not grow with the velocity"
+    if not scene.tube.model_errors:
+        return ValueError(f"{problem}: its loss terms are inconsistent")
+    fault = scene_fault(
+        scene, "tube.model_errors", problem=f"with these corrections {problem}", allowed="smaller ones"
+    )
+    written = [{"cause": each.cause, "even": each.even, "odd": each.odd} for each in scene.tube.model_errors]
+    return SceneError([replace(fault, value=toml_text(written))])
+
+
 def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -> FloatArray:
     """Velocity that belongs to a head.
 
@@ -135,16 +155,19 @@ def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -
     return np.where(where, np.exp(table.inverse(np.log(safe))), 0.0)
 
 
-def _growing(head: LogHead) -> LogHead:
-    """A head with supposed errors of models, level where these make it fall.
+def _growing(scene: Scene, head: LogHead) -> LogHead:
+    """A head with supposed errors of models, level where these make it fall a little.
 
-    The errors' sizes step where the flow turns turbulent, by which a head may fall within a percent of
-    velocity: that no model says, and no velocity would belong to it. Its largest value up to a velocity is
-    taken at the places of the finest table, rising by `_RISE` per unit of ln u.
+    Sizes of errors change fast where the flow turns turbulent. Its largest value up to a velocity is taken at
+    the places of the finest table, rising by `_RISE` per unit of ln u, so that one velocity belongs to each.
+    Raises: SceneError: it falls by more than `_LEVELLED`.
     """
     start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
     places = np.linspace(start, stop, _MOST_NODES)
-    highest = np.maximum.accumulate(head(places))
+    values = head(places)
+    highest = np.maximum.accumulate(values)
+    if not np.all(highest - values <= _LEVELLED):
+        raise _inconsistent(scene)
 
     def growing(log_velocity: FloatArray) -> FloatArray:
         below = np.clip(np.searchsorted(places, log_velocity, side="right") - 1, 0, None)

@@ -48,6 +48,30 @@ while True:
 )
 
 
+TIMED = (
+    """
+import signal, sys
+
+def out_of_time(*_):
+    raise TimeoutError
+
+signal.signal(signal.SIGPROF, out_of_time)
+"""
+    + PROGRAM
+    + """
+pairs(1.0)
+for _ in range(200):
+    try:
+        signal.setitimer(signal.ITIMER_PROF, 1e-4)
+        while True:
+            pairs(1.0)
+    except TimeoutError:
+        pass
+print("survived")
+"""
+)
+
+
 FUNCTIONS = ("doubled", "paired")
 
 
@@ -219,6 +243,18 @@ def test_ctrl_c_between_compiled_calls_is_an_interruption(tmp_path: Path) -> Non
             running.send_signal(signal.SIGINT)
             # Python's own end after a KeyboardInterrupt; a segmentation fault would be SIGSEGV.
             assert running.wait(timeout=60) == -signal.SIGINT
+
+
+def test_a_limit_of_processor_time_is_an_ordinary_error(tmp_path: Path) -> None:
+    done = subprocess.run(
+        _program(tmp_path, TIMED),
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert (done.returncode, done.stdout.splitlines()[-1:]) == (0, ["survived"])
 
 
 def test_a_real_run_survives_a_damaged_cache_and_ctrl_c(tmp_path: Path) -> None:

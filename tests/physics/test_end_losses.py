@@ -155,3 +155,12 @@ def test_above_the_table_the_answer_says_so() -> None:
 def test_bad_reynolds_numbers_are_refused(bad: float) -> None:
     with pytest.raises(ValueError, match="reynolds"):
         laminar_exit_loss(reynolds=bad)
+
+
+def test_the_half_width_does_not_step_where_the_table_ends() -> None:
+    """Errors of k are a share of it, and a step of k would make the head fall where the velocity grows."""
+    for loss in (laminar_entrance_loss, laminar_exit_loss):
+        re = np.linspace(1500, 2600, 2001)
+        width = loss(reynolds=re).uncertainty
+        assert np.max(np.abs(np.diff(width))) < 1e-3
+        assert width[-1] - width[0] > 0.25

@@ -14,6 +14,7 @@ from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.loading import load_law
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.fitted import Fitted, FittedQuantity
 from ringbalance.scene.models import Scene
 from ringbalance.scene.tube_models import ModelError
@@ -119,3 +120,23 @@ def test_a_correction_of_a_model_changes_the_law(paper_scene: Scene) -> None:
     velocity = [each.operating_point.velocity for each in both]
     assert abs(k[1] / k[0] - 1) > 0.005
     assert velocity[1] != pytest.approx(velocity[0], rel=1e-4)
+
+
+TRANSITION = [
+    {"cause": "ends", "even": -0.17, "odd": -0.38},
+    {"cause": "rotation model", "even": -0.5, "odd": -1.3},
+]
+
+
+def test_errors_of_ordinary_size_leave_a_head_that_grows_through_the_transition(paper_scene: Scene) -> None:
+    """Those that the bundled injections leave: a width that stepped at Re = 2000 made the head step down."""
+    scene = paper_scene.with_values({"tube.model_errors": TRANSITION})
+    assert 0 < calibrate(scene).operating_point.velocity < math.inf
+
+
+@pytest.mark.parametrize("size", [-100.0, 100.0])
+def test_errors_that_make_no_loss_are_refused_by_name(paper_scene: Scene, size: float) -> None:
+    scene = paper_scene.with_values({"tube.model_errors": [{"cause": "ends", "even": size, "odd": size}]})
+    with pytest.raises(SceneError) as error:
+        calibrate(scene)
+    assert [(fault.table, fault.key) for fault in error.value.faults] == [("tube", "model_errors")]

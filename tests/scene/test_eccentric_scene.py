@@ -96,6 +96,7 @@ def test_each_table_has_its_uncertainties(driven_document: dict[str, Any], load:
         "rotor": {"mass": "1 %"},
         "imbalance": {"mass": "10 g", "phase": "5 deg"},
         "masses": {"friction_arm": "10 mm"},
+        "motor": {},
     }
     stated = {each.quantity: (each.half_width, each.relative) for each in load(driven_document).uncertainty}
     assert stated == {

@@ -32,7 +32,7 @@ def liquid_not_driven(plant: LiquidRing, state: DiscState, last: Injection | Non
     """
     total = state.pairs[0].total
     lowest = max(0.0, total - plant.model.flow.max_fill_ratio)
-    empty = f"to empty it: {_needed(plant, total, lowest + NEARLY_EMPTY, primed=True)}"
+    empty = f"to empty it: {_needed(plant, total, lowest + NEARLY_EMPTY)}"
     if last is None:
         fill = plant.least_fill(state=state)
         pressure = f"{plant.gas_pressure / _MEGAPASCAL:.4g} MPa"
@@ -40,17 +40,18 @@ def liquid_not_driven(plant: LiquidRing, state: DiscState, last: Injection | Non
     fill = last.operation.fill_after
     return (
         f"{plant.gas_pressure / _MEGAPASCAL:.4g} MPa drives no liquid out of chamber {last.chamber} at fill "
-        f"{fill:.4g} (to start there: {_needed(plant, total, fill, primed=False)}; {empty})"
+        f"{fill:.4g} (to start there: {_needed(plant, total, fill)}; {empty})"
     )
 
 
-def _needed(plant: LiquidRing, total: float, fill: float, *, primed: bool) -> str:
+def _needed(plant: LiquidRing, total: float, fill: float) -> str:
+    """The pressure from which an injection begins at a fill, over an empty crest: short ones all do."""
     law = plant.model.flow
     found = starting_pressure(
         law=law,
         fill=fill,
         opposite_fill=min(total - fill, law.max_fill_ratio),
-        primed=primed,
+        primed=False,
         above=max(plant.gas_pressure, LEAST_PRESSURE),
     )
     return "no pressure: its liquid has left the port" if found is None else f"{found / _MEGAPASCAL:.4g} MPa"

@@ -106,6 +106,10 @@ def simulate(
         if names := [name for name, value in given.items() if value is not None]:
             raise ValueError(f"eccentric masses have their own strategy: leave {', '.join(names)} out")
         return simulate_eccentric(scene, progress=progress)
+    if controller is not None and not (hasattr(controller, "start") and hasattr(controller, "step")):
+        raise TypeError(
+            f"an algorithm has start() and step(state, measurement), which {controller!r} has not"
+        )
     run = run_closed_loop(
         scene,
         _model_of(scene, flow_law),

@@ -48,6 +48,8 @@ def _changed(
     schema = LIQUID_RING if isinstance(scene, Scene) else deferred.ECCENTRIC_MASS
     document = deepcopy(dict(known.document))
     for path, value in values.items():
+        if not isinstance(path, str):
+            raise TypeError(f'a value is named by its path, such as "tube.bore", and not by {path!r}')
         _place(document, path, value, schema=schema, origin=origin)
     if document == known.document:
         return cast("AnyScene", scene)

@@ -172,6 +172,8 @@ def test_what_a_law_of_one_s_own_does_not_give_is_said() -> None:
 def test_eccentric_masses_have_their_own_strategy_and_both_are_tuned(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="controller"):
         rb.simulate(driven(), controller=Wrapped(1.0))  # type: ignore[call-overload]
+    with pytest.raises(TypeError, match="step"):
+        rb.simulate(short(), controller=3)  # type: ignore[call-overload]
     locked = driven().with_values({"supervisor.strategy": "locked"})
     tuning = rb.tune(locked)
     assert isinstance(tuning, rb.EccentricTuning)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from ringbalance.controller.ensemble.samples import ASSUMED_INFLUENCE
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
@@ -71,7 +72,7 @@ def _collect(work: Work) -> Record:
     rotor = work.scene.rotor
     return {
         "needed_moment_kg_m": rotor.initial_amplitude / rotor.influence_coefficient,
-        "needed_uncertainty_kg_m": _needed_uncertainty(work.scene),
+        "needed_uncertainty_kg_m": needed_uncertainty(work.scene),
         "gas_pressure_uncertainty_Pa": half_widths(work.scene).get("pressure", 0.0),
         "requirement": requirement_record(work.scene),
         "highest_gas_pressure_Pa": highest_pressure(work.scene, work.calibration.model),
@@ -84,9 +85,10 @@ def _collect(work: Work) -> Record:
     }
 
 
-def _needed_uncertainty(scene: Scene) -> float:
-    """Of the initial unbalance, kg m at 95 %, by that of the influence coefficient."""
-    width = half_widths(scene).get("influence_coefficient", 0.0)
+def needed_uncertainty(scene: Scene) -> float:
+    """Of the initial unbalance, kg m at 95 %, by that of the influence coefficient: stated, else assumed."""
+    assumed = ASSUMED_INFLUENCE * scene.rotor.influence_coefficient
+    width = half_widths(scene).get("influence_coefficient", assumed)
     return scene.rotor.initial_amplitude * width / scene.rotor.influence_coefficient**2
 
 

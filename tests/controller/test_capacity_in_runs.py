@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Final
 
@@ -119,3 +120,14 @@ def test_capacity_and_runs_agree_on_random_discs(tmp_path: Path, number: int) ->
     usable = found.residual.usable_pair_moment / found.residual.pair_moment
     run = driven(scene, found, share=1.1 * usable * found.residual.reach / found.residual.usable_pair_moment)
     judged(run, found)
+
+
+def test_a_stalled_run_names_the_pressure_from_which_injections_begin(paper_scene: Scene) -> None:
+    """Each short injection begins over an empty crest, so its pressure is that of priming."""
+    scene = paper_scene.with_values({"gas.pressure": 0.45e6, "rotor.initial_vibration.amplitude": "9 um"})
+    run = ringbalance.simulate(scene)
+    assert run.outcome is Outcome.STALLED
+    (named,) = re.findall(r"to empty it: ([0-9.]+) MPa", run.status)
+    priming = ringbalance.calibrate(scene).operating_point.priming_vented
+    assert priming is not None
+    assert float(named) == pytest.approx(1e-6 * priming, rel=2e-3)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 
+import example_measurements
 import numpy as np
 import pytest
 from synthetic_rigs import Rig, fitted, rig
 
+from ringbalance.cli import main
 from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
 from ringbalance.identification.balancers import changed
 from ringbalance.identification.data.measurements import Observations
@@ -21,12 +24,14 @@ from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.tube.uncertainty import MODEL_CAUSES
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.inputs import measured_closed_forms
-from ringbalance.scene import liquid_ring_scene, load_scene
+from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR, START_ERROR, ModelError
 
+PAPER = str(bundled_scene("liquid_ring_paper"))
+INJECTIONS = str(example_measurements.FOLDER / "injection.csv")
 SLOPE = 0.02
 """By which data may differ from the saved scene's prediction; without what is pulled it is 3 % and more."""
 
@@ -140,3 +145,18 @@ def test_drawn_devices_spread_as_the_posterior(result: FitResult, scene: Scene) 
 def test_every_error_of_a_model_has_a_name() -> None:
     for cause in (*MODEL_CAUSES, CAVITY_ERROR, CLEARING_ERROR, START_ERROR):
         assert ModelError.named(f"model: {cause}, odd", 0.5).odd == 0.5
+
+
+def test_a_saved_scene_goes_on_to_the_other_commands(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As docs/fit.md has it: fit, save, calibrate and simulate what was saved, whatever its gain does."""
+    target = tmp_path / "fitted.toml"
+    words = ["fit", PAPER, INJECTIONS, "--parameters", "lambda_factor", "--save", str(target), "--json"]
+    assert main(words) == 0
+    fitted_lambda = json.loads(capsys.readouterr().out)["parameters"][0]["value"]
+    assert main(["calibrate", str(target), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["status"]["code"] == "ok"
+    code = main(["simulate", str(target), "--json"])
+    assert json.loads(capsys.readouterr().out)["settled"] == (code == 0)
+    assert liquid_ring_scene(load_scene(target)).disc.moment_factor == pytest.approx(fitted_lambda)

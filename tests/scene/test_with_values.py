@@ -100,6 +100,8 @@ def test_everything_wrong_is_reported_at_once(paper_scene: Scene) -> None:
         with pytest.raises(SceneError) as caught:
             paper_scene.with_values({"tube.bore": value})
         assert ("tube", "bore") in {(fault.table, fault.key) for fault in caught.value.faults}
+    with pytest.raises(TypeError, match=r"tube\.bore"):
+        paper_scene.with_values({3: 4})  # type: ignore[dict-item]
 
 
 def test_an_imported_chamber_keeps_its_mesh(tmp_path: Path) -> None:

@@ -113,8 +113,9 @@ def open_folder() -> Iterator[Path]:
     """A folder that everybody can enter, outside the tests' own, which nobody else can."""
     if os.getuid() != 0 or shutil.which("setpriv") is None:
         pytest.skip("needs to become another user")
-    if subprocess.run([*NOBODY, sys.executable, "-c", ""], capture_output=True, check=False).returncode != 0:
-        pytest.skip("another user cannot run this Python")
+    probe = [*NOBODY, sys.executable, "-c", "import ringbalance.scene"]
+    if subprocess.run(probe, capture_output=True, check=False).returncode != 0:
+        pytest.skip("another user cannot run this Python, or not read this checkout (a umask of 077)")
     folder = Path(tempfile.mkdtemp())
     folder.chmod(0o755)
     yield folder

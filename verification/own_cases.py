@@ -9,7 +9,7 @@ import inspect
 import sys
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -20,7 +20,7 @@ import numpy as np
 from ringbalance.verification.case import CaseDefinition, CaseError
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference, as_found
 from ringbalance.verification.result import CaseResult
-from ringbalance.verification.runner import mutate_definition, run_definition, scene_of
+from ringbalance.verification.runner import run_on, scene_of
 
 TEXT: Final = "case.toml"
 CODE: Final = "case.py"
@@ -40,11 +40,8 @@ class OwnCase:
 
         Raises: CaseError: its code cannot be loaded, or gives something else than a case must.
         """
-        code, given = self._code(), scene_of(self.definition, scene)
-        result = run_definition(self.definition, code, scene=given, level=level)
-        if not mutations or result.evidence is None:
-            return result
-        return replace(result, mutations=mutate_definition(self.definition, code, scene=given, level=level))
+        given = scene_of(self.definition, scene)
+        return run_on(self.definition, self._code(), scene=given, level=level, mutations=mutations)
 
     def _code(self) -> _Code:
         path = self.folder / CODE

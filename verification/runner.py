@@ -54,11 +54,17 @@ def run_case(case_id: str, *, scene: Scene, level: Level = "light", mutations: b
     Raises: KeyError: an unknown case.
     """
     definition, code = load_case(case_id), case_code(case_id)
-    own = scene_of(definition, scene)
-    result = run_definition(definition, code, scene=own, level=level)
+    return run_on(definition, code, scene=scene_of(definition, scene), level=level, mutations=mutations)
+
+
+def run_on(
+    definition: CaseDefinition, code: CaseCode, *, scene: Scene, level: Level, mutations: bool
+) -> CaseResult:
+    """As `run_case`, of a case given by its text and its code, on the scene exactly as given."""
+    result = run_definition(definition, code, scene=scene, level=level)
     if not mutations or result.verdict is Verdict.NOT_RUN:
         return result
-    caught = mutate_definition(definition, code, scene=own, level=level)
+    caught = mutate_definition(definition, code, scene=scene, level=level)
     return dataclasses.replace(result, mutations=caught)
 
 

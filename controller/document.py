@@ -12,7 +12,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_text, line_warning
 from ringbalance.reduced_model.selection.registry import neglected_in_injections
@@ -32,7 +32,6 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "balancer": simulation.balancer,
         "controller": simulation.controller,
         "law": simulation.law,
-        "integrator": simulation.integrator,
         "settled": simulation.settled,
         "settling_time_s": simulation.settling_time,
         "verdict": simulation.verdict.value,
@@ -173,7 +172,7 @@ def _summary(simulation: Simulation) -> Table:
     when = "-" if simulation.settling_time is None else f"{simulation.settling_time:.3f} s"
     last = {letter: fill[-1] for letter, fill in simulation.fill_ratio.items()}
     rows = (
-        ("flow law", f"{simulation.law} ({simulation.integrator.replace('_', ' ')})"),
+        ("flow law", simulation.law),
         ("settling time", when),
         ("amplitude", f"{_um(simulation.amplitude[0])} -> {_um(simulation.amplitude[-1])}"),
         ("limit", f"{_um(simulation.limit)} for {simulation.hold_time:.4g} s"),

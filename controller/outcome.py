@@ -14,7 +14,7 @@ from ringbalance.controller.advice import lowered_gain, raised_gain
 from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, runs_back_text
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.shortfall import liquid_not_driven, moment_missing
 from ringbalance.controller.simulation import (
     NOISE_DEVIATIONS,
@@ -170,7 +170,7 @@ def _unmoved(facts: Facts) -> Outcome:
 def _over_too_soon(facts: Facts) -> bool:
     """Whether the gas would drive liquid, had it the time to fill the chamber."""
     plant, done = facts.plant, _longest(facts).operation
-    if plant.dynamics is None:
+    if plant.dynamics.quasi_steady:
         return False
     flow, total = plant.model.flow, facts.state.pairs[0].total
     other = min(max(total - done.fill_after, 0.0), flow.max_fill_ratio)

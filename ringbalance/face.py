@@ -11,11 +11,11 @@ from ringbalance.controller.compare import Comparison
 from ringbalance.controller.compare import compare as run_comparison
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.liquid_ring.motion import gives_forces
 from ringbalance.controller.loop import Progress
 from ringbalance.controller.loop import simulate as run_closed_loop
 from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Simulation
-from ringbalance.controller.terms import can_carry
 from ringbalance.controller.tuning.eccentric import EccentricTuning, tune_eccentric
 from ringbalance.controller.tuning.tune import Tuning
 from ringbalance.controller.tuning.tune import tune as tune_scene
@@ -118,7 +118,7 @@ def simulate(
         progress=progress,
         modelled=modelled,
     )
-    remark = _of_own_law(scene, flow_law, run)
+    remark = _of_own_law(flow_law, run)
     return replace(run, status=f"{run.status}; {remark}") if remark else run
 
 
@@ -130,7 +130,7 @@ def _model_of(scene: Scene, law: Any) -> BalancerModel:
     return completed_model(law, by=calibrate_scene(scene).flow_law)
 
 
-def _of_own_law(scene: Scene, law: object, run: Simulation) -> str:
+def _of_own_law(law: object, run: Simulation) -> str:
     """What a run takes from elsewhere, or leaves out, because a law of the caller's own does not give it."""
     if law is None or isinstance(law, CalibratedLaw | PaperLaw):
         return ""
@@ -138,7 +138,7 @@ def _of_own_law(scene: Scene, law: object, run: Simulation) -> str:
     parts = []
     if names := lacking(law):
         parts.append(f"the law gives no {', '.join(names)}: those of the calibrated law are used")
-    if rows and not can_carry(scene, run.model):
+    if rows and not gives_forces(run.model.flow):
         parts.append(f"it gives velocities and no forces, so the run leaves out {', '.join(rows)}")
     return "; ".join(parts)
 

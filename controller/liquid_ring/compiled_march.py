@@ -45,8 +45,7 @@ from ringbalance.controller.liquid_ring.compiled_step import (
     shorten,
     take,
 )
-from ringbalance.controller.liquid_ring.records import EVENTS, P, Record, U, X
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import EVENTS, Event, P, Record, U, X
 from ringbalance.scene.arrays import FloatArray
 
 _ROUND_OFF: Final = 1e-12
@@ -380,6 +379,8 @@ def _note(plant: Record, motion: Record, event: int, direction: int) -> None:
         is_open = motion.valve_1 > 0 if motion.chamber else motion.valve_0 > 0
         if motion.regime_start == RESTING and event == NONE:
             motion.regime_start = regime(plant, motion)
+        if event != NONE:
+            motion.ended = motion.now
         if event == EMPTY and motion.event != EMPTY:
             motion.run_dry = motion.closes if is_open else 0.0
         if event != STALLED or is_open:

@@ -14,14 +14,16 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from ringbalance import bundled_scene, load_scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.integrators import closed_form, quadrature
-from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.transfers import adaptive_ode
+from ringbalance.verification.reference.transfers import Drive, adaptive_ode, closed_form, marched
+
+MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 
 DriveBy = Callable[..., Drive]
 NAMES = ("tube inertia", "gas filling", "valve lag")
@@ -155,7 +157,7 @@ def test_quadrature_and_closed_form_agree(
 ) -> None:
     asked = replace(drive, fill=fill, gas_pressure=pressure)
     t = np.linspace(0.0, duration, 4)
-    exact, found = closed_form(asked, t), quadrature(asked, t)
+    exact, found = closed_form(asked, t), MARCH(asked, t)
     assert found.fill == pytest.approx(exact.fill, abs=1e-9)
     # The tables do not tell a stall from its last 1e-12 of fill.
     at_rest = abs(exact.fill[-1] - exact.fill[0]) <= 1e-12
@@ -175,12 +177,12 @@ def test_quadrature_and_adaptive_ode_agree(
 ) -> None:
     asked = drive_by(name, fill=fill, gas_pressure=pressure, primed=primed)
     t = np.linspace(0.0, duration, 4)
-    assert quadrature(asked, t).fill == pytest.approx(adaptive_ode()(asked, t).fill, abs=1e-5)
+    assert MARCH(asked, t).fill == pytest.approx(adaptive_ode()(asked, t).fill, abs=1e-5)
 
 
 @given(fill=st.floats(0.0, 0.5), split=st.floats(0.01, 0.99))
 def test_two_stretches_are_one(drive: Drive, fill: float, split: float) -> None:
-    for integrator in (closed_form, quadrature):
+    for integrator in (closed_form, MARCH):
         whole = integrator(replace(drive, fill=fill), np.array([1.0])).fill[-1]
         first = integrator(replace(drive, fill=fill), np.array([split])).fill[-1]
         second = integrator(replace(drive, fill=float(first), primed=True), np.array([1.0 - split])).fill[-1]

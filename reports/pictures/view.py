@@ -10,9 +10,9 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
-from ringbalance.reports.numbers import given, number
 from ringbalance.reports.pictures.fields import ShownField, shown_field, shown_fill
 from ringbalance.reports.pictures.tube_path import tube_path
+from ringbalance.results.numbers import given, number
 from ringbalance.scene import Scene
 from ringbalance.scene.arrays import FloatArray
 

@@ -158,12 +158,11 @@ def write_report(
     level: Level = "light",
     workers: int = 1,
     progress: Callable[[str], None] | None = None,
-    interactive: bool = False,
 ) -> Report:
     """Verify, calibrate, simulate and draw a scene into one folder.
 
     Args: `level`: "heavy" also runs the cases that take long. `workers`: processes, this one included.
-        `progress`: called with what is being done. `interactive`: whether view.html is written, too.
+        `progress`: called with what is being done.
     Raises: SceneError: a scene that cannot be used; nothing is written.
     Raises: OSError: the folder cannot be written.
     """
@@ -175,7 +174,6 @@ def write_report(
         scene_text=toml_bytes(document_of(scene)).decode(),
         workers=workers,
         progress=progress,
-        interactive=interactive,
     )
 
 

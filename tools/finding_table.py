@@ -15,7 +15,7 @@ _HEAD: Final = """# Findings
 
 Every command's JSON has a list `findings`. Each has a `code` and a `severity`, which do not change, its
 numbers as `values` (SI), the `change` of the scene that would mend it, by path of a key (`raise`, `lower`,
-`set` or a new value, SI), and the sentence as `text`, whose wording may change. Values are in *italics* below.
+`set` or a new value, SI), and the sentence as `text`, whose wording may change. Values are in *italics*.
 
 | code | severity | values | sentence |
 |---|---|---|---|

@@ -52,6 +52,11 @@ class BuiltIn:
     needs: ClassVar[int] = USABLE
     """What it reads of a sample."""
 
+    @property
+    def rises_tolerated(self) -> int:
+        """As `Controller` has it."""
+        raise NotImplementedError
+
     def fill(self, loop: Record, run: Record) -> None:
         """Write the settings into an element of type `LOOP`, and the first memory into one of type `RUN`."""
         raise NotImplementedError

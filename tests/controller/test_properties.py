@@ -15,12 +15,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ringbalance import bundled_scene, load_scene
-from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.reference.transfers import Drive, adaptive_ode, closed_form, marched
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)

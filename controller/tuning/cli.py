@@ -20,10 +20,11 @@ from ringbalance.controller.tuning.tune import tune as tune_scene
 from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.selection.registry import neglected_in_injections
+from ringbalance.results.render import two_columns
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, checked_law, with_tolerance
-from ringbalance.scene.platform.terminal import activity, results_console, two_columns
+from ringbalance.scene.platform.terminal import activity, results_console
 
 TUNED = 0
 NOT_TUNED = 1

@@ -42,7 +42,7 @@ def report(
         out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
         level: "heavy" also runs the cases that take long.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
         interactive: also write view.html, in which the liquid and the tube can be turned.
 
     Returns:

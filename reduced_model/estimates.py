@@ -165,10 +165,12 @@ def injection_time(scene: Scene) -> float:
 
 
 def plates(scene: Scene) -> Contribution:
+    """Volume that the plates take from a plain sector."""
     return range_contributions(scene)["pressures"][PLATES]
 
 
 def gravity_mean(scene: Scene) -> Contribution:
+    """Change of wall pressure or moment, mean over a turn, of second order in g/(omega^2 a)."""
     formula = "free surface |r + g/omega^2| = b against a concentric one, at the worst fill of the range"
     return Contribution(value=mean_gravity(scene), formula=formula)
 
@@ -192,6 +194,7 @@ def ripple_and_sloshing(scene: Scene) -> Contribution:
 
 
 def surface_tension(scene: Scene) -> Contribution:
+    """Pressure jump over a meniscus between wetted walls against the wall pressure."""
     return Contribution(
         value=float(np.max(capillary_share(scene, _fills(scene))["pressures"])),
         formula="sigma (2/B + 1/(a alpha) + 1/a)/P, an inverse Bond number",
@@ -199,6 +202,7 @@ def surface_tension(scene: Scene) -> Contribution:
 
 
 def wall_friction(scene: Scene) -> Contribution:
+    """Ekman layers under the swing that gravity drives, against the wall pressure."""
     layers, ekman = wall_layers(scene, _fills(scene)[-1])
     formula = f"g/(omega^2 a) sqrt(Ek), Ek = nu/(omega R2^2) = {ekman:.1e}"
     return Contribution(value=float(layers), formula=formula)
@@ -330,6 +334,7 @@ def filling(scene: Scene) -> Contribution:
 
 
 def lag(scene: Scene) -> Contribution:
+    """Delay of the valve over the deciding injection."""
     times, deciding = [line_ends(scene)[i].valve_lag for i in (-1, 0)], injection_time(scene)
     formula = f"{_span(times)} ms {_within(deciding)}"
     return _over(formula, times, deciding, given=scene.gas.valve_lag is not None)

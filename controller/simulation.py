@@ -22,7 +22,7 @@ from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
-from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.findings import Finding
 from ringbalance.results.result import DeferredResult
 from ringbalance.scene.arrays import FloatArray

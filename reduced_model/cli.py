@@ -53,7 +53,7 @@ def calibrate(
         json: print one JSON document instead of tables.
         save: also write the flow law to this file, for `simulate --law`.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code 0.

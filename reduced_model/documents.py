@@ -80,7 +80,6 @@ def _curve(curve: Curve, at: list[int], name: str, unit: str) -> dict[str, Any]:
         f"{name}_input_uncertainty": _listed(curve.inputs[at]),
         f"{name}_uncertainty_parts": {
             "numerical": _listed(curve.numerical[at]),
-            "left_out_gravity": _listed(curve.left_out[at]),
             "unmodelled_terms": _listed(curve.unmodelled[at]),
         },
     }

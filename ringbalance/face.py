@@ -26,7 +26,7 @@ from ringbalance.reduced_model.law.completing import completed_model, lacking
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.selection.registry import IN_INJECTIONS, NOT_MODELLED
+from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED
 from ringbalance.results.findings import Finding
 from ringbalance.scene import AnyScene, EccentricScene, Scene
 from ringbalance.scene.changes import checked_scene
@@ -96,7 +96,7 @@ def simulate(
             scene's noise from the scene's seed.
         progress: called with the simulated time and the time limit, s.
         modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
-            default those whose estimated contribution is above the scene's tolerance.
+            default all that the scene gives numbers for.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a law, an algorithm, a sensor or terms for eccentric masses; terms that the scene or
         the law gives no numbers for.

@@ -166,8 +166,8 @@ def _gas(
     settings, half, longest = scene.controller, len(fills), 0.0
     length = min(max(wanted, 0.0), settings.maximum_gas_time)
     angle = phase + settings.assumed_lag_angle
-    first, share, second, other = vector_shares(2 * half, angle, length, (False,) * 2 * half)
-    for chamber, share in ((first, share), (second, other)):
+    first, near, second, far = vector_shares(2 * half, angle, length, (False,) * 2 * half)
+    for chamber, share in ((first, near), (second, far)):
         duration = min(share, remaining)
         if share < settings.minimum_gas_time or duration <= 0:
             continue

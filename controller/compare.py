@@ -18,7 +18,7 @@ from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.search import recommended
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.eccentric_models import EccentricScene

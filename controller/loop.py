@@ -20,6 +20,7 @@ from ringbalance.controller.liquid_ring.records import EVENTS
 from ringbalance.controller.loop_plan import CHUNK, LoopPlan, RunsInHand, Trace, joined
 from ringbalance.controller.outcome import Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
+from ringbalance.controller.run_findings import run_findings
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import loop_factor
@@ -27,7 +28,7 @@ from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
-from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 
@@ -59,8 +60,8 @@ def simulate(
     Args:
         flow_law: in place of `model`, a law that carries its own moments and volumes.
         sensor: default the scene's noise from the scene's seed.
-        modelled: of "tube inertia", "gas filling" and "valve lag" those to model; default those whose
-            estimated contribution is above the scene's tolerance.
+        modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
+            default all that the scene gives numbers for.
         residual_fill: of a driven chamber; injections are shortened so that none falls below it. Default the
             fill at which gas enters the port.
     Raises: SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
@@ -249,7 +250,7 @@ def _record(
         settling_time=facts.settling_time if settled else None,
         hold_time=scene.controller.hold_time,
         loop=facts.loop,
-        status=facts.status,
+        findings=run_findings(facts),
         time=time,
         amplitude=facts.amplitude,
         phase=phase,

@@ -62,7 +62,7 @@ def simulate(
         plot: also draw the run's figures on one sheet, an SVG file.
         seed: of all random numbers, in place of the scene's.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code: 0 settled, 1 not settled; the result is printed either way.

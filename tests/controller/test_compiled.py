@@ -11,8 +11,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from ringbalance.controller.compilation.compiled import compiled, compiled_sources
 from ringbalance.controller import compiled_loop, moment_table
+from ringbalance.controller.compilation.compiled import compiled, compiled_sources
 
 
 def _sum_of_sines(values: np.ndarray[Any, np.dtype[np.float64]], factor: float) -> float:

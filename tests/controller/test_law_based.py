@@ -102,8 +102,8 @@ def test_the_papers_gas_time_by_hand(model: BalancerModel, ring_of: RingOf) -> N
 def test_the_fill_for_a_moment_goes_on_straight_beyond_the_ends() -> None:
     moment = PaperMoment(moment_per_transferred_mass=0.072, density=1000.0, chamber_volume=6e-5)
     per_fill = 0.072 * 1000.0 * 6e-5
-    x = np.linspace(0.0, 0.5, MOMENT_NODES)
-    values = moment.pair_vector(fill_ratio=x, opposite_fill_ratio=0.5 - x)
+    fills = np.linspace(0.0, 0.5, MOMENT_NODES)
+    values = moment.pair_vector(fill_ratio=fills, opposite_fill_ratio=0.5 - fills)
     nodes = np.stack([values, np.gradient(values)], axis=1)
     for x in (-0.2, 0.0, 0.1, 0.25, 0.5, 0.6):
         wanted = per_fill * (x - 0.25)

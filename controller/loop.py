@@ -96,7 +96,7 @@ def simulate(
     if own is not None or sensor is not None:
         used_sensor = sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed)
         outside = _Outside(sensor=used_sensor, controller=own, chambers=scene.disc.chambers)
-    trace = _carried(plan.begin(runs), scene, outside, progress or (lambda _, __: None))
+    trace = _carried(plan.begin(runs), scene, outside, progress)
     time, vibration, fills = _histories(scene, balancer, trace)
     facts = Facts(
         scene=scene,
@@ -127,17 +127,18 @@ def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> Balanc
     raise ValueError("give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither")
 
 
-def _carried(hand: RunsInHand, scene: Scene, outside: _Outside | None, progress: Progress) -> Trace:
-    """Carry a run to its end. Returns: its trace."""
+def _carried(hand: RunsInHand, scene: Scene, outside: _Outside | None, progress: Progress | None) -> Trace:
+    """Carry a run to its end, by one sample where anybody looks on. Returns: its trace."""
     run, limit = hand.runs[0], scene.run.time_limit
     random = np.random.default_rng(scene.run.seed)
     parts = [hand.go_on(np.zeros((1, 0, 2)), traced=True)]
     while run["cause"] == Cause.NONE:
-        progress(float(run["time"]), limit)
+        if progress is not None:
+            progress(float(run["time"]), limit)
         if outside is not None:
             outside.answer(run)
-        noise = np.zeros((1, 1, 2)) if outside is not None else random.standard_normal((1, CHUNK, 2))
-        parts.append(hand.go_on(noise, traced=True))
+        size = CHUNK if progress is None and outside is None else 1
+        parts.append(hand.go_on(random.standard_normal((1, size, 2)), traced=True))
     return joined(parts)
 
 

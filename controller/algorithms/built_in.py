@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Final
 
 import numpy as np
@@ -26,8 +27,6 @@ _valve_time: Final = in_place(valve_time)
 class Memory:
     """State of an algorithm of the program between two samples; arrays of one element, never changed."""
 
-    loop: npt.NDArray[np.void]
-    """Its settings, type `LOOP`."""
     run: npt.NDArray[np.void]
     """What it remembers, type `RUN`."""
     liquid: npt.NDArray[np.void]
@@ -65,15 +64,20 @@ class BuiltIn:
         """The pairs as the algorithm believes them to be at the start; empty where it has no belief."""
         return np.zeros(0, dtype=MOTION)
 
-    def react(self, memory: Memory) -> None:
+    def react(self, loop: Record, memory: Memory) -> None:
         """Call the compiled step on a memory that shows a usable sample."""
         raise NotImplementedError
 
+    @cached_property
+    def _filled(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
+        """Settings and first memory, shape (1,) each."""
+        loop, run = np.zeros(1, dtype=LOOP), np.zeros(1, dtype=RUN)
+        self.fill(loop[0], run[0])
+        return loop, run
+
     def start(self) -> Memory:
         """The state before the first sample."""
-        memory = Memory(np.zeros(1, dtype=LOOP), np.zeros(1, dtype=RUN), self.liquid())
-        self.fill(memory.loop[0], memory.run[0])
-        return memory
+        return Memory(self._filled[1], self.liquid())
 
     def step(self, state: Memory, measurement: Measurement | None) -> tuple[Memory, Command]:
         """Next state and command after one sample (None: dropped); a pure function."""
@@ -83,10 +87,10 @@ class BuiltIn:
             return state, Command(reason=NO_SAMPLE)
         seen["time"], seen["asked"], seen["resting"], seen["reason"] = measurement.time, 0.0, 0, 0
         seen["at_residual"][0, : len(measurement.at_residual)] = measurement.at_residual
-        after = Memory(state.loop, seen, state.liquid.copy())
-        self.react(after)
+        after = Memory(seen, state.liquid.copy())
+        self.react(self._filled[0][0], after)
         seen["reason"] = 0 if seen["resting"][0] or np.any(seen["asked"]) else TOO_SHORT
-        return after, command_of(seen[0], int(state.loop["chambers"][0]))
+        return after, command_of(seen[0], int(self._filled[0]["chambers"][0]))
 
 
 @in_place

@@ -126,9 +126,9 @@ class LawBased(BuiltIn):
         ]
         return np.concatenate([*pairs, pairs[0]])
 
-    def react(self, memory: Memory) -> None:
+    def react(self, loop: Record, memory: Memory) -> None:
         room = np.zeros(WORKSPACE)
-        law_based_step(memory.loop[0], self.plant[0], memory.run[0], memory.liquid, np.zeros((2, 1)), room)
+        law_based_step(loop, self.plant[0], memory.run[0], memory.liquid, np.zeros((2, 1)), room)
 
 
 @in_place

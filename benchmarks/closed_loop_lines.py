@@ -20,7 +20,6 @@ from ringbalance.controller.ensemble.run import EnsemblePlan
 from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.transfers import Drive, closed_form
 

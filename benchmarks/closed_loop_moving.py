@@ -25,9 +25,9 @@ from closed_loop_growth import growth
 from closed_loop_plain import plain_run
 from moving_injection import FILL_ERROR, METHODS, TOLERANCES, WANTED, Rival, least, ours, piped_scene
 from rich.console import Console
-from ringbalance.controller.ensemble.run import RELATIVE_ERROR
 
 from ringbalance.controller.ensemble.monte_carlo import ensemble_dynamics, simulate_ensemble, simulate_members
+from ringbalance.controller.ensemble.run import RELATIVE_ERROR
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate

@@ -19,11 +19,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from ringbalance.controller.ensemble.run import RELATIVE_ERROR
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_motion import begin
+from ringbalance.controller.ensemble.run import RELATIVE_ERROR
 from ringbalance.controller.formulas import flow_shape
 from ringbalance.controller.liquid_ring.compiled_events import command
 from ringbalance.controller.liquid_ring.compiled_march import advance

@@ -242,8 +242,8 @@ def test_a_member_of_an_ensemble_is_the_single_run(tmp_path: Path, crest: str, i
     found = simulate_members(scene, model, size=1)
     assert found.settled[0] == run.settled
     assert found.drifted[0] == (run.outcome is Outcome.DRIFTING)
-    # A member's injection ends within 1e-6 in fill of a single run's; a fill of 1e-6 is 1e-10 m here.
-    assert found.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=1e-9 if inertia else 1e-12)
+    # A member ends within 1e-6 in fill of a single run, 3e-5 without mass; a fill of 1e-6 is 1e-10 m here.
+    assert found.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=3e-9)
     assert found.samples[0] == len(run.samples)
 
 

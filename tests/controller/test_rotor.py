@@ -24,6 +24,7 @@ PER_DIFFERENCE = 72e-3 * 1000 * VOLUME / 2
 
 RingOf = Callable[..., LiquidRing]
 
+
 def test_four_chambers_lie_on_the_axes() -> None:
     assert chamber_letters(4) == ("A", "B", "C", "D")
     assert chamber_directions(4).tolist() == [1, 1j, -1, -1j]
@@ -103,7 +104,9 @@ def left_over(plant: LiquidRing, state: DiscState, rotor: Rotor, *, wanted: comp
 
 
 @pytest.mark.parametrize("n", [4, 6, 8])
-def test_the_reach_is_the_polygon_of_full_pairs(scene: Scene, model: BalancerModel, n: int, ring_of: RingOf) -> None:
+def test_the_reach_is_the_polygon_of_full_pairs(
+    scene: Scene, model: BalancerModel, n: int, ring_of: RingOf
+) -> None:
     state = DiscState.initial(disc=replace(scene.disc, chambers=n))
     plant = ring_of(model, chambers=n)
     pair = plant.largest_pair_moment(state=state)

@@ -13,7 +13,6 @@ from typing import Any, Final
 
 from ringbalance.reports import deferred
 from ringbalance.scene import Scene, liquid_ring_scene, load_scene, read_scene
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.files import staged
@@ -24,6 +23,7 @@ from ringbalance.verification.evidence import Level
 DONE: Final = 0
 NOT_SOUND: Final = 1
 MOST_WORKERS: Final = 2
+WITH_LIQUID: Final = ("liquid_ring",)
 
 
 def report(
@@ -54,8 +54,8 @@ def report(
         OSError: the folder cannot be written.
     """
     told, text = read_scene(scene)
-    if interactive and isinstance(told, EccentricScene):
-        problem = "a scene of eccentric masses holds no liquid"
+    if interactive and told.balancer not in WITH_LIQUID:
+        problem = f"the balancer {told.balancer} holds no liquid"
         raise SceneError.of_option(
             option="--interactive", value=True, problem=problem, allowed="to leave it out"
         )

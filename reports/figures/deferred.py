@@ -14,8 +14,7 @@ _HOME: Final = MappingProxyType(
     {
         "sheet": "ringbalance.reports.figures.sheet",
         "fit_figures": "ringbalance.reports.figures.fit",
-        "run_figures": "ringbalance.reports.figures.loop",
-        "eccentric_figures": "ringbalance.reports.figures.eccentric",
+        "figures_of": "ringbalance.reports.figures.runs",
         "typeset": "ringbalance.reports.typesetting",
     }
 )

@@ -11,11 +11,11 @@ import numpy as np
 
 from ringbalance.controller import deferred
 from ringbalance.controller.balancer import Balancer, CommonRotor, Draws
-from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.reduced_model.terms import ModelUsed
+from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.results import CommandResult
 
 RUNS: Final = 5
 """Of each balancer, with the seeds that follow its scene's."""

@@ -15,7 +15,7 @@ from rich.text import Text
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_text, line_warning
-from ringbalance.reduced_model.selection.registry import neglected_in_injections
+from ringbalance.reduced_model.terms import neglected_in_injections
 from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.platform.terminal import two_columns
 

@@ -22,10 +22,10 @@ from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
-from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.reduced_model.terms import ModelUsed
+from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.results import CommandResult
 
 _LITRE = 1e-3
 

@@ -20,7 +20,6 @@ from ringbalance.reports.pages.document import evidence_text
 from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
-from ringbalance.reports.pictures.view import VIEW, view_page
 from ringbalance.reports.prose import untraced
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
@@ -124,12 +123,11 @@ def write_report(
     workers: int | Workers = 1,
     progress: Progress | None = None,
     opengl: OpenGL | None = None,
-    interactive: bool = False,
 ) -> Report:
     """Verify, calibrate, simulate and draw a scene into one folder.
 
     Args: `scene_text`: the scene file's own text, for the appendix. `workers`: processes, this one included,
-    or those that are at work already. `interactive`: whether a liquid ring's view.html is written, too.
+    or those that are at work already.
     Raises: SceneError: a scene that cannot be calibrated or simulated; nothing is written.
     Raises: OSError: the folder cannot be written, or holds an evidence.json that is none; known before the
     work.
@@ -148,8 +146,6 @@ def write_report(
             evidence = DRIVEN[scene.balancer](scene, **common)
         else:
             ring = liquid_ring_scene(scene)
-            if interactive:
-                (stage / VIEW).write_text(view_page(ring), encoding="utf-8")
             with _pictures(ring, stage, opengl) as pictures:
                 evidence = collect_evidence(ring, saved=saved, judged=views.begin_cases, **common)
                 _tell(progress, "pictures")

@@ -8,9 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.controller.balancer import AS_GIVEN
+from ringbalance.controller.balancer import AS_GIVEN, Run
 from ringbalance.controller.commands import balancer_under
-from ringbalance.reports.figures import deferred
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import AnyScene, Models, with_tolerance
@@ -43,7 +42,7 @@ def simulate(
         plot: also draw the run's figures on one sheet, an SVG file.
         seed: of all random numbers, in place of the scene's.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code: 0 settled, 1 not settled; the result is printed either way.
@@ -60,11 +59,11 @@ def simulate(
     with activity("simulate", "closed loop (the first run compiles) ...") as shown:
         run = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown)).runs[0][0]
         document = run.to_dict() if json else {}
-        figures = None if plot is None else deferred.figures_of(told, run)
+        drawing = None if plot is None else _sheet(told, run)
     if csv is not None:
         write_whole(csv, _csv_text(balancer.history(run)))
-    if plot is not None:
-        write_whole(plot, deferred.sheet(figures))
+    if plot is not None and drawing is not None:
+        write_whole(plot, drawing)
     if json:
         print(json_format.dumps(document, allow_nan=False))
     else:
@@ -92,6 +91,14 @@ def _with_seed(scene: AnyScene, seed: int | None) -> AnyScene:
             option="--seed", value=seed, problem="out of range", allowed="a whole number from 0 to 2^63 - 1"
         )
     return replace(scene, run=replace(scene.run, seed=seed))
+
+
+def _sheet(scene: AnyScene, run: Run) -> str:
+    # Loading what draws takes as long as a short run.
+    from ringbalance.reports.figures.runs import figures_of  # noqa: PLC0415
+    from ringbalance.reports.figures.sheet import sheet  # noqa: PLC0415
+
+    return sheet(figures_of(scene, run))
 
 
 def _clock(shown: Activity) -> Callable[[float, float], None]:

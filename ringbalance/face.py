@@ -85,7 +85,7 @@ def simulate(
             scene's noise from the scene's seed.
         progress: called with the simulated time and the time limit, s.
         modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
-            default those whose estimated contribution is above the scene's tolerance.
+            default all that the scene gives numbers for.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a law, an algorithm, a sensor or terms for eccentric masses; terms that the scene or
         the law gives no numbers for.

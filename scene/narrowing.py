@@ -37,21 +37,21 @@ def liquid_ring_scene(scene: SceneFile) -> Scene:
 
 Models = Literal["finest"]
 FINEST: Final = 0.0
-"""Tolerance at which every term is modelled that has a model."""
+"""Tolerance at which all that is expensive is the finest."""
 ALLOWED: Final = 'a fraction above 0 and below 1, such as 0.005 or "0.5 %"'
 
 
 def with_tolerance(scene: Kind, *, tolerance: str | None = None, models: Models | None = None) -> Kind:
     """The scene with another tolerance; the same scene where neither option is given.
 
-    Args: `tolerance`: such as "0.5 %" or "0.005". `models`: "finest" models every term that has a model.
+    Args: `tolerance`: such as "0.5 %" or "0.005". `models`: "finest" for a tolerance of zero.
     Raises: SceneError: no such tolerance, or both options.
     """
     if models is not None:
         if tolerance is not None:
             raise _error(
                 tolerance,
-                "--models finest models every term, whatever the tolerance",
+                "--models finest is a tolerance of zero",
                 "one of the two options",
             )
         return replace(scene, tolerance=FINEST)

@@ -23,7 +23,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
-from ringbalance.scene.results import CommandResult
+from ringbalance.results.result import CommandResult
 
 RUNS: Final = 40
 FIRST_RUNS: Final = 16

@@ -44,8 +44,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.completing import completed_model, lacking
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.selection.registry import IN_INJECTIONS, NOT_MODELLED, ModelUsed
-from ringbalance.reduced_model.selection.tube_terms import with_tube_models
+from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
@@ -103,7 +102,7 @@ class LiquidRingBalancer:
             return law_by_name(self.scene, law)
         if isinstance(law, CalibratedLaw | PaperLaw):
             return BalancerModel.of(law)
-        return completed_model(law, by=chamber_and_law(with_tube_models(self.scene))[1])
+        return completed_model(law, by=chamber_and_law(self.scene)[1])
 
     @property
     def models_used(self) -> tuple[ModelUsed, ...]:

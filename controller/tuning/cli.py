@@ -29,7 +29,7 @@ def tune(
         law: of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.
         json: print one JSON document instead of tables.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code: 0 what is recommended settles 95 % of the runs; 1 otherwise; the result is printed either

@@ -21,8 +21,8 @@ from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_
 from ringbalance.physics.roots import bracketed_root
 from ringbalance.reduced_model.gas_line import line_ends, standing_amplitude
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.estimates import FILLING, HELD
 from ringbalance.reduced_model.short_injection import Fills, short_injections
+from ringbalance.reduced_model.terms import FILLING, HELD
 from ringbalance.scene.models import Scene
 
 _TAIL: Final = 0.5

@@ -13,8 +13,8 @@ from matplotlib.patches import Circle
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import shown
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import shown
 from ringbalance.scene.arrays import FloatArray
 
 _RPM: Final = 30 / math.pi

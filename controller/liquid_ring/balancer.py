@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
@@ -45,6 +45,7 @@ from ringbalance.reduced_model.law.completing import completed_model, lacking
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
+from ringbalance.results.findings import Finding
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
@@ -185,8 +186,7 @@ class LiquidRingBalancer:
             modelled=given.modelled,
             to_time_limit=given.to_time_limit,
         )
-        remark = _of_own_law(scene, given.flow_law, run)
-        return replace(run, status=f"{run.status}; {remark}") if remark else run
+        return replace(run, findings=(*run.findings, *_of_own_law(scene, given.flow_law, run)))
 
     def rotor(self) -> CommonRotor:
         """See `Balancer`."""
@@ -279,17 +279,15 @@ class LiquidRingBalancer:
         return simulation_history(run)
 
 
-def _of_own_law(scene: Scene, law: object, run: Simulation) -> str:
+def _of_own_law(scene: Scene, law: object, run: Simulation) -> Iterator[Finding]:
     """What a run takes from elsewhere, or leaves out, because a law of the caller's own does not give it."""
     if law is None or isinstance(law, CalibratedLaw | PaperLaw | str):
-        return ""
+        return
     rows = [row.term for row in run.models_used if row.term in IN_INJECTIONS and row.model == NOT_MODELLED]
-    parts = []
     if names := lacking(law):
-        parts.append(f"the law gives no {', '.join(names)}: those of the calibrated law are used")
+        yield Finding(code="own_law_lacks", values={"names": names})
     if rows and not can_carry(scene, run.model):
-        parts.append(f"it gives velocities and no forces, so the run leaves out {', '.join(rows)}")
-    return "; ".join(parts)
+        yield Finding(code="own_law_without_forces", values={"terms": rows})
 
 
 def _changes(before: ControllerSettings, after: ControllerSettings, *, chambers: int) -> dict[str, float]:

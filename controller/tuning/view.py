@@ -11,7 +11,7 @@ from rich.text import Text
 from ringbalance.controller.tuning.tune import Tuning
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.terms import neglected_in_injections
-from ringbalance.scene.platform.terminal import two_columns
+from ringbalance.results.render import two_columns
 
 _UM = 1e6
 

@@ -33,7 +33,7 @@ from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
+from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import bundled_scene, load_scene
@@ -249,7 +249,6 @@ def rows(repeats: int) -> list[dict[str, object]]:
     scene = piped_scene()
     model = calibrate(scene).model
     dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG, HELD))
-    assert dynamics is not None
     rival, found = Rival(scene, model), []
     for duration in DURATIONS:
         exact = ours(dynamics, duration, error=1e-10, count=1)

@@ -7,10 +7,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.reduced_model.law.flow_law import FlowLaw
-from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.reduced_model.short_injection import least_pressure
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.models import Scene
 
 NEAR_RESIDUAL: Final = 1e-6
 """Fill ratio to which a chamber counts as at its residual fill, which a run and an ensemble know as well:
@@ -27,13 +25,6 @@ BEYOND_CAPACITY: Final = (
 """What to do about an unbalance that the disc cannot cancel."""
 RUNS_BACK: Final = "raise rotor.speed or lower tube.hump_radius so that the column breaks, or vent the tube"
 """What to do about a full tube that lets liquid run back while the gas is off."""
-
-
-def runs_back_text(scene: Scene, *, residual_fill: float) -> str:
-    """Why a full tube lets liquid run back while the gas is off, and what to do about it."""
-    total = 2 * scene.disc.initial_fill
-    known = Holding.of(scene, fill_ratio=total - min(residual_fill, total / 2)).warning
-    return known or f"the full tube lets liquid run back while the gas is off: {RUNS_BACK}"
 
 
 def starting_pressure(

@@ -15,8 +15,9 @@ from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.reference.transfers import Drive, adaptive_ode, marched
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)

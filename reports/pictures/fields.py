@@ -10,14 +10,12 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from ringbalance.mesh.chamber import chamber_mesh, default_cells
-from ringbalance.mesh.export import write_cells, write_vtu
+from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.liquid_body import Level, liquid_body
-from ringbalance.mesh.quadratic_tetrahedra import FACES, Tetrahedra, tetrahedra
-from ringbalance.physics.pressure.imported import solve_on
-from ringbalance.physics.pressure.linear import LinearSolution
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
-from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
+from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
+from ringbalance.physics.pressure.elements import LinearSolution, quadratic_basis
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_on, solve_pressure
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
@@ -111,12 +109,12 @@ class ChamberField:
 
     def record(self) -> Record:
         chamber, solution = self.solution.chamber, self.solution
-        quality = chamber.quality()
+        jacobian, aspect = chamber.quality()
         return {
             "cells": list(chamber.cells),
-            "unknowns": quality.nodes,
-            "minimum_scaled_jacobian": quality.minimum_scaled_jacobian,
-            "largest_aspect": quality.maximum_aspect,
+            "unknowns": chamber.grid.size,
+            "minimum_scaled_jacobian": jacobian,
+            "largest_aspect": aspect,
             "relative_residual": solution.statistics.relative_residual,
             "status": solution.status.text,
         }
@@ -145,7 +143,7 @@ class ChamberField:
             "pressure_Pa": self.solution.pressure,
             "depth_m": np.maximum(radius - self.surface_radius, 0.0),
         }
-        return write_vtu(path, chamber=chamber, fields=fields)
+        return write_vtu(path, mesh=chamber.mesh.scaled(chamber.length_scale), fields=fields)
 
 
 def shown_fill(scene: Scene) -> float:

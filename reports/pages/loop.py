@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from ringbalance.reports.figures.operation import residual_polar, settling_histogram
-from ringbalance.reports.numbers import MISSING, given, number, percent, shown
 from ringbalance.reports.pages.first_page import RETUNED, place_of_run
 from ringbalance.reports.prose import found_at, traced
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
 from ringbalance.reports.summary import runs_settled
+from ringbalance.results.numbers import MISSING, given, number, percent, shown
 
 _MICROMETRE: Final = 1e6
 _GAINS: Final = {1: "with the scene’s gain", 2: "with the recommended settings"}

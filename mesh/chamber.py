@@ -111,9 +111,9 @@ def chamber_mesh(
     if not np.all((surface > max(disc.plate_thickness, 0.0)) & (surface < disc.outer_radius)):
         raise ValueError("surface_radius must lie inside the outer radius and outside the plate's edge")
     unit, steps, grid = _topology(counts)
-    places = _positions(disc, surface, counts)[:, *steps] / disc.outer_radius
+    places = np.stack([each[steps] for each in _positions(disc, surface, counts)]) / disc.outer_radius
     return ChamberMesh(
-        mesh=type(unit)(np.ascontiguousarray(places), unit.t, unit.boundaries),
+        mesh=type(unit)(places, unit.t, unit.boundaries),
         length_scale=disc.outer_radius,
         cells=counts,
         grid=grid,

@@ -190,7 +190,9 @@ def compacted(body: Tetrahedra) -> Tetrahedra:
 def scikit_fem_mesh(body: Tetrahedra) -> Any:
     """`skfem.MeshTet2` of a body, m, with its boundaries by name."""
     corners, cells = np.unique(body.cells[:, :4], return_inverse=True)
-    straight = MeshTet1(*(np.ascontiguousarray(each.T) for each in (body.nodes[corners], cells.reshape(-1, 4))))
+    straight = MeshTet1(
+        *(np.ascontiguousarray(each.T) for each in (body.nodes[corners], cells.reshape(-1, 4)))
+    )
     places = MeshTet2.from_mesh(straight).doflocs
     # Its nodes are the corners, then the edges; both number a cell's edges alike, faces the other way round.
     places[:, corners.size + straight.t2e] = body.nodes[body.cells[:, 4:]].T

@@ -17,7 +17,7 @@ from skfem import MeshTri1
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.liquid_body import Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import FACES, face_nodes, tetrahedra
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.arrays import BoolArray, IntArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 
 _BESIDE: Final = 1e-4
@@ -39,7 +39,7 @@ _EIGHT: Final = np.array(
 _FOUR: Final = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 
 
-class NoPlaneWaves(ValueError):
+class NoPlaneWavesError(ValueError):
     """A section whose surface is not one line from wall to wall, or that has walls inside."""
 
 
@@ -58,8 +58,8 @@ def middle_section(geometry: ChamberGeometry, *, surface_radius: float, coarse: 
 
     Args: `surface_radius`: a, m. `coarse`: by the corners of the cells alone, on chords twice as long.
     Raises: ValueError: as `liquid_body`.
-    Raises: NoPlaneWaves: the free surface is not one chain of edges from wall to wall, or a wall is closed in
-        itself: stream functions would differ from wall to wall.
+    Raises: NoPlaneWavesError: the free surface is not one chain of edges from wall to wall, or a wall is
+        closed in itself: stream functions would differ from wall to wall.
     """
     body = liquid_body(tetrahedra(geometry), Level(constant=surface_radius**2 / 2))
     low, high = geometry.points[:, 2].min(), geometry.points[:, 2].max()
@@ -79,9 +79,7 @@ def middle_section(geometry: ChamberGeometry, *, surface_radius: float, coarse: 
     places = ((1 - share) * body.nodes[edges[:, 0]] + share * body.nodes[edges[:, 1]])[:, :2]
     scale = float(np.hypot(*places.T).max())
     corners, pairs = np.split(numbers.ravel(), [3 * len(triangles)])
-    mesh = MeshTri1(
-        np.ascontiguousarray(places.T / scale), np.ascontiguousarray(corners.reshape(-1, 3).T)
-    )
+    mesh = MeshTri1(np.ascontiguousarray(places.T / scale), np.ascontiguousarray(corners.reshape(-1, 3).T))
     by_name = {
         name: pairs.reshape(-1, 2)[names[names >= 0][cut] == number] for number, name in enumerate(body.names)
     }
@@ -110,19 +108,21 @@ def _crossings(simplices: IntArray, above: BoolArray) -> tuple[IntArray, IntArra
 
 
 def _with_boundaries(mesh: Any, by_name: dict[str, IntArray]) -> Any:
-    """The mesh with facets named by their ends. Raises: NoPlaneWaves."""
+    """The mesh with facets named by their ends. Raises: NoPlaneWavesError."""
     size = mesh.p.shape[1]
     known = mesh.facets[0].astype(np.int64) * size + mesh.facets[1]
     order = np.argsort(known)
 
     def facets(pairs: IntArray) -> IntArray:
         low, high = np.sort(pairs.astype(np.int64), axis=1).T
-        return order[np.searchsorted(known[order], low * size + high)].astype(np.int32)
+        return np.asarray(order[np.searchsorted(known[order], low * size + high)], dtype=np.int32)
 
     named = {name: facets(pairs) for name, pairs in by_name.items() if len(pairs)}
     rim = mesh.boundary_facets()
     whole = np.sort(np.concatenate(list(named.values()))) if named else np.empty(0)
-    surface = mesh.facets[:, named[FREE_SURFACE]] if FREE_SURFACE in named else np.empty((2, 0), dtype=np.int64)
+    surface = (
+        mesh.facets[:, named[FREE_SURFACE]] if FREE_SURFACE in named else np.empty((2, 0), dtype=np.int64)
+    )
     ends = np.bincount(surface.ravel(), minlength=1)
     if not (
         np.array_equal(whole, np.sort(rim))
@@ -131,7 +131,7 @@ def _with_boundaries(mesh: Any, by_name: dict[str, IntArray]) -> Any:
         and ends.max() == 2
         and OUTER_WALL in named
     ):
-        raise NoPlaneWaves(
+        raise NoPlaneWavesError(
             "in the chamber's middle the free surface is not one line from wall to wall, or a wall stands "
             "alone in the liquid: no plane waves are solved there"
         )

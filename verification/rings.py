@@ -88,7 +88,7 @@ def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> 
 
 @contextmanager
 def mutated_force(*, along: float = 1.0, across: float = 1.0) -> Iterator[None]:
-    """Multiply the body force of every rotating liquid solved inside, along the chamber's middle and across."""
+    """Multiply the body force of every liquid solved inside, along the chamber's middle and across it."""
     true = RotatingLiquid.body_force
 
     def body_force(liquid: RotatingLiquid, places: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Quadratic elements on the liquid's meshes: the stiffness, named sides, and the linear solve, on scikit-fem."""
+"""Quadratic elements of scikit-fem on the liquid's meshes: stiffness, named sides, and the linear solve."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
+import pyamg
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.linalg import cg, splu
 from skfem import Basis, ElementTetP2
@@ -26,10 +27,10 @@ _MOST_STEPS: Final = 500
 
 
 def quadratic_basis(mesh: Any) -> Any:
-    """`skfem.Basis` of the mesh's own quadratic elements; each a few lengths deep.
+    """`skfem.Basis` of the mesh's own quadratic elements.
 
     Quadrature of order 4 on quadrilaterals and hexahedra: by default scikit-fem takes 343 points in a
-    hexahedron, with the same errors.  Of order 2 on tetrahedra: exact for straight ones, and of the same order
+    hexahedron, with the same errors.  Of order 2 on tetrahedra: exact for straight ones, of the same order
     for curved ones; that of order 3 has a negative weight.
     """
     return Basis(mesh, mesh.elem(), intorder=2 if mesh.elem is ElementTetP2 else 4)
@@ -109,7 +110,9 @@ def side(mesh: Any, boundary: str) -> Side:
     inside = mesh.p[:, mesh.t[:, mesh.f2t[0, facets]]].mean(axis=1)
     outward = mesh.p[:, corners[:, facets]].mean(axis=1) - inside
     area *= np.sign(np.einsum("xfq,xf->fq", area, outward))
-    return Side(nodes=nodes, values=values, points=np.einsum("xnf,nq->xfq", mesh.doflocs[:, nodes], values), area=area)
+    return Side(
+        nodes=nodes, values=values, points=np.einsum("xnf,nq->xfq", mesh.doflocs[:, nodes], values), area=area
+    )
 
 
 def _normal(tangents: FloatArray) -> FloatArray:
@@ -158,16 +161,13 @@ def _factorised(matrix: csr_matrix, right: FloatArray) -> FloatArray:
 
 
 def _by_multigrid(matrix: csr_matrix, right: FloatArray) -> tuple[FloatArray, int]:
-    # Few solves are so large, and the import takes longer than a calibration.
-    import pyamg  # noqa: PLC0415
-
     steps: list[None] = []
     # No part needs a spectral radius, which pyamg would estimate from random vectors.
     sweeps = ("gauss_seidel", {"sweep": "symmetric"})
     hierarchy = pyamg.smoothed_aggregation_solver(
-        matrix,
+        matrix.sorted_indices(),  # in any other order its aggregates differ from run to run
         symmetry="symmetric",
-        strength=("symmetric", {"theta": 0.05}),
+        strength=("symmetric", {"theta": 0.1}),
         smooth=("energy", {"krylov": "cg", "maxiter": 2}),
         presmoother=sweeps,
         postsmoother=sweeps,

@@ -137,7 +137,9 @@ def _held_volume(chamber: Tetrahedra, level: Level, radius: float) -> tuple[_Hel
         if abs(shortage) <= _VOLUME_TOLERANCE * target:
             return _Held(liquid=liquid, level=level), Status()
         # A level lower by d moves the surface out of the liquid by d / |gradient|.
-        growth = np.sum(surface.weights / np.linalg.norm(level.gradient(np.moveaxis(surface.points, 0, -1)), axis=-1))
+        growth = np.sum(
+            surface.weights / np.linalg.norm(level.gradient(np.moveaxis(surface.points, 0, -1)), axis=-1)
+        )
         level = Level(constant=level.constant - shortage / float(growth), tilt=level.tilt)
         liquid = liquid_body(chamber, level)
     text = "no free surface under gravity holds this volume: use a finer mesh"

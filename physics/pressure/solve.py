@@ -1,7 +1,7 @@
 """The pressure of the liquid in a chamber that turns: a Poisson problem with the gas on its free surface.
 
-In the rotating frame liquid at rest obeys grad p = f, f = rho (omega^2 r e_r + g).  With p = p_gas on the free
-surface the weak form is
+In the rotating frame liquid at rest obeys grad p = f, f = rho (omega^2 r e_r + g).  With p = p_gas on the
+free surface the weak form is
 
     int grad p . grad v = int f . grad v      for all v that vanish on the free surface,
 
@@ -129,7 +129,7 @@ class WeakProblem:
         return LinearSolution(values=values, status=linear.status, statistics=linear.statistics)
 
 
-@LinearForm
+@LinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
 def _work(v: Any, w: Any) -> Any:
     return dot(w.force, grad(v))
 

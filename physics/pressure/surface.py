@@ -220,9 +220,7 @@ def _far_too_thin(disc: Disc, liquid: RotatingLiquid, radius: float) -> bool:
     return fall > 100 * liquid.angular_velocity**2 * radius * (disc.outer_radius - radius)
 
 
-def _wanted_move(
-    chamber: ChamberMesh, basis: Any, liquid: RotatingLiquid, target: float
-) -> FloatArray:
+def _wanted_move(chamber: ChamberMesh, basis: Any, liquid: RotatingLiquid, target: float) -> FloatArray:
     """Radial move of every surface node, m."""
     unit = chamber.length_scale
     # With the force given on the whole boundary the pressure is free by a constant: one node holds it.
@@ -245,9 +243,7 @@ def _damping(disc: Disc, radius: FloatArray, move: FloatArray) -> float:
         return float(min(1.0, _SAFE_SHARE * np.min(room / np.abs(move))))
 
 
-def _hold_volume(
-    disc: Disc, chamber: ChamberMesh, basis: Any, target: float
-) -> tuple[ChamberMesh, Any]:
+def _hold_volume(disc: Disc, chamber: ChamberMesh, basis: Any, target: float) -> tuple[ChamberMesh, Any]:
     """Take the last rounding out of the volume by equal moves of all nodes."""
     for _ in range(3):
         surplus = float(basis.dx.sum()) - target

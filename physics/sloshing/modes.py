@@ -40,7 +40,7 @@ class _SloshingModes:
 
 @dataclass(frozen=True, kw_only=True)
 class Meshes:
-    """On which a chamber's waves are solved: those given of a sector, two of an imported chamber's section."""
+    """On which waves are solved: those given of a sector, two of an imported chamber's section."""
 
     disc: Disc
     cells: tuple[tuple[int, int], ...]
@@ -99,7 +99,7 @@ def sloshing_modes(
     Validity: small planar waves without viscosity on a circular surface, that is g much smaller than
     omega^2 a; the ends are flat and the section is the same along the shaft, so gravity across it drives no
     others.
-    Source: Eq. 10 of the liquid-ring paper with the inertia that it leaves out; derived in `sloshing_system`.
+    Source: Eq. 10 of the liquid-ring paper with the inertia that it leaves out; derived in `section_system`.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)) or modes < 1:

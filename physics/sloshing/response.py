@@ -67,9 +67,10 @@ def sloshing_response(
         cells: three meshes or more, finest first; default those of `sloshing_modes`.
     Returns: SloshingResponse; status says where the waves might not be small, or gravity leaves no ring.
     Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
-    Validity: small planar waves, of an imported chamber those of its middle section; thin Stokes layers on all walls without the Coriolis force, which makes the
-        damping, and with it a peak, good to a factor of about two.
-    Source: derived in `sloshing_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
+    Validity: small planar waves, of an imported chamber those of its middle section: waves along the shaft,
+        and what a section that changes along it does to them, are left out; thin Stokes layers on all walls
+        without the Coriolis force, which makes the damping, and with it a peak, good to a factor of two.
+    Source: derived in `section_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     _check(fills, angular_velocity, kinematic_viscosity, gravity, frequency_ratio)
@@ -84,10 +85,7 @@ def sloshing_response(
 
     found = np.array([[on_mesh(float(a), level) for level in meshes.levels] for a in radii])
     widths = np.array(
-        [
-            [meshes.half_width(values, float(a)) for values in at.T]
-            for a, at in zip(radii, found, strict=True)
-        ]
+        [[meshes.half_width(values, float(a)) for values in at.T] for a, at in zip(radii, found, strict=True)]
     )
     scale = gravity / angular_velocity**2
     amplitude = Estimate(value=scale * found[:, 0, 1], uncertainty=scale * widths[:, 1])

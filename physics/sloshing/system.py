@@ -109,7 +109,7 @@ def imported_system(
 ) -> tuple[SloshingSystem, float]:
     """The problem in the middle section of an imported chamber, and its unit of length, m.
 
-    Args: `width`: of the chamber, m. `coarse`: on the corners of the cells alone.
+    Args: `coarse`: on the corners of the cells alone.
     Raises: ValueError: as `middle_section`.
     """
     section: Section = middle_section(geometry, surface_radius=surface_radius, coarse=coarse)
@@ -129,7 +129,10 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
     def along(facets: Any) -> Any:
         return FacetBasis(mesh, element, mapping=near, facets=facets, intorder=6)
 
-    top, sides = along(FREE_SURFACE), along(np.setdiff1d(mesh.boundary_facets(), mesh.boundaries[FREE_SURFACE]))
+    top, sides = (
+        along(FREE_SURFACE),
+        along(np.setdiff1d(mesh.boundary_facets(), mesh.boundaries[FREE_SURFACE])),
+    )
     surface, walls = basis.get_dofs(top.find).all(), basis.get_dofs(sides.find).all()
     kept, inner = np.setdiff1d(surface, walls), np.setdiff1d(np.arange(basis.N), np.union1d(surface, walls))
     matrix = stiffness(basis)
@@ -162,7 +165,7 @@ def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
 
 
 class _Near(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no types
-    """In a film rounding exceeds the absolute 1e-12 at which scikit-fem's Newton method ends; it is quadratic."""
+    """In a film rounding exceeds the 1e-12 where scikit-fem's Newton method ends; it is quadratic."""
 
     def invF(self, x: Any, tind: Any = None, **_: Any) -> Any:  # noqa: N802
         return super().invF(x, tind, newton_tol=1e-6)
@@ -181,17 +184,17 @@ def _outward(psi: Any, w: Any) -> Any:
     return w.n[0] * grad(psi)[1] - w.n[1] * grad(psi)[0]
 
 
-@BilinearForm
+@BilinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
 def _coriolis(psi: Any, v: Any, w: Any) -> Any:
     return (psi * _outward(v, w) - v * _outward(psi, w)) / 2
 
 
-@BilinearForm
+@BilinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
 def _centrifugal(psi: Any, v: Any, w: Any) -> Any:
     return np.hypot(*w.x) * _outward(psi, w) * _outward(v, w)
 
 
-@BilinearForm
+@BilinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
 def _turned(psi: Any, v: Any, _: Any) -> Any:
     return grad(psi)[1] * grad(v)[0] - grad(psi)[0] * grad(v)[1]
 

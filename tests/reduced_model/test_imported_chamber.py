@@ -11,6 +11,7 @@ import pytest
 
 from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.chamber import element_check
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import share_across

@@ -74,9 +74,7 @@ def carry(
     count: int,
     w: FloatArray,
 ) -> float:
-    """The one way in from Python, so that what both of these need is made into machine code once.
-
-    Lets a time pass for `motions[0]` as `advance` does, with its fills in row 1 of `notes`; or, given a
+    """Let a time pass for `motions[0]` as `advance` does, with its fills in row 1 of `notes`; or, given a
     driven chamber, which is not below zero, finds its `opening_within` on `motions[1]`.  Returns: a time, s.
     """
     if chamber >= 0:

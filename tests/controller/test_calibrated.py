@@ -18,7 +18,8 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.verification.reference.transfers import Drive, adaptive_ode, marched
+from ringbalance.verification.reference.marched import marched
+from ringbalance.verification.reference.transfers import Drive, adaptive_ode
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 

@@ -13,13 +13,13 @@ from ringbalance import bundled_scene, load_scene
 from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.verification.reference.marched import marched
 from ringbalance.verification.reference.transfers import (
     Drive,
     Integrator,
     adaptive_ode,
     closed_form,
     explicit_segments,
-    marched,
 )
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)

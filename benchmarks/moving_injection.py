@@ -251,7 +251,6 @@ def rows(repeats: int) -> list[dict[str, object]]:
     scene = piped_scene()
     model = calibrate(scene).model
     dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG, HELD))
-    assert dynamics is not None
     rival, found = Rival(scene, model), []
     for duration in DURATIONS:
         exact = ours(dynamics, duration, error=1e-10, count=1)

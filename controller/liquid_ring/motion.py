@@ -343,6 +343,9 @@ def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:
         )
         square = flow.velocity * np.abs(flow.velocity)
         powers = PchipInterpolator(np.arange(PIECES + 1.0), square).c[::-1]
+        ends = square[:-1] * square[1:] <= 0
+        powers[:, ends] = 0.0
+        powers[0, ends], powers[1, ends] = square[:-1][ends], np.diff(square)[ends]
         plant["cells"][0, which] = np.stack([*powers, flow.primed[:-1], flow.regime[:-1]], axis=1)
 
 

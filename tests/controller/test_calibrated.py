@@ -15,9 +15,11 @@ from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.transfers import Drive, adaptive_ode, marched
+from ringbalance.scene.origins import InputUncertainty
+from ringbalance.verification.reference.marched import marched
+from ringbalance.verification.reference.transfers import Drive, adaptive_ode
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 
@@ -43,7 +45,7 @@ def drive_of(model: BalancerModel, *, fill: float, pressure: float, primed: bool
     [
         (0.45, 0.7e6, Regime.SEPARATED, Event.NONE),
         (0.25, 0.7e6, Regime.SEPARATED, Event.EMPTY),
-        (0.15, 1.5e6, Regime.UNDECIDED, Event.EMPTY),
+        (0.15, 1.5e6, Regime.SIPHON, Event.EMPTY),
         (0.15, 2.5e6, Regime.SIPHON, Event.EMPTY),
     ],
 )

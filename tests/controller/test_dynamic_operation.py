@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Column, Dynamics, PairState
+from ringbalance.controller.liquid_ring.motion import Dynamics, PairState
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.loop import simulate
@@ -388,8 +388,3 @@ def test_energy_is_pressure_times_displaced_volume(scene: Scene, model: Balancer
         volume = (done.fill_before - done.fill_after) * model.chamber_volume
         assert done.energy == pytest.approx(0.7e6 * volume, rel=1e-12)
     assert run.energy == pytest.approx(math.fsum(i.operation.energy for i in run.injections))
-
-
-def test_a_column_is_only_made_for_laws_with_forces(scene: Scene, laws: Any) -> None:
-    assert Column.of(law=laws["constant"], tube=scene.tube) is None
-    assert isinstance(Column.of(law=calibrate(scene).flow_law, tube=scene.tube), Column)

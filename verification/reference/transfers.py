@@ -1,5 +1,5 @@
 """One operation of a pair under its flow law alone, in ways other than the program's own: the paper's closed
-form, Eq. 20's explicit segments and an adaptive Runge-Kutta method with events; and the program's march.
+form, Eq. 20's explicit segments and an adaptive Runge-Kutta method with events.
 
 The driven chamber's fill ratio x obeys dx/dt = -(S/V) u(x_A, x_C, p) with x_C = total - x, which is taken in
 `Drive.opposite` and nowhere else: liquid is conserved by construction.
@@ -16,13 +16,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.liquid_ring.interval import opened, pass_time
-from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Motion, PairState
 from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray, clipped
-from ringbalance.scene.models import Tube
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,45 +209,6 @@ def _linear_course(
     if left <= 0.0:
         return u0, slowing, u0 / slowing, True
     return u0, slowing, 2.0 * distance / (u0 + math.sqrt(left)), False
-
-
-def marched(tube: Tube) -> Integrator:
-    """The march that every run takes, without a term beyond the flow law; its error is that of one run."""
-
-    def integrate(drive: Drive, instants: FloatArray) -> Transfer:
-        t = checked_instants(instants)
-        dynamics = Dynamics(
-            column=Column.of(law=drive.law, tube=tube),
-            inertia=False,
-            line=None,
-            valve_lag=0.0,
-            gas_pressure=drive.gas_pressure,
-            ambient_pressure=1e5,
-            dead_volume=0.0,
-            tube_area=drive.exchange_rate,
-            chamber_volume=1.0,
-            max_fill_ratio=drive.law.max_fill_ratio,
-        )
-        valve = opened(dynamics, chamber=0, duration=2 * float(t[-1]) + 1)
-        pair = PairState(
-            fill=drive.fill,
-            total=drive.total,
-            primed=drive.primed,
-            motion=Motion(pending=valve if drive.gas_pressure > 0 else ()),
-        )
-        path = pass_time(dynamics, pair, instants=t)
-        record = path.motion.record
-        return Transfer(
-            instants=t,
-            fill=path.fills,
-            regime_start=record.regime_start,
-            regime_end=record.regime_end,
-            event=record.event,
-            event_time=path.ended if record.event is not Event.NONE else None,
-            primed=path.primed,
-        )
-
-    return integrate
 
 
 def paper_drive(law: PaperLaw, *, gas_pressure: float, fill: float, total: float) -> Drive:

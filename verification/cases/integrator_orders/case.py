@@ -28,13 +28,13 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, Table, as_found, figure
 from ringbalance.verification.orders import OrderStudy
+from ringbalance.verification.reference.marched import marched
 from ringbalance.verification.reference.transfers import (
     Drive,
     Integrator,
     adaptive_ode,
     closed_form,
     explicit_segments,
-    marched,
     paper_drive,
 )
 

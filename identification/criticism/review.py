@@ -113,8 +113,8 @@ class Review:
 def _comparisons(result: FitResult, found: _AtSolution) -> Iterator[LawComparison]:
     best = result.optimum
     problem, scene = best.residuals.problem, best.residuals.problem.scene_at(best.t)
-    predictions = _by_other_tubes if isinstance(scene, Scene) else _by_other_machines
-    for name, predicted in predictions(problem, scene):
+    # Each yields nothing without data of the kinds that it is about.
+    for name, predicted in (*_by_other_tubes(problem, scene), *_by_other_machines(problem, scene)):
         residuals = found.turned(best.residuals.at(best.t, predicted=predicted))
         yield LawComparison.of(found.fit, other=name, residuals=residuals)
 

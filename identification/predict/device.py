@@ -68,6 +68,11 @@ class Models:
             gas_pressure=scene.gas.pressure - scene.gas.gauge_correction,
         )
 
+    def with_gauge_correction(self, scene: Scene) -> Scene:
+        """A fitted scene that says by how much the gauge of the data is off."""
+        off = scene.gas.pressure - self.gas_pressure
+        return replace(scene, gas=replace(scene.gas, gauge_correction=off))
+
 
 def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
     """Of a primed tube at equal fills under the scene's gas, m/s; zero where it is blocked."""

@@ -136,12 +136,10 @@ def _triangles(space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntAr
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-@BilinearForm
 def _squared_slope(u: Any, v: Any, w: Any) -> Any:
     return w.weight * dot(grad(u), grad(v))
 
 
-@LinearForm
 def _slope_along(v: Any, w: Any) -> Any:
     return w.weight * (w.across[0] * grad(v)[0] + w.across[1] * grad(v)[1])
 
@@ -150,8 +148,8 @@ def _potential(
     space: FlowSpace, gradient: FloatArray, known: IntArray, values: FloatArray, weight: FloatArray
 ) -> FloatArray:
     """Nodal psi with known values at some nodes whose gradient is nearest to a given one, by a weight."""
-    matrix = _squared_slope.assemble(space.velocity, weight=weight)
-    right = _slope_along.assemble(space.velocity, weight=weight, across=gradient)
+    matrix = BilinearForm(_squared_slope).assemble(space.velocity, weight=weight)
+    right = LinearForm(_slope_along).assemble(space.velocity, weight=weight, across=gradient)
     psi = np.zeros(space.velocity_nodes)
     psi[known] = values
     return np.asarray(solve(*condense(matrix, right, x=psi, D=known)), dtype=np.float64)

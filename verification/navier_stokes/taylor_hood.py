@@ -47,27 +47,22 @@ _ORDER = 6
 """Of the quadrature: exact for two quadratic functions and a quadratic coefficient on straight cells."""
 
 
-@BilinearForm
 def _stiffness(u: Any, v: Any, w: Any) -> Any:
     return w.measure * dot(grad(u), grad(v))
 
 
-@BilinearForm
 def _transposed(u: Any, v: Any, w: Any) -> Any:
     return w.measure * grad(v)[w.column] * grad(u)[w.row]
 
 
-@BilinearForm
 def mass_between(u: Any, v: Any, w: Any) -> Any:
     return w.measure * u * v
 
 
-@BilinearForm
 def _slope(u: Any, q: Any, w: Any) -> Any:
     return w.measure * grad(u)[w.direction] * q
 
 
-@LinearForm
 def _load(v: Any, w: Any) -> Any:
     return w.measure * v
 
@@ -176,7 +171,9 @@ class FlowSpace:
 
     def load(self, values: FloatArray | float = 1.0) -> FloatArray:
         """Integral of a function, shape (elements, points), against every velocity shape function."""
-        return np.asarray(_load.assemble(self.velocity, measure=self.measure * values), dtype=np.float64)
+        return np.asarray(
+            LinearForm(_load).assemble(self.velocity, measure=self.measure * values), dtype=np.float64
+        )
 
     def at_points(self, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Velocity and its gradient at the quadrature points, from nodal values (components, velocity nodes).
@@ -304,7 +301,9 @@ class FlowSystem:
             fixed_values=values,
             source=_loads(space, force),
             flow_load=_loads(space, flow),
-            mean_load=np.asarray(_load.assemble(space.pressure, measure=space.measure), dtype=np.float64),
+            mean_load=np.asarray(
+                LinearForm(_load).assemble(space.pressure, measure=space.measure), dtype=np.float64
+            ),
             viscous=_viscous_blocks(space, stress_form),
             mass=space.mass(),
             gradient=_gradient(space),
@@ -357,14 +356,14 @@ def _sum(viscosity: float, viscous: Any, turning: float, mass: Any) -> Any:
 
 def _viscous_blocks(space: FlowSpace, stress_form: bool) -> list[list[Any]]:
     count, basis = space.components, space.velocity
-    stiffness = _stiffness.assemble(basis, measure=space.measure)
+    stiffness = BilinearForm(_stiffness).assemble(basis, measure=space.measure)
     blocks: list[list[Any]] = [[stiffness if c == d else None for d in range(count)] for c in range(count)]
     if space.axisymmetric:
         blocks[1][1] = stiffness + space.mass(1 / space.points[1] ** 2)
     if stress_form:
         for c in range(space.dimension):
             for d in range(space.dimension):
-                turned = _transposed.assemble(basis, measure=space.measure, row=c, column=d)
+                turned = BilinearForm(_transposed).assemble(basis, measure=space.measure, row=c, column=d)
                 blocks[c][d] = turned if blocks[c][d] is None else blocks[c][d] + turned
     return blocks
 
@@ -376,9 +375,11 @@ def _gradient(space: FlowSpace) -> Any:
         if direction >= space.dimension:
             parts.append(sparse.csr_matrix((space.pressure_nodes, space.velocity_nodes)))
             continue
-        part = _slope.assemble(space.velocity, space.pressure, measure=space.measure, direction=direction)
+        part = BilinearForm(_slope).assemble(
+            space.velocity, space.pressure, measure=space.measure, direction=direction
+        )
         if space.axisymmetric and direction == 1:
-            part = part + mass_between.assemble(space.velocity, space.pressure, measure=1.0)
+            part = part + BilinearForm(mass_between).assemble(space.velocity, space.pressure, measure=1.0)
         parts.append(part)
     return -sparse.hstack(parts, format="csr").T.tocsr()
 

@@ -21,6 +21,7 @@ from typing import Any, Final
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigs
+from skfem import BilinearForm
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
@@ -186,7 +187,7 @@ def _matrices(system: FlowSystem, flow: FlowSolution, c: Coefficients, along: fl
     if c.inertia != 0.0:
         zero = zero + c.inertia * system.convection_matrix(flow.vector)
     carried = c.inertia * space.mass(space.at_points(flow.velocity)[0][2])
-    coupling = mass_between.assemble(space.velocity, space.pressure, measure=space.measure)
+    coupling = BilinearForm(mass_between).assemble(space.velocity, space.pressure, measure=space.measure)
     nothing = sparse.csr_matrix((space.pressure_nodes,) * 2)
     one = sparse.block_diag([*[carried] * 3, nothing], format="lil")
     first = 3 * space.velocity_nodes

@@ -59,7 +59,7 @@ def _tuned(tuning: Record) -> str:
     if reached is None:
         return f"{tuning['status'][0].upper()}{tuning['status'][1:]}."
     return (
-        f"With the fuller models that the tolerance selects, {runs_settled(tuning)} settle with the "
+        f"With every term of an injection modelled, {runs_settled(tuning)} settle with the "
         f"recommended settings, {percent(0.95)} of all within {shown(reached, 's', digits=2)}."
     )
 

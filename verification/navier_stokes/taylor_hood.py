@@ -55,7 +55,7 @@ def _transposed(u: Any, v: Any, w: Any) -> Any:
     return w.measure * grad(v)[w.column] * grad(u)[w.row]
 
 
-def mass_between(u: Any, v: Any, w: Any) -> Any:
+def _mass(u: Any, v: Any, w: Any) -> Any:
     return w.measure * u * v
 
 
@@ -163,6 +163,11 @@ class FlowSpace:
         products = np.einsum("iq,jq->qij", self.shape, self.shape)
         local = (self.weights * coefficient) @ products.reshape(products.shape[0], -1)
         return _assembled(self.velocity, local.reshape(-1, *products.shape[1:]))
+
+    def pressure_mass(self, coefficient: FloatArray | float = 1.0) -> Any:
+        """Matrix of integral(coefficient psi_i N_j), pressure against velocity shape functions."""
+        measure = self.measure * coefficient
+        return BilinearForm(_mass).assemble(self.velocity, self.pressure, measure=measure)
 
     def convection(self, carrier: FloatArray) -> Any:
         """Matrix of integral(N_i carrier . grad N_j), the carrier of shape (dimension, elements, points)."""
@@ -379,7 +384,7 @@ def _gradient(space: FlowSpace) -> Any:
             space.velocity, space.pressure, measure=space.measure, direction=direction
         )
         if space.axisymmetric and direction == 1:
-            part = part + BilinearForm(mass_between).assemble(space.velocity, space.pressure, measure=1.0)
+            part = part + space.pressure_mass(1 / space.measure)
         parts.append(part)
     return -sparse.hstack(parts, format="csr").T.tocsr()
 

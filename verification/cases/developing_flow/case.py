@@ -21,7 +21,6 @@ from typing import Any, Final
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigs
-from skfem import BilinearForm
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
@@ -39,7 +38,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
 from ringbalance.verification.navier_stokes.taylor_hood import (
     Coefficients,
     FlowSystem,
-    mass_between,
 )
 
 _CREEPING: Final = 2 * (4.46629832 + 1.46746761j)
@@ -187,7 +185,7 @@ def _matrices(system: FlowSystem, flow: FlowSolution, c: Coefficients, along: fl
     if c.inertia != 0.0:
         zero = zero + c.inertia * system.convection_matrix(flow.vector)
     carried = c.inertia * space.mass(space.at_points(flow.velocity)[0][2])
-    coupling = BilinearForm(mass_between).assemble(space.velocity, space.pressure, measure=space.measure)
+    coupling = space.pressure_mass()
     nothing = sparse.csr_matrix((space.pressure_nodes,) * 2)
     one = sparse.block_diag([*[carried] * 3, nothing], format="lil")
     first = 3 * space.velocity_nodes

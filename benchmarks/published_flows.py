@@ -16,7 +16,8 @@ from ringbalance.verification.navier_stokes.meshes import (
     with_midpoints,
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
-from ringbalance.verification.navier_stokes.taylor_hood import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 Field = Callable[[FloatArray], FloatArray]
 

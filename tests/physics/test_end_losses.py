@@ -22,7 +22,7 @@ from ringbalance.verification.navier_stokes.end_losses import (
     solve_end,
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution
-from ringbalance.verification.navier_stokes.taylor_hood import FlowSystem
+from ringbalance.verification.navier_stokes.system import FlowSystem
 
 
 def _cells(end: End) -> EndMesh:

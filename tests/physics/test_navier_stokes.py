@@ -25,7 +25,8 @@ from skfem import MeshHex, MeshTet
 from ringbalance.physics.results import StatusCode
 from ringbalance.verification.navier_stokes.meshes import Patch, patch_mesh
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
-from ringbalance.verification.navier_stokes.taylor_hood import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 DATA = Path(__file__).parent / "data"
 

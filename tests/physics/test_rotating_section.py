@@ -35,7 +35,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.taylor_hood import FlowSystem
+from ringbalance.verification.navier_stokes.system import FlowSystem
 
 
 @cache

@@ -27,7 +27,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.taylor_hood import Coefficients, FlowSystem
+from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 from ringbalance.verification.reference import bent_tube
 
 Array = np.ndarray

@@ -25,7 +25,8 @@ import numpy as np
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.meshes import Patch, patch_mesh, with_midpoints
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
-from ringbalance.verification.navier_stokes.taylor_hood import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 End = Literal["entrance", "exit"]
 

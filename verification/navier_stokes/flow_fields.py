@@ -24,7 +24,8 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
     friction_ratio,
 )
-from ringbalance.verification.navier_stokes.taylor_hood import Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.space import FlowSpace
+from ringbalance.verification.navier_stokes.system import Dirichlet, FlowSystem
 
 LARGEST_KL: Final = 1e6
 """R Re up to which the section is drawn; near it further steady flows appear."""

@@ -15,7 +15,7 @@ import numpy as np
 from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.linear import Factors
-from ringbalance.verification.navier_stokes.taylor_hood import Coefficients, FlowSystem
+from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 
 
 @dataclass(frozen=True, kw_only=True)

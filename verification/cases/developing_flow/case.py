@@ -35,10 +35,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.taylor_hood import (
-    Coefficients,
-    FlowSystem,
-)
+from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 
 _CREEPING: Final = 2 * (4.46629832 + 1.46746761j)
 """Per diameter: root of z (J0^2 + J1^2) = 2 J0 J1 per radius."""

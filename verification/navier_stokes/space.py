@@ -1,4 +1,4 @@
-"""Taylor-Hood space of scikit-fem's elements on a straight or curved mesh: quadratic velocity, linear pressure.
+"""Taylor-Hood space by scikit-fem on a straight or curved mesh: quadratic velocity, linear pressure.
 
 Unknowns are the velocity components one after the other, then the pressure.
 Source: Taylor and Hood, Comput. Fluids 1 (1973) 73.

@@ -129,9 +129,7 @@ class FlowSystem:
             fixed_values=values,
             source=_loads(space, force),
             flow_load=_loads(space, flow),
-            mean_load=np.asarray(
-                LinearForm(_load).assemble(space.pressure, measure=space.measure), dtype=np.float64
-            ),
+            mean_load=space.pressure_load(),
             viscous=_viscous_blocks(space, stress_form),
             mass=space.mass(),
             gradient=_gradient(space),

@@ -11,15 +11,16 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.results import Estimate, Statistics, Status
+from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
 from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect
-from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
 from ringbalance.reduced_model.chamber.pressure_table import even_table, pressure_table
 from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.reduced_model.tables import HermiteTable, level_table
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import Scene
 
 FILL_STEP: Final = 0.05
@@ -67,6 +68,32 @@ class Curve:
         squares = (self.uncertainty**2 + inputs**2)[:count] + self.interpolation**2
         # Errors step from node to node: where walls do, and where waves may become resonant.
         return level_table(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
+
+
+CHAMBER_INPUTS: Final = (
+    "outer_radius",
+    "inner_radius",
+    "axial_width",
+    "central_angle",
+    "plate_thickness",
+    "density",
+    "speed",
+    "lambda_factor",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputEffect:
+    """Expanded uncertainties (95 %) by one input at a fixed fill ratio; arrays along the fill ratio."""
+
+    wall_pressure: FloatArray
+    """Pa."""
+    hydrostatic_pressure: FloatArray
+    """Pa."""
+    moment: FloatArray
+    """kg m."""
+    moment_per_mass: float
+    """lambda at equal fills, m."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -138,7 +165,7 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     ring = RingValues.of(scene, fill_ratio=fills, gravity=modelled)
     check = ElementCheck.of(scene, values=ring, gravity=modelled)
     unmodelled = unmodelled_fractions(scene, fills)
-    effects = input_effects(scene=scene, fill_ratio=fills)
+    effects = _input_effects(scene, fills)
     ring, effect = _as_measured(scene, ring, effect)
     waves = chamber_status(scene)
     scale = 0.0 if modelled else SAFETY
@@ -186,6 +213,27 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         status=_first(ring.status, check.status, waves),
         statistics=check.elements.statistics,
     )
+
+
+def _input_effects(scene: Scene, fills: FloatArray) -> dict[str, InputEffect]:
+    """By quantity, "fitted" for those that were fitted together; by closed forms."""
+    places = np.append(fills, scene.disc.max_fill_ratio / 2)[:, None]
+
+    def values(designs: Designs) -> FloatArray:
+        wall, moment, ratio = measured_closed_forms(scene=designs.scene, fill_ratio=places)
+        level = chamber_pressure(scene=designs.scene, fill_ratio=places)
+        return np.array(np.broadcast_arrays(wall, level, moment, ratio))
+
+    effects = input_effects(scene, values, among=CHAMBER_INPUTS, errors=False)[1]
+    return {
+        name: InputEffect(
+            wall_pressure=each[0, :-1],
+            hydrostatic_pressure=each[1, :-1],
+            moment=each[2, :-1],
+            moment_per_mass=float(each[3, -1]),
+        )
+        for name, each in effects.items()
+    }
 
 
 def _first(*statuses: Status) -> Status:

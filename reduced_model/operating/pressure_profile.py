@@ -15,7 +15,6 @@ from ringbalance.physics.pressure.hydrostatics import column_radius
 from ringbalance.physics.roots import bracketed_root
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.physics.tube.uncertainty import corrected_state
-from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.operating.crest_margin import DirectedState
@@ -27,7 +26,7 @@ from ringbalance.reduced_model.tube.path import (
     reversed_tube,
     share_at_radius,
 )
-from ringbalance.reduced_model.tube.regime import TubeEnds
+from ringbalance.reduced_model.tube.regime import TubeEnds, column_pressure
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
 

@@ -15,7 +15,13 @@ from typing import Any, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.physics.gas import vented_pressure
+from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
+from ringbalance.scene.arrays import BoolArray, FloatArray, plain
+from ringbalance.scene.joint import fitted_causes
+from ringbalance.scene.models import Scene
+from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
+from ringbalance.scene.uncertain import NORMAL_95
 
 CLEARING: Final = (0.6, 1.1)
 """Froude numbers u/sqrt(g_c d), g_c = omega^2 r_m, below which gas stays over the crest, and above which the
@@ -141,7 +147,7 @@ class SiphonCrest(Generic[Pressure]):
         """
         gas = ends.downstream_gas
         low = _choose(ends.downstream_open(), gas, self.vapour_pressure)
-        return low, low if self.released == 0 else _larger(gas, low)
+        return low, low if np.all(np.asarray(self.released) == 0) else _larger(gas, low)
 
     def resting_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
         """Crest pressure of a column at rest, p_A + P_A - D_m, Pa."""
@@ -165,7 +171,7 @@ class SiphonCrest(Generic[Pressure]):
 
         Zero below and one above `CLEARING`, smooth between: which of both holds there is not known.
         """
-        if self.froude_velocity == 0:
+        if np.all(np.asarray(self.froude_velocity) == 0):
             return velocity * 0 + 1
         low, high = CLEARING
         part = (velocity / self.froude_velocity - low) / (high - low)
@@ -240,7 +246,8 @@ class TubePath:
             downstream_hydrostatic=self.port_pressure,
             port_pressure=self.port_pressure,
         )
-        return -float(self.crest.separation_margin(still))
+        highest: float = plain(-self.crest.separation_margin(still))
+        return highest
 
     def holds(self, level: float) -> bool:
         """Whether a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off."""
@@ -249,6 +256,44 @@ class TubePath:
     def holding_pressure(self, level: float) -> float:
         """D_m of a crest from which on it lasts whatever the pressure of a cavity over the crest, Pa."""
         return level - min(self.vapour_pressure, 0.0)
+
+
+def tube_path(scene: Scene) -> TubePath:
+    """Radii of the tube as pressures of a column that reaches from there to the outer radius R2.
+
+    Source: p(r) = rho omega^2 r^2/2 of liquid at rest in the rotating frame.
+    """
+    hump, error = scene.tube.hump_radius, scene.tube.model_error
+    crest = 0.0 if hump is None else hump
+    froude = 1 + CLEARING_UNCERTAINTY * error(CLEARING_ERROR) / NORMAL_95
+    # With dissolved gas both ends of what the cavity's pressure may be are in its uncertainty.
+    released = plain(np.clip(RELEASED * (1 + error(CAVITY_ERROR) / NORMAL_95), 0.0, 1.0))
+    fitted = fitted_causes(scene)
+    return TubePath(
+        density=scene.liquid.density,
+        port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
+        hump_pressure=None if hump is None else column_pressure(scene=scene, radius=hump),
+        trapped=scene.tube.hump_gas == "trapped",
+        vapour_pressure=scene.liquid.vapour_pressure - vented_pressure(scene),
+        released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
+        froude_velocity=froude * abs(scene.rotor.speed) * plain(np.sqrt(crest * scene.tube.bore)),
+        cavity_fitted=CAVITY_ERROR in fitted,
+        clearing_fitted=CLEARING_ERROR in fitted,
+    )
+
+
+def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
+    """Pressure of a liquid column from a radius to the outer radius R2.
+
+    Returns: Pa, the shape of `radius`.
+    Source: Eq. 11 of the liquid-ring paper, integrated.
+    """
+    return hydrostatic_pressure(
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        inner=radius,
+        outer=scene.disc.outer_radius,
+    )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -348,7 +393,7 @@ def column_flow(
 
 def _larger(first: Pressure, second: Pressure | float) -> Pressure:
     """The larger of two, without the cost of an array for plain numbers."""
-    if isinstance(first, float):
+    if isinstance(first, float) and not isinstance(second, np.ndarray):
         return max(first, second)
     return np.asarray(np.maximum(first, second), dtype=np.float64)
 

@@ -14,7 +14,7 @@ from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
 from ringbalance.physics.convergence import gci
 from ringbalance.physics.pressure.imported import solve_on, solved_ring
 from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
-from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms
+from ringbalance.reduced_model.chamber.closed_forms import chamber_closed_forms
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, from_half_width

@@ -17,7 +17,7 @@ _HOME: Final = MappingProxyType(
         "eccentric_lines": "ringbalance.controller.summary",
         "eccentric_tuning_document": "ringbalance.controller.tuning.eccentric",
         "eccentric_tuning_lines": "ringbalance.controller.summary",
-        "simulation_lines": "ringbalance.controller.summary",
+        "simulation_rows": "ringbalance.controller.document",
         "tuning_document": "ringbalance.controller.tuning.tune",
         "tuning_lines": "ringbalance.controller.summary",
     }

@@ -62,7 +62,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "holding": _holding(calibration),
         "gas_line": line_document(calibration.gas_line),
         "models_used": [asdict(term) for term in calibration.models_used],
-        "findings": [asdict(each) for each in mesh_findings(scene)],
+        "findings": [each.document() for each in mesh_findings(scene)],
         "status": {"code": str(calibration.chamber.status.code), "text": calibration.chamber.status.text},
         "statistics": dict(calibration.statistics),
     }
@@ -80,7 +80,6 @@ def _curve(curve: Curve, at: list[int], name: str, unit: str) -> dict[str, Any]:
         f"{name}_input_uncertainty": _listed(curve.inputs[at]),
         f"{name}_uncertainty_parts": {
             "numerical": _listed(curve.numerical[at]),
-            "left_out_gravity": _listed(curve.left_out[at]),
             "unmodelled_terms": _listed(curve.unmodelled[at]),
         },
     }
@@ -290,7 +289,7 @@ def _holding(calibration: Calibration) -> dict[str, Any]:
         "holds": found.holds,
         "fill_ratio": calibration.residual.largest_fill_ratio,
         "largest_hump_radius_m": found.largest_hump_radius,
-        "warning": found.warning,
+        "warning": "" if found.finding is None else found.finding.text,
     }
 
 

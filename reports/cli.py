@@ -1,8 +1,4 @@
-"""The commands `ringbalance report` and `ringbalance plot`.
-
-What draws and calculates is loaded once the scene is read: a broken one is told of at once, and a worker
-loads the same meanwhile.
-"""
+"""The commands `ringbalance report` and `ringbalance plot`."""
 
 from __future__ import annotations
 
@@ -11,10 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.reports import deferred
+from ringbalance.reports.pictures import process
+from ringbalance.reports.report import write_report
 from ringbalance.scene import Scene, liquid_ring_scene, load_scene, read_scene
-from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.faults import SceneError
 from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.processes import beside
@@ -33,7 +28,6 @@ def report(
     level: Level = "light",
     tolerance: str | None = None,
     models: Models | None = None,
-    interactive: bool = False,
 ) -> int:
     """Verify, calibrate, simulate and draw: everything, into a report and its annex.
 
@@ -42,8 +36,7 @@ def report(
         out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
         level: "heavy" also runs the cases that take long.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
-        interactive: also write view.html, in which the liquid and the tube can be turned.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code: 0; 1 when a code-verification case failed, or the loop settled under neither law; the
@@ -54,21 +47,15 @@ def report(
         OSError: the folder cannot be written.
     """
     told, text = read_scene(scene)
-    if interactive and isinstance(told, EccentricScene):
-        problem = "a scene of eccentric masses holds no liquid"
-        raise SceneError.of_option(
-            option="--interactive", value=True, problem=problem, allowed="to leave it out"
-        )
     console, workers = messages_console(), min(MOST_WORKERS, os.cpu_count() or 1)
     with activity("report", "reading") as shown, beside(workers, loading=_load) as pool:
-        finished = deferred.program.write_report(
+        finished = write_report(
             with_tolerance(told, tolerance=tolerance, models=models),
             out,
             level=level,
             scene_text=text,
             workers=pool or 1,
             progress=shown.show,
-            interactive=interactive,
         )
     for line in finished.summary:
         console.print(line, markup=False, highlight=False)
@@ -79,7 +66,7 @@ def report(
 
 def _load() -> bool:
     """Called in a worker: what a report needs is then there."""
-    return callable(deferred.program.write_report)
+    return callable(write_report)
 
 
 def plot(scene: Path, *, out: Path = Path("out")) -> int:
@@ -113,7 +100,6 @@ def draw_pictures(
     Returns: `drawn`, and `text` with the reason where this machine cannot draw.
     Raises: OSError: the folder cannot be written.
     """
-    process = deferred.drawing
     with staged(out, folders=process.FOLDERS) as stage:
         fields = process.write_fields(scene=scene, folder=stage)
         drawing = process.start_drawing(scene=scene, fields=fields, folder=stage)

@@ -12,7 +12,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Final, cast
 
-from ringbalance.reports.figures import deferred
+from markupsafe import escape
 
 GLYPHS: Final = "<!-- glyphs -->"
 _SYMBOL: Final = re.compile(r'<symbol id="([^"]+)"([^>]*/>|[^>]*>.*?</symbol>)', re.DOTALL)
@@ -41,10 +41,13 @@ def equations() -> Mapping[str, _Equation]:
 def equation_svg(latex: str, words: str, name: str) -> str:
     """One equation as an SVG element in the current text colour, sized in the text's em.
 
+    One that is not kept, as of a case of the user's own, is shown as its LaTeX.
+
     Args: `name`: prefix of every id within, so that two equations on one page do not share glyphs.
-    Raises: ValueError: LaTeX that cannot be set.
     """
-    text: str = _kept().get(latex) or deferred.typeset(latex)
+    text = _kept().get(latex)
+    if text is None:
+        return f"<code>{escape(latex)}</code>"
     text = re.sub(r'\bid="', f'id="{name}-', text)
     text = re.sub(r'href="#', f'href="#{name}-', text)
     text = re.sub(r' width="([\d.]+)" height="([\d.]+)"', _in_em, text, count=1)

@@ -8,7 +8,6 @@ from ringbalance.identification.against_fit import against_fit
 from ringbalance.identification.cli import DONE, FitRequest, keep_inputs, run_fit
 from ringbalance.identification.data.kinds import template as template_of
 from ringbalance.identification.fitting import Loss
-from ringbalance.reports.figures import deferred
 from ringbalance.reports.simulate_cli import check_output
 from ringbalance.scene.platform.files import write_whole
 
@@ -55,5 +54,9 @@ def fit(
     asked = FitRequest(parameters=parameters, loss=loss, next=next, save=save, json=json)
     code, result = run_fit(scene, data, asked)
     if plot is not None:
-        write_whole(plot, deferred.sheet(deferred.fit_figures(against_fit(result))))
+        # Loading what draws takes as long as a short fit.
+        from ringbalance.reports.figures.fit import fit_figures  # noqa: PLC0415
+        from ringbalance.reports.figures.sheet import sheet  # noqa: PLC0415
+
+        write_whole(plot, sheet(fit_figures(against_fit(result))))
     return code

@@ -14,8 +14,8 @@ from typing import Final
 from ringbalance.reports.section import Record
 
 _PACKAGES: Final = (
-    *("numpy", "scipy", "scikit-fem", "pyamg", "fluids", "chemicals", "meshio", "pydantic"),
-    *("matplotlib", "pyvista", "vtk", "jinja2", "ziamath"),
+    *("numpy", "scipy", "scikit-fem", "pyamg", "fluids", "meshio"),
+    *("matplotlib", "pyvista", "vtk", "jinja2"),
 )
 _ROOT: Final = Path(__file__).resolve().parents[1]
 _LOCK: Final = _ROOT / "requirements" / "lock.txt"

@@ -19,7 +19,6 @@ from ringbalance.reports.pages.document import evidence_text
 from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
-from ringbalance.reports.pictures.view import VIEW, view_page
 from ringbalance.reports.prose import untraced
 from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
@@ -122,12 +121,11 @@ def write_report(
     workers: int | Workers = 1,
     progress: Progress | None = None,
     opengl: OpenGL | None = None,
-    interactive: bool = False,
 ) -> Report:
     """Verify, calibrate, simulate and draw a scene into one folder.
 
     Args: `scene_text`: the scene file's own text, for the appendix. `workers`: processes, this one included,
-    or those that are at work already. `interactive`: whether a liquid ring's view.html is written, too.
+    or those that are at work already.
     Raises: SceneError: a scene that cannot be calibrated or simulated; nothing is written.
     Raises: OSError: the folder cannot be written, or holds an evidence.json that is none; known before the
     work.
@@ -145,8 +143,6 @@ def write_report(
                 scene, level=level, scene_text=scene_text, pool=pool, progress=progress
             )
         else:
-            if interactive:
-                (stage / VIEW).write_text(view_page(scene), encoding="utf-8")
             with _pictures(scene, stage, opengl) as pictures:
                 evidence = collect_evidence(
                     scene,

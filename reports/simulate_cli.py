@@ -18,7 +18,6 @@ from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccen
 from ringbalance.controller.line_runs import command_document, line_runs, line_runs_text
 from ringbalance.controller.loop import simulate as run_loop
 from ringbalance.reduced_model.calibration import law_by_name
-from ringbalance.reports.figures import deferred
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
@@ -63,7 +62,7 @@ def simulate(
         plot: also draw the run's figures on one sheet, an SVG file.
         seed: of all random numbers, in place of the scene's.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code: 0 settled, 1 not settled; the result is printed either way.
@@ -113,7 +112,7 @@ def _ring(scene: Scene, law: str, outputs: _Outputs) -> bool:
     if outputs.csv is not None:
         write_whole(outputs.csv, _csv_text(simulation_history(found)))
     if outputs.plot is not None:
-        _draw(outputs.plot, deferred.run_figures(simulation_document(found)))
+        _draw(outputs.plot, simulation_document(found))
     if outputs.json:
         print(json_format.dumps(command_document(found, at_ends), allow_nan=False))
     else:
@@ -132,7 +131,7 @@ def _eccentric_masses(scene: EccentricScene, outputs: _Outputs) -> bool:
         write_whole(outputs.csv, _csv_text(eccentric_history(found)))
     if outputs.plot is not None and locked is not None:
         runs = eccentric_document(found), eccentric_document(locked)
-        _draw(outputs.plot, deferred.eccentric_figures(scene, *runs))
+        _draw(outputs.plot, *runs, scene=scene)
     if outputs.json:
         print(json_format.dumps(eccentric_document(found), allow_nan=False))
     else:
@@ -140,8 +139,13 @@ def _eccentric_masses(scene: EccentricScene, outputs: _Outputs) -> bool:
     return found.settled
 
 
-def _draw(path: Path, figures: Any) -> None:
-    write_whole(path, deferred.sheet(figures))
+def _draw(path: Path, *runs: dict[str, Any], scene: EccentricScene | None = None) -> None:
+    # Loading what draws takes as long as a short run.
+    from ringbalance.reports.figures.eccentric import eccentric_figures  # noqa: PLC0415
+    from ringbalance.reports.figures.loop import run_figures  # noqa: PLC0415
+    from ringbalance.reports.figures.sheet import sheet  # noqa: PLC0415
+
+    write_whole(path, sheet(run_figures(*runs) if scene is None else eccentric_figures(scene, *runs)))
 
 
 def _clock(shown: Activity) -> Callable[[float, float], None]:

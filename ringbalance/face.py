@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from typing import Any, Protocol, overload
 
@@ -26,7 +26,8 @@ from ringbalance.reduced_model.law.completing import completed_model, lacking
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.selection.registry import IN_INJECTIONS, NOT_MODELLED
+from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED
+from ringbalance.results.findings import Finding
 from ringbalance.scene import AnyScene, EccentricScene, Scene
 from ringbalance.scene.changes import checked_scene
 
@@ -95,7 +96,7 @@ def simulate(
             scene's noise from the scene's seed.
         progress: called with the simulated time and the time limit, s.
         modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
-            default those whose estimated contribution is above the scene's tolerance.
+            default all that the scene gives numbers for.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a law, an algorithm, a sensor or terms for eccentric masses; terms that the scene or
         the law gives no numbers for.
@@ -118,8 +119,7 @@ def simulate(
         progress=progress,
         modelled=modelled,
     )
-    remark = _of_own_law(scene, flow_law, run)
-    return replace(run, status=f"{run.status}; {remark}") if remark else run
+    return replace(run, findings=(*run.findings, *_of_own_law(scene, flow_law, run)))
 
 
 def _model_of(scene: Scene, law: Any) -> BalancerModel:
@@ -130,17 +130,15 @@ def _model_of(scene: Scene, law: Any) -> BalancerModel:
     return completed_model(law, by=calibrate_scene(scene).flow_law)
 
 
-def _of_own_law(scene: Scene, law: object, run: Simulation) -> str:
+def _of_own_law(scene: Scene, law: object, run: Simulation) -> Iterator[Finding]:
     """What a run takes from elsewhere, or leaves out, because a law of the caller's own does not give it."""
     if law is None or isinstance(law, CalibratedLaw | PaperLaw):
-        return ""
+        return
     rows = [row.term for row in run.models_used if row.term in IN_INJECTIONS and row.model == NOT_MODELLED]
-    parts = []
     if names := lacking(law):
-        parts.append(f"the law gives no {', '.join(names)}: those of the calibrated law are used")
+        yield Finding(code="own_law_lacks", values={"names": names})
     if rows and not can_carry(scene, run.model):
-        parts.append(f"it gives velocities and no forces, so the run leaves out {', '.join(rows)}")
-    return "; ".join(parts)
+        yield Finding(code="own_law_without_forces", values={"terms": rows})
 
 
 def compare(first: AnyScene, second: AnyScene) -> Comparison:

@@ -22,11 +22,11 @@ from ringbalance.reports.cli import draw_pictures
 from ringbalance.reports.extremes_cli import base_of
 from ringbalance.reports.report import Report
 from ringbalance.reports.report import write_report as write_scene_report
+from ringbalance.results.result import CommandResult
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.changes import checked_scene, document_of
 from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.results import CommandResult
 from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
 from ringbalance.verification.result import CaseResult
@@ -158,12 +158,11 @@ def write_report(
     level: Level = "light",
     workers: int = 1,
     progress: Callable[[str], None] | None = None,
-    interactive: bool = False,
 ) -> Report:
     """Verify, calibrate, simulate and draw a scene into one folder.
 
     Args: `level`: "heavy" also runs the cases that take long. `workers`: processes, this one included.
-        `progress`: called with what is being done. `interactive`: whether view.html is written, too.
+        `progress`: called with what is being done.
     Raises: SceneError: a scene that cannot be used; nothing is written.
     Raises: OSError: the folder cannot be written.
     """
@@ -175,7 +174,6 @@ def write_report(
         scene_text=toml_bytes(document_of(scene)).decode(),
         workers=workers,
         progress=progress,
-        interactive=interactive,
     )
 
 

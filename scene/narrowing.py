@@ -56,7 +56,7 @@ def _wrong_kind(scene: AnyScene, problem: str, kind: str) -> SceneError:
 
 Models = Literal["finest"]
 FINEST: Final = 0.0
-"""Tolerance at which every term is modelled that has a model."""
+"""Tolerance at which all that is expensive is the finest."""
 ALLOWED: Final = 'a fraction above 0 and below 1, such as 0.005 or "0.5 %"'
 
 SomeScene = TypeVar("SomeScene", Scene, "EccentricScene", "Scene | EccentricScene")
@@ -67,14 +67,14 @@ def with_tolerance(
 ) -> SomeScene:
     """The scene with another tolerance; the same scene where neither option is given.
 
-    Args: `tolerance`: such as "0.5 %" or "0.005". `models`: "finest" models every term that has a model.
+    Args: `tolerance`: such as "0.5 %" or "0.005". `models`: "finest" for a tolerance of zero.
     Raises: SceneError: no such tolerance, or both options.
     """
     if models is not None:
         if tolerance is not None:
             raise _error(
                 tolerance,
-                "--models finest models every term, whatever the tolerance",
+                "--models finest is a tolerance of zero",
                 "one of the two options",
             )
         return replace(scene, tolerance=FINEST)

@@ -32,6 +32,7 @@ BY_NAME: Final = {
     *("held", "pulls", "cost_model.seconds", "quantities.choices.models", "times.refit_seconds"),
     *(f"quantities.{MODELS}.{each}" for each in ("models", "work", "fixed_work")),
     f"times.{MODELS}",
+    *("findings.values", "findings.change"),
     *("numbers", "tables.columns", "tables.units", "endings", "loop_endings", "violations.point"),
 }
 """Whose keys are names of what the scene, the fit or the case has."""

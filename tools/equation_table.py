@@ -10,8 +10,9 @@ import lzma
 from collections.abc import Mapping
 from pathlib import Path
 
+from typesetting import typeset
+
 from ringbalance.reports.equations import equations
-from ringbalance.reports.typesetting import typeset
 from ringbalance.verification.catalogue import load_cases
 
 TABLE = Path(__file__).resolve().parents[1] / "reports" / "data" / "equations.json.xz"

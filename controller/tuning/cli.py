@@ -19,11 +19,12 @@ from ringbalance.controller.tuning.tune import Tuning, tuning_document
 from ringbalance.controller.tuning.tune import tune as tune_scene
 from ringbalance.reduced_model.calibration import law_by_name
 from ringbalance.reduced_model.gas_line import line_text, line_warning
-from ringbalance.reduced_model.selection.registry import neglected_in_injections
+from ringbalance.reduced_model.terms import neglected_in_injections
+from ringbalance.results.render import two_columns
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, checked_law, with_tolerance
-from ringbalance.scene.platform.terminal import activity, results_console, two_columns
+from ringbalance.scene.platform.terminal import activity, results_console
 
 TUNED = 0
 NOT_TUNED = 1
@@ -46,7 +47,7 @@ def tune(
             none.
         json: print one JSON document instead of tables.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code: 0 what is recommended settles 95 % of the runs; 1 otherwise; the result is printed either

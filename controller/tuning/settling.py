@@ -20,6 +20,7 @@ from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.reduced_model.operating.residual import Drawing, stalled_fill_ratio
+from ringbalance.results.findings import Finding
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
@@ -58,7 +59,7 @@ class SettlingTimes:
     beyond_pressure: float = 0.0
     """The same with the fills to which the scene's gas drives the liquid."""
 
-    let_go: str = ""
+    let_go: Finding | None = None
     """Why the tube lets the corrections go that these runs make; empty where it holds them."""
 
     def explained_by(self, fraction: float) -> bool:
@@ -93,7 +94,7 @@ def settling_times(
         return found
     beyond, driven = _beyond_capacity(scene, model, widths, runs=found.runs)
     largest = 2 * scene.disc.initial_fill - usable_fill(scene, model)
-    let_go = Holding.of(scene, fill_ratio=largest).warning if found.explained_by(found.drifted) else ""
+    let_go = Holding.of(scene, fill_ratio=largest).finding if found.explained_by(found.drifted) else None
     return replace(found, beyond_capacity=beyond, beyond_pressure=driven, let_go=let_go)
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.reduced_model.budget import UNSTATED, believed
+from ringbalance.reduced_model.budget import UNSTATED
 from ringbalance.reports.figures.operation import tornado
-from ringbalance.reports.numbers import MISSING, display_unit, fixed, given, number, shown
 from ringbalance.reports.prose import named_with_origin, read, states_uncertainty, traced
 from ringbalance.reports.section import Cells, Record, Section, Table
+from ringbalance.results.numbers import MISSING, believed, display_unit, fixed, given, number, shown
 from ringbalance.verification.standing import budget_standing
 
 _NAMES: Final = {

@@ -13,11 +13,11 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reports.figures.drag_coefficient import drag_figures
-from ringbalance.reports.numbers import MISSING, given, measured, percent, shown
 from ringbalance.reports.prose import series
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
 from ringbalance.reports.studies.drag_map import BORES, ApparentDrag, DragMap, LiquidVerdicts
 from ringbalance.reports.studies.drag_point import DragPoint
+from ringbalance.results.numbers import MISSING, given, measured, percent, shown
 
 _SAME_POINT: Final = 1e-6
 """Relative difference of two velocities of one operating point: rounding."""

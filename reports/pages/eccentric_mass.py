@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from ringbalance.controller.compare import compare
 from ringbalance.reports import summary
-from ringbalance.reports.numbers import MISSING, percent, shown
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
+from ringbalance.results.numbers import MISSING, percent, shown
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
 PAPER: Final = "eccentric_mass"

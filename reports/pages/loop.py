@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from ringbalance.reports.figures.operation import residual_polar, settling_histogram
-from ringbalance.reports.numbers import MISSING, given, number, percent, shown
 from ringbalance.reports.pages.first_page import RETUNED, place_of_run
 from ringbalance.reports.prose import found_at, traced
 from ringbalance.reports.section import Cells, Record, Section, Table, Work
 from ringbalance.reports.summary import runs_settled
+from ringbalance.results.numbers import MISSING, given, number, percent, shown
 
 _MICROMETRE: Final = 1e6
 _GAINS: Final = {1: "with the scene’s gain", 2: "with the recommended settings"}
@@ -59,7 +59,7 @@ def _tuned(tuning: Record) -> str:
     if reached is None:
         return f"{tuning['status'][0].upper()}{tuning['status'][1:]}."
     return (
-        f"With the fuller models that the tolerance selects, {runs_settled(tuning)} settle with the "
+        f"With every term of an injection modelled, {runs_settled(tuning)} settle with the "
         f"recommended settings, {percent(0.95)} of all within {shown(reached, 's', digits=2)}."
     )
 

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import MISSING, number, short
 from ringbalance.reports.section import Record, Section, Table
+from ringbalance.results.numbers import MISSING, number, short
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.describe import usual_name
 

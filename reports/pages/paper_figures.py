@@ -17,8 +17,8 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.reports.figures.paper import paper_figures
-from ringbalance.reports.numbers import given, number, percent, short, shown
 from ringbalance.reports.section import Record, Section, Table, Work
+from ringbalance.results.numbers import given, number, percent, short, shown
 from ringbalance.scene.models import Scene
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.loops import AMPLITUDES, GAINS, PHASES, calibration_of, loop_scene, run_loop

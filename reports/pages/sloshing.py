@@ -12,8 +12,8 @@ from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TR
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import number, percent, short, shown
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.numbers import number, percent, short, shown
 
 _MODES: Final = 4
 _POINTS: Final = 17

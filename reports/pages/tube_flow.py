@@ -14,9 +14,9 @@ from matplotlib.tri import Triangulation
 from ringbalance.physics.tube.loss import FlowState, tube_loss
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import number, percent
 from ringbalance.reports.pages.cases import anchor, case_view
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.numbers import number, percent
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.flow_fields import EndFlow, SectionFlow
 

@@ -12,6 +12,7 @@ import json
 import subprocess
 import sys
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
@@ -101,10 +102,13 @@ def _nothing(reason: str) -> OpenGL:
 
 
 def find_opengl(*, egl: str = EGL_LIBRARY, osmesa: str = OSMESA_LIBRARY) -> OpenGL:
-    """Whether pictures can be drawn off-screen, asked in a child process.
+    """Whether pictures can be drawn off-screen: pyvista is there, and OpenGL answers in a child process.
 
     Args: `egl`: file name of the EGL library. `osmesa`: file name of the OSMesa library, tried second.
     """
+    if find_spec("pyvista") is None:
+        text = "The 3-D pictures were left out: pyvista is not installed; pip install 'ringbalance[pictures]'"
+        return OpenGL(available=False, window="", text=text)
     command = [sys.executable, str(Path(__file__).resolve()), egl, osmesa]
     try:
         child = subprocess.run(command, capture_output=True, text=True, check=False, timeout=_PATIENCE)

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import equation_table
 import pytest
+import typesetting
 
 from ringbalance.reports.equations import GLYPHS, equation_svg, equations, share_glyphs
 
@@ -30,7 +31,7 @@ def test_the_kept_equations_are_those_of_the_program_as_set_today() -> None:
 
 
 def test_glyphs_are_shared_and_all_found() -> None:
-    parts = [equation_svg(r"\rho\omega^2 r", "a", "one"), equation_svg(r"\rho r", "b", "two")]
+    parts = [equation_svg(equations()[name].latex, "a", name) for name in ("eq7", "eq12")]
     page = share_glyphs(f"{GLYPHS}{parts[0]}{parts[1]}")
     ids = re.findall(r'<symbol id="([^"]+)"', page)
     used = re.findall(r'href="#([^"]+)"', page)
@@ -40,6 +41,10 @@ def test_glyphs_are_shared_and_all_found() -> None:
     assert len(page) < len(parts[0]) + len(parts[1])
 
 
+def test_latex_that_is_not_kept_is_shown_as_it_is() -> None:
+    assert equation_svg(r"a < \frac{b}{c}", "words", "x") == r"<code>a &lt; \frac{b}{c}</code>"
+
+
 def test_latex_that_cannot_be_set_is_refused() -> None:
     with pytest.raises(ValueError, match="cannot be set"):
-        equation_svg(r"\frac{a}", "broken", "x")
+        typesetting.typeset(r"\frac{a}")

@@ -20,6 +20,13 @@ def test_a_missing_library_is_named_with_what_to_install() -> None:
     assert DEBIAN_PACKAGES in found.text
 
 
+def test_without_pyvista_it_is_said_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(opengl, "find_spec", lambda _: None)
+    found = find_opengl()
+    assert not found.available
+    assert "ringbalance[pictures]" in found.text
+
+
 def test_a_library_that_is_no_egl_is_refused() -> None:
     found = find_opengl(egl="libm.so.6", osmesa="libNoSuchOSMesa.so.8")
     assert not found.available

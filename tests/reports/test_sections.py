@@ -21,7 +21,6 @@ from ringbalance.reports.pages import eccentric_scene
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside
-from ringbalance.reports.pictures.view import VIEW
 from ringbalance.reports.prose import untraced
 from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
@@ -40,7 +39,6 @@ def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
     assert present == {section.template for section in (*SECTIONS, *eccentric_scene.SECTIONS)} | {
         "report.html",
         "macros.html",
-        VIEW,
     }
 
 

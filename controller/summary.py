@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ringbalance.controller.compare import Comparison
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.controller.tuning.eccentric import EccentricTuning
+from ringbalance.controller.eccentric_mass.tuning import EccentricTuning
 from ringbalance.controller.tuning.settling import SettlingTimes
 from ringbalance.controller.tuning.tune import Tuning
 

@@ -131,7 +131,10 @@ def _runs(
 ) -> SettlingTimes:
     if scene.controller.kind == "target_vector":
         return _of_ensemble(scene, model, widths, members=number, told=told)
-    found = [_one_run(scene, model, widths, number=i, told=told) for i in range(number)]
+    found = []
+    for i in range(number):
+        told(f"run {i + 1}")
+        found.append(drawn_run(scene, model, widths, number=i))
     times = [math.inf if run.settling_time is None else run.settling_time for run in found]
     drifted = sum(run.outcome is Outcome.DRIFTING for run in found)
     return replace(summary(times), drifted=drifted / number)
@@ -197,11 +200,9 @@ def _rotor(scene: Scene, drawn: Members, number: int) -> Rotor:
     )
 
 
-def _one_run(
-    scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, number: int, told: Progress
-) -> Simulation:
-    """One drawn run; velocity, moment and influence coefficient act through their product."""
-    told(f"run {number + 1}")
+def drawn_run(scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, number: int) -> Simulation:
+    """The run of a device by its number; velocity, moment and influence coefficient act through their
+    product."""
     drawn = Members.drawn(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
     rotor = _rotor(scene, drawn, number)
     faster = rotor.influence_coefficient * float(drawn.velocity_factor[number])

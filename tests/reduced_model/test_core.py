@@ -18,7 +18,8 @@ from ringbalance.reduced_model.core import Answers, growing_root
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, in_batches, input_effects
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 
 Gas = Literal["vented", "trapped"]
 

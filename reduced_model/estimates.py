@@ -44,9 +44,10 @@ from ringbalance.reduced_model.time_scales import (
     start_up_loss,
     start_up_time,
 )
+from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads, crest_head, velocity_of
 from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
-from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow, column_flow, tube_path
+from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow, column_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.loop_models import Sensor
 from ringbalance.scene.models import Scene

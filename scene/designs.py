@@ -156,7 +156,8 @@ def input_effects(
     Every input moves by its expanded uncertainty (95 %) to both sides, and the larger change counts, because
     a sensitivity at the value itself misses what bends within the interval.  All that follows from an input
     follows, such as the velocity at which k is asked for, unless the function holds it.
-    Args: `function`: as for `in_batches`. `among`, `errors`: as `input_sides`.
+    Args: `function`: as for `in_batches`. `among`: inputs that count. `errors`: whether fitted errors of
+        models count too.
     Returns: The scene's values, and expanded uncertainties (95 %) by input, "fitted" for all that were fitted
         together; NaN where neither side has the quantity.
     Source: ASME V&V 20-2009, one input at a time.

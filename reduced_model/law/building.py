@@ -17,8 +17,8 @@ from ringbalance.reduced_model.chamber.values import RingValues, share_across
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
+from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.reduced_model.tube.regime import tube_path
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.joint import FITTED, direction_sides, independent_half_widths
 from ringbalance.scene.models import Scene

@@ -18,6 +18,7 @@ from ringbalance.physics.tube.uncertainty import corrected_state
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.operating.crest_margin import DirectedState
+from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.reduced_model.tube.path import (
     Places,
     crest_span,
@@ -26,7 +27,7 @@ from ringbalance.reduced_model.tube.path import (
     reversed_tube,
     share_at_radius,
 )
-from ringbalance.reduced_model.tube.regime import TubeEnds, column_pressure
+from ringbalance.reduced_model.tube.regime import TubeEnds
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
 

@@ -25,8 +25,9 @@ from ringbalance.reduced_model.selection.range_flow import (
     range_velocities,
     steady,
 )
+from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import crest_head
-from ringbalance.reduced_model.tube.regime import SiphonCrest, tube_path
+from ringbalance.reduced_model.tube.regime import SiphonCrest
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import FINEST

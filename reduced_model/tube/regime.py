@@ -15,13 +15,7 @@ from typing import Any, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from ringbalance.physics.gas import vented_pressure
-from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.scene.arrays import BoolArray, FloatArray, plain
-from ringbalance.scene.joint import fitted_causes
-from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
-from ringbalance.scene.uncertain import NORMAL_95
 
 CLEARING: Final = (0.6, 1.1)
 """Froude numbers u/sqrt(g_c d), g_c = omega^2 r_m, below which gas stays over the crest, and above which the
@@ -256,44 +250,6 @@ class TubePath:
     def holding_pressure(self, level: float) -> float:
         """D_m of a crest from which on it lasts whatever the pressure of a cavity over the crest, Pa."""
         return level - min(self.vapour_pressure, 0.0)
-
-
-def tube_path(scene: Scene) -> TubePath:
-    """Radii of the tube as pressures of a column that reaches from there to the outer radius R2.
-
-    Source: p(r) = rho omega^2 r^2/2 of liquid at rest in the rotating frame.
-    """
-    hump, error = scene.tube.hump_radius, scene.tube.model_error
-    crest = 0.0 if hump is None else hump
-    froude = 1 + CLEARING_UNCERTAINTY * error(CLEARING_ERROR) / NORMAL_95
-    # With dissolved gas both ends of what the cavity's pressure may be are in its uncertainty.
-    released = plain(np.clip(RELEASED * (1 + error(CAVITY_ERROR) / NORMAL_95), 0.0, 1.0))
-    fitted = fitted_causes(scene)
-    return TubePath(
-        density=scene.liquid.density,
-        port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
-        hump_pressure=None if hump is None else column_pressure(scene=scene, radius=hump),
-        trapped=scene.tube.hump_gas == "trapped",
-        vapour_pressure=scene.liquid.vapour_pressure - vented_pressure(scene),
-        released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
-        froude_velocity=froude * abs(scene.rotor.speed) * plain(np.sqrt(crest * scene.tube.bore)),
-        cavity_fitted=CAVITY_ERROR in fitted,
-        clearing_fitted=CLEARING_ERROR in fitted,
-    )
-
-
-def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
-    """Pressure of a liquid column from a radius to the outer radius R2.
-
-    Returns: Pa, the shape of `radius`.
-    Source: Eq. 11 of the liquid-ring paper, integrated.
-    """
-    return hydrostatic_pressure(
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        inner=radius,
-        outer=scene.disc.outer_radius,
-    )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)

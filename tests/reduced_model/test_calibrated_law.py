@@ -19,8 +19,8 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.point import priming_pressure
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.reduced_model.selection.range_flow import range_flow
+from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.reduced_model.tube.regime import column_pressure
 from ringbalance.scene.models import HumpGas, Scene
 
 AMBIENT = 101325.0

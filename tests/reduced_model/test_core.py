@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from ringbalance.physics.tube.uncertainty import corrected_state
-from ringbalance.reduced_model.core import Answers, growing_root
+from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.tube.flow import growing_root
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, in_batches, input_effects
 from ringbalance.scene.models import Scene

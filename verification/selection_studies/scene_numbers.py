@@ -18,7 +18,7 @@ from ringbalance.reduced_model.selection.estimates import (
     injection_time,
 )
 from ringbalance.reduced_model.selection.range_flow import equal_velocity
-from ringbalance.reduced_model.tube.regime import column_pressure
+from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.scene.models import Scene
 
 _Row = tuple[str, float | None, str, str]

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.motion import gives_forces
-from ringbalance.controller.loop import simulate
-from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.gas_line import line_ends
-from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.results.numbers import given
 from ringbalance.results.table import Table
-from ringbalance.scene.models import Scene
+
+if TYPE_CHECKING:
+    from ringbalance.controller.simulation import Simulation
 
 
 @dataclass(frozen=True, kw_only=True)
-class _LineRun:
+class LineRun:
     """One run with one end of the range."""
 
     end: str
@@ -32,11 +30,12 @@ class _LineRun:
     run: Simulation
 
 
-def line_runs(scene: Scene, model: BalancerModel) -> tuple[_LineRun, ...]:
-    """Runs with all terms of an injection modelled; none where the scene gives its gas line, or the law no
-    forces."""
+def line_runs(given: Simulation) -> tuple[LineRun, ...]:
+    """Runs of the same scene and law with all terms of an injection modelled; none where the scene gives its
+    gas line, the law no forces, or algorithm or sensor are the caller's own."""
+    scene, flow = given.scene, given.model.flow
     ends = line_ends(scene)
-    if len(ends) == 1 or not gives_forces(model.flow):
+    if len(ends) == 1 or not gives_forces(flow) or not given.as_scene:
         return ()
     found = []
     for end in ends:
@@ -47,27 +46,16 @@ def line_runs(scene: Scene, model: BalancerModel) -> tuple[_LineRun, ...]:
             valve_lag=end.valve_lag,
         )
         # The paper's law has no mass in the tube and no crest.
-        own = () if isinstance(model.flow, PaperLaw) else (INERTIA, HELD)
+        own = () if isinstance(flow, PaperLaw) else (INERTIA, HELD)
         terms = (*own, FILLING, LAG)
-        run = simulate(replace(scene, gas=gas), model, modelled=terms)
+        run = given.again(replace(scene, gas=gas), terms)
         found.append(
-            _LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)
+            LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)
         )
     return tuple(found)
 
 
-def command_document(simulation: Simulation, at_ends: Sequence[_LineRun] | None = None) -> dict[str, Any]:
-    """What `ringbalance simulate --json` prints of a run.
-
-    Args: `at_ends`: of the same scene and law; None: they are run, unless algorithm or sensor are the
-        caller's own.
-    """
-    if at_ends is None:
-        at_ends = line_runs(simulation.scene, simulation.model) if simulation.as_scene else ()
-    return simulation_document(simulation) | {"gas_line_runs": line_runs_document(at_ends)}
-
-
-def line_runs_table(runs: Sequence[_LineRun]) -> Table:
+def line_runs_table(runs: Sequence[LineRun]) -> Table:
     """How the runs end."""
     return Table(
         caption="The scene gives no gas line; with both ends of its default range",
@@ -84,7 +72,7 @@ def line_runs_table(runs: Sequence[_LineRun]) -> Table:
     )
 
 
-def line_runs_document(runs: Sequence[_LineRun]) -> list[dict[str, Any]]:
+def line_runs_document(runs: Sequence[LineRun]) -> list[dict[str, Any]]:
     """For JSON, in SI."""
     return [
         {

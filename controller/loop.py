@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -265,4 +266,9 @@ def _record(
         energy=math.fsum(injection.operation.energy for injection in facts.injections),
         terms_modelled=terms_modelled(used),
         models_used=used,
+        again=partial(_again, facts.plant.model),
     )
+
+
+def _again(model: BalancerModel, scene: Scene, modelled: Collection[str]) -> Simulation:
+    return simulate(scene, model, modelled=modelled)

@@ -15,8 +15,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.document import simulation_document
-from ringbalance.controller.line_runs import line_runs, line_runs_document
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
@@ -139,11 +137,7 @@ def _pressure(scene: Scene) -> Record:
 
 def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
     models = {"calibrated": calibration.model, "paper": paper_model(scene)}
-    return {
-        name: simulation_document(simulate(scene, model))
-        | {"gas_line_runs": line_runs_document(line_runs(scene, model))}
-        for name, model in models.items()
-    }
+    return {name: simulate(scene, model).to_dict() for name, model in models.items()}
 
 
 @contextmanager

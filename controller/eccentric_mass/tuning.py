@@ -7,11 +7,10 @@ import statistics
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller import deferred
 from ringbalance.controller.eccentric_mass.inputs import eccentric_drawn
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
@@ -21,7 +20,7 @@ from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Sta
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
 from ringbalance.results.findings import Finding
-from ringbalance.results.result import DeferredResult, Rows
+from ringbalance.results.result import Result, Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.results.table import Table
 
@@ -46,12 +45,8 @@ class _EccentricSettling:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class EccentricTuning(DeferredResult):
+class EccentricTuning(Result):
     """What is recommended for the drives of eccentric masses."""
-
-    _deferred: ClassVar[Any] = deferred
-    _document: ClassVar[str] = "eccentric_tuning_document"
-    _rows: ClassVar[str] = "eccentric_tuning_rows"
 
     scene: EccentricScene
     """As given."""
@@ -60,6 +55,14 @@ class EccentricTuning(DeferredResult):
     """Keys that the runs had lowered or raised to the recommended value, SI."""
     settling: _EccentricSettling | None
     """None: not asked for, or the masses are locked."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document that the command of the result prints with `--json`."""
+        return eccentric_tuning_document(self)
+
+    def rows(self) -> Rows:
+        """Quantities, findings and tables."""
+        return eccentric_tuning_rows(self)
 
     @property
     def recommended_scene(self) -> EccentricScene:

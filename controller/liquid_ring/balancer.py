@@ -267,7 +267,7 @@ class LiquidRingBalancer:
     def rows(self, run: Simulation) -> Rows:
         """See `Balancer`."""
         rows = run.rows()
-        at_ends = line_runs_table(line_runs(self.scene, self.model))
+        at_ends = line_runs_table(line_runs(run))
         return replace(rows, tables=(at_ends, *rows.tables))
 
     def history(self, run: Simulation) -> Mapping[str, Sequence[Any]]:

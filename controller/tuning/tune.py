@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from ringbalance.controller import deferred
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.checks import check_settings
 from ringbalance.controller.liquid_ring.plant import DiscState
@@ -34,11 +33,12 @@ from ringbalance.controller.tuning.search import (
     with_ways_out,
 )
 from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
+from ringbalance.controller.tuning.view import tuning_rows
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.terms import ModelUsed, neglected_in_injections
-from ringbalance.results.result import DeferredResult
+from ringbalance.results.result import Result, Rows
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.models import Scene
@@ -46,12 +46,8 @@ from ringbalance.scene.narrowing import AnyScene
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Tuning(DeferredResult):
+class Tuning(Result):
     """What is recommended for a scene's controller under a law."""
-
-    _deferred: ClassVar[Any] = deferred
-    _document: ClassVar[str] = "tuning_document"
-    _rows: ClassVar[str] = "tuning_rows"
 
     scene: Scene
     """With what is recommended."""
@@ -87,6 +83,14 @@ class Tuning(DeferredResult):
     settling: SettlingTimes | None
     models_used: tuple[ModelUsed, ...]
     status: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document that the command of the result prints with `--json`."""
+        return tuning_document(self)
+
+    def rows(self) -> Rows:
+        """Quantities, findings and tables."""
+        return tuning_rows(self)
 
     @property
     def recommended_scene(self) -> AnyScene:

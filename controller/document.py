@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.liquid_ring.records import Event
+from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_text, line_warning
 from ringbalance.reduced_model.terms import neglected_in_injections
 from ringbalance.results.findings import Finding
@@ -17,9 +18,6 @@ from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.results.table import Table, models_table
 from ringbalance.scene.arrays import FloatArray, finite
-
-if TYPE_CHECKING:
-    from ringbalance.controller.simulation import Injection, Sample, Simulation
 
 
 def simulation_document(simulation: Simulation) -> dict[str, Any]:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.motion import gives_forces
+from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.results.numbers import given
 from ringbalance.results.table import Table
-
-if TYPE_CHECKING:
-    from ringbalance.controller.simulation import Simulation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +52,11 @@ def line_runs(given: Simulation) -> tuple[LineRun, ...]:
             LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)
         )
     return tuple(found)
+
+
+def command_document(run: Simulation) -> dict[str, Any]:
+    """What `ringbalance simulate --json` prints of a run."""
+    return simulation_document(run) | {"gas_line_runs": line_runs_document(line_runs(run))}
 
 
 def line_runs_table(runs: Sequence[LineRun]) -> Table:

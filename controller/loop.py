@@ -14,7 +14,9 @@ from ringbalance.controller.algorithms.algorithm import Command, Controller, Mea
 from ringbalance.controller.algorithms.built_in import BuiltIn, command_of, show
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
+from ringbalance.controller.document import simulation_rows
 from ringbalance.controller.formulas import Cause
+from ringbalance.controller.line_runs import command_document
 from ringbalance.controller.liquid_ring.motion import RELATIVE_ERROR
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, Operation
 from ringbalance.controller.liquid_ring.records import EVENTS
@@ -30,6 +32,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.terms import ModelUsed
+from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 
@@ -266,6 +269,7 @@ def _record(
         energy=math.fsum(injection.operation.energy for injection in facts.injections),
         terms_modelled=terms_modelled(used),
         models_used=used,
+        presentation=Presentation(document=command_document, rows=simulation_rows),
         again=partial(_again, facts.plant.model),
     )
 

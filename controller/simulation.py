@@ -7,11 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Any, Final
+from typing import Final
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.document import simulation_document, simulation_rows
-from ringbalance.controller.line_runs import line_runs, line_runs_document
 from ringbalance.controller.liquid_ring.plant import Operation
 from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.controller.tuning.loop_factor import LoopFactor
@@ -23,7 +21,7 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.findings import Finding
-from ringbalance.results.result import Result, Rows
+from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -165,7 +163,7 @@ class Injection:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Simulation(Result):
+class Simulation(PresentedResult):
     """One closed-loop run."""
 
     scene: Scene
@@ -213,14 +211,6 @@ class Simulation(Result):
     """Names of the terms that are modelled beyond the flow law; empty: it alone carries the operations."""
     again: Callable[[Scene, Sequence[str]], Simulation]
     """Runs another scene under the same law, with given terms modelled."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """What `ringbalance simulate --json` prints of it, with runs at both ends of a gas line not given."""
-        return simulation_document(self) | {"gas_line_runs": line_runs_document(line_runs(self))}
-
-    def rows(self) -> Rows:
-        """Quantities, findings and tables."""
-        return simulation_rows(self)
 
     @property
     def status(self) -> str:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final, Literal
 
-from ringbalance.controller.tuning.tune import Tuning, tune
+from ringbalance.controller.tuning.result import Tuning
+from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.prose import untraced
 from ringbalance.results.numbers import MISSING

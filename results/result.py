@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from html import escape
 from typing import Any, ClassVar, Final
@@ -101,6 +101,29 @@ class Result:
     def _repr_html_(self) -> str:
         """For a notebook."""
         return self.rows().html()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Presentation:
+    """Functions that lay a result out; they import what they describe, so who makes a result gives them."""
+
+    document: Callable[[Any], dict[str, Any]]
+    rows: Callable[[Any], Rows]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class PresentedResult(Result):
+    """A result that was made together with its presentation."""
+
+    presentation: Presentation
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document that the command of the result prints with `--json`."""
+        return self.presentation.document(self)
+
+    def rows(self) -> Rows:
+        """Quantities, findings and tables."""
+        return self.presentation.rows(self)
 
 
 class DeferredResult(Result):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ringbalance.controller.eccentric_mass.tuning import EccentricTuning as EccentricTuning
     from ringbalance.controller.rotor import Sensor as Sensor
     from ringbalance.controller.simulation import Simulation as Simulation
-    from ringbalance.controller.tuning.tune import Tuning as Tuning
+    from ringbalance.controller.tuning.result import Tuning as Tuning
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune

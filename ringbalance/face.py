@@ -15,7 +15,7 @@ from ringbalance.controller.eccentric_mass.tuning import EccentricTuning
 from ringbalance.controller.loop import Progress
 from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Simulation
-from ringbalance.controller.tuning.tune import Tuning
+from ringbalance.controller.tuning.result import Tuning
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.scene import AnyScene, Scene
 from ringbalance.scene.changes import checked_scene

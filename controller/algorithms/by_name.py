@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from ringbalance.controller.algorithms.algorithm import Controller
+from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.algorithms.target_vector import TargetVector
 from ringbalance.controller.algorithms.trial import Trial
@@ -18,7 +16,7 @@ from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
 
-def controller_of(scene: Scene, model: BalancerModel | None = None) -> Controller[Any]:
+def controller_of(scene: Scene, model: BalancerModel | None = None) -> BuiltIn:
     """The control algorithm that a scene asks for; `model` is the balancer as the law-based one assumes it.
 
     Raises: SceneError: an algorithm that this program does not have.

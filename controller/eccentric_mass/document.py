@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.document import amplitude_line
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import given
 from ringbalance.results.result import Rows
@@ -16,9 +17,6 @@ from ringbalance.results.rows import Quantity, around
 from ringbalance.results.table import Table
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.uncertain import NORMAL_95
-
-if TYPE_CHECKING:
-    from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 
 _MOST_ROWS: Final = 2500
 """Instants in the document; a run has a hundred times as many."""

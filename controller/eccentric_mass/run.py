@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.document import eccentric_document, eccentric_rows
 from ringbalance.controller.eccentric_mass.estimation.rotor_uncertainty import rotor_covariance
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, check_substeps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
@@ -19,6 +20,7 @@ from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings, believed_whirl
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
 from ringbalance.results.findings import Finding
+from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 
@@ -52,6 +54,7 @@ def simulate_eccentric(
     remedies = remedies_of(facts)
     settled = facts.settling_time is not None and outcome.value in {"settled", "locked"}
     return EccentricRun(
+        presentation=Presentation(document=eccentric_document, rows=eccentric_rows),
         balancer="eccentric_mass",
         scene=scene.name,
         source=scene.source,

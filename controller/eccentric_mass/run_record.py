@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.document import eccentric_document, eccentric_rows
 from ringbalance.controller.eccentric_mass.run_loop import Record
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets
 from ringbalance.results.findings import Finding
-from ringbalance.results.result import Result, Rows
+from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 
 _NOTHING: Final = 1e-6
@@ -63,7 +62,7 @@ class StageSpan:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class EccentricRun(Result):
+class EccentricRun(PresentedResult):
     """One run of the whole strategy on the plant."""
 
     balancer: str
@@ -116,14 +115,6 @@ class EccentricRun(Result):
     """For the imbalance as it was estimated; None when it never came to that."""
     unbalanced_amplitude: float
     """Steady amplitude that the masses' first places would give at the last speed, m."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """The document that the command of the result prints with `--json`."""
-        return eccentric_document(self)
-
-    def rows(self) -> Rows:
-        """Quantities, findings and tables."""
-        return eccentric_rows(self)
 
     @property
     def status(self) -> str:

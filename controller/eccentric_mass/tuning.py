@@ -20,7 +20,7 @@ from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Sta
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
 from ringbalance.results.findings import Finding
-from ringbalance.results.result import Result, Rows
+from ringbalance.results.result import Presentation, PresentedResult, Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.results.table import Table
 
@@ -45,7 +45,7 @@ class _EccentricSettling:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class EccentricTuning(Result):
+class EccentricTuning(PresentedResult):
     """What is recommended for the drives of eccentric masses."""
 
     scene: EccentricScene
@@ -55,14 +55,6 @@ class EccentricTuning(Result):
     """Keys that the runs had lowered or raised to the recommended value, SI."""
     settling: _EccentricSettling | None
     """None: not asked for, or the masses are locked."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """The document that the command of the result prints with `--json`."""
-        return eccentric_tuning_document(self)
-
-    def rows(self) -> Rows:
-        """Quantities, findings and tables."""
-        return eccentric_tuning_rows(self)
 
     @property
     def recommended_scene(self) -> EccentricScene:
@@ -94,7 +86,13 @@ def tune_eccentric(
     settling = None
     if runs and scene.supervisor.strategy != "locked":
         settling = _eccentric_settling(ready, runs=runs, told=told or (lambda _: None))
-    return EccentricTuning(scene=scene, gains=gains, tuned=changes, settling=settling)
+    return EccentricTuning(
+        presentation=Presentation(document=eccentric_tuning_document, rows=eccentric_tuning_rows),
+        scene=scene,
+        gains=gains,
+        tuned=changes,
+        settling=settling,
+    )
 
 
 def _eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> _EccentricSettling:

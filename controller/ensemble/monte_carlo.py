@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.checks import check_fit
 from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns
 from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
@@ -122,17 +123,18 @@ def simulate_ensemble(
     *,
     uncertainty_95: MemberUncertainty | None = None,
     dynamics: Dynamics | None = None,
+    controller: BuiltIn | None = None,
     quantiles: Sequence[float] = QUANTILES,
     workers: int = 2,
     progress: Progress | None = None,
 ) -> Ensemble:
-    """Distributions over n noisy runs of the target-vector algorithm under a flow law.
+    """Distributions over n noisy runs under a flow law.
 
     Every member has its own speed of flow, moment, influence coefficient, lag angle and noise; the algorithm
-    keeps the assumptions and the gain of the scene, whatever its `controller.kind`. Inertia, gas filling and
-    valve lag are modelled as in a single run. The same seed gives the
-    same numbers for any number of threads (`workers`), and a larger ensemble begins with the members of a
-    smaller one.
+    keeps the assumptions and the gain of the scene. Inertia, gas filling and valve lag are modelled as in a
+    single run. The same seed gives the same numbers for any number of threads (`workers`), and a larger
+    ensemble begins with the members of a smaller one.
+    Args: `controller`: default the scene's target vector, whatever its `controller.kind`.
     Raises: SceneError: a rotor too slow to form a ring, a model made for another disc, or more samples than a
         run may take.
     Raises: ValueError: no members, no workers, or a law that an ensemble cannot follow.
@@ -142,7 +144,7 @@ def simulate_ensemble(
     model = flow_law if isinstance(flow_law, BalancerModel) else BalancerModel.of(flow_law)
     followed = ensemble_dynamics(scene, model) if dynamics is None else dynamics
     widths = MemberUncertainty.of(scene, model) if uncertainty_95 is None else uncertainty_95
-    plan = EnsemblePlan.of(scene=scene, model=model, dynamics=followed)
+    plan = EnsemblePlan.of(scene=scene, model=model, dynamics=followed, controller=controller)
     tally = _Tally(time_limit=scene.run.time_limit, quantiles=quantiles)
 
     def run(block: int) -> MemberRuns:

@@ -34,9 +34,10 @@ from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
+from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.search import recommended
 from ringbalance.controller.tuning.settling import drawn_run
-from ringbalance.controller.tuning.tune import Tuning, tune
+from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.calibration import calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw

@@ -65,25 +65,6 @@ _UNFINISHED: Final = EVENTS.index(Event.UNFINISHED)
 
 
 @in_place
-def carry(
-    plant: Record,
-    motions: Record,
-    chamber: int,
-    duration: float,
-    notes: FloatArray,
-    count: int,
-    w: FloatArray,
-) -> float:
-    """Let a time pass for `motions[0]` as `advance` does, with its fills in row 1 of `notes`; or, given a
-    driven chamber, which is not below zero, finds its `opening_within` on `motions[1]`.  Returns: a time, s.
-    """
-    if chamber >= 0:
-        return opening_within(plant, motions, 0, 1, chamber, duration, w)
-    advance(plant, motions[0], duration, notes, 1, count, w)
-    return duration
-
-
-@in_place
 def advance(
     plant: Record, motion: Record, duration: float, notes: FloatArray, row: int, count: int, w: FloatArray
 ) -> None:

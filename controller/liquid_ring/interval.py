@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.liquid_ring.compiled_lift import resume, stands
-from ringbalance.controller.liquid_ring.compiled_march import carry
+from ringbalance.controller.liquid_ring.compiled_march import advance
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Record, Switch
 from ringbalance.controller.liquid_ring.records import EVENTS, MOTION, WORK, WORKSPACE, P, U
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
-
-_NONE: Final = -1
-"""Instead of a driven chamber."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +39,7 @@ def pass_time(dynamics: Dynamics, pair: PairState, *, instants: FloatArray) -> P
     plant = dynamics.kept_plant(total=total)
     state = packed(plant, fill=pair.fill, primed=pair.primed, motion=pair.motion)
     notes = np.stack([instants, instants])
-    carry(plant[0], state, _NONE, float(instants[-1]), notes, instants.size, np.zeros(WORKSPACE))
+    advance(plant[0], state[0], float(instants[-1]), notes, 1, instants.size, np.zeros(WORKSPACE))
     lowest, highest = max(0.0, total - dynamics.max_fill_ratio), min(total, dynamics.max_fill_ratio)
     return Passage(
         fills=np.clip(notes[1], lowest, highest),
@@ -62,14 +58,6 @@ def opened(dynamics: Dynamics, *, chamber: int, duration: float) -> tuple[Switch
         Switch(after=lag, chamber=chamber, opens=True),
         Switch(after=lag + duration, chamber=chamber, opens=False),
     )
-
-
-def longest_opening(dynamics: Dynamics, pair: PairState, *, chamber: int, duration: float) -> float:
-    """Longest valve-open time, at most `duration`, s, whose injection and tail leave the residual fill."""
-    plant = dynamics.kept_plant(total=pair.total)
-    states = np.concatenate([packed(plant, fill=pair.fill, primed=pair.primed, motion=pair.motion)] * 2)
-    w = np.zeros(WORKSPACE)
-    return carry(plant[0], states, chamber, duration, w, 0, w)
 
 
 def packed(plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Motion) -> npt.NDArray[np.void]:

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ringbalance.controller.formulas import NOTICEABLE
-from ringbalance.controller.liquid_ring.interval import Passage, longest_opening, opened, pass_time
+from ringbalance.controller.liquid_ring.interval import opened, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, PairState, Record
-from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.controller.liquid_ring.records import Event
-from ringbalance.controller.rotor import chamber_directions, disc_unbalance
+from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
-from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.models import Disc
 
 _SCAN: Final = 33
 """Instants at which a fill is looked for before its time is found."""
@@ -122,22 +119,6 @@ class LiquidRing:
         """Whether liquid runs back with the gas off though its tube is not primed."""
         return floods(self.model.flow, total=self.model.flow.max_fill_ratio)
 
-    def permitted(self, state: DiscState, *, gas_times: Mapping[int, float]) -> dict[int, float]:
-        """Valve-open times, s, shortened so that no driven chamber falls below its residual fill.
-
-        A chamber that is already there is left out.
-        """
-        half = self.chambers // 2
-        found = {i: self._permitted(state.pairs[i % half], i < half, time) for i, time in gas_times.items()}
-        return {chamber: time for chamber, time in found.items() if time > 0}
-
-    def _permitted(self, pair: PairState, first: bool, duration: float) -> float:
-        if self.residual_fill <= 0:
-            return duration
-        if (pair.fill if first else pair.opposite_fill) <= self.residual_fill + NEAR_RESIDUAL:
-            return 0.0
-        return longest_opening(self.dynamics, pair, chamber=0 if first else 1, duration=duration)
-
     def advance(
         self, state: DiscState, *, gas_times: Mapping[int, float], duration: float, points: int
     ) -> Advance:
@@ -214,50 +195,6 @@ class LiquidRing:
         pair = state.pairs[operation.chamber % (self.chambers // 2)]
         return self._operation(pair, _Valve(chamber=operation.chamber, duration=operation.duration))
 
-    def gas_time(self, pair: PairState, *, first: bool, fill: float, longest: float) -> float:
-        """Valve-open time, s, that lowers the driven chamber of a pair at rest to a fill ratio.
-
-        Args: `first`: whether the chamber on the positive side is driven. `longest`: s, that it keeps to.
-        Returns: Zero when the fill is not below the present one or nothing flows; the time of the stall when
-            the flow stalls before; below the smallest possible fill the last velocity is kept.
-        """
-        instants = np.linspace(0.0, longest, _SCAN)
-        driven = self._commanded(pair, _Valve(chamber=0 if first else 1, duration=2.0 * longest), 0)
-
-        def above(at: FloatArray) -> tuple[Passage, FloatArray]:
-            passage = pass_time(self.dynamics, driven, instants=at)
-            fills = passage.fills if first else pair.total - passage.fills
-            return passage, np.asarray(fills - fill, dtype=np.float64)
-
-        path, left = above(instants)
-        event = path.motion.record.event
-        if (pair.fill if first else pair.opposite_fill) <= fill or event is Event.BLOCKED:
-            return 0.0
-        if left[-1] > 0:
-            more = float(left[-1]) / self._last_rate(pair) if event in {Event.EMPTY, Event.FULL} else 0.0
-            return min(path.ended + more, longest) if path.ended > 0 else longest
-        place = int(np.argmax(left <= 0))
-        before, after = float(instants[place - 1]), float(instants[place])
-        after = path.ended if before < path.ended < after else after
-        if above(np.array([after]))[1][0] >= 0:
-            return after
-        return float(
-            brentq(lambda time: above(np.array([time]))[1][0], before, after, xtol=_TIME_ERROR * longest)
-        )
-
-    def _last_rate(self, pair: PairState) -> float:
-        """Fill ratio that leaves a driven chamber per second as its flow ends at a limit, 1/s."""
-        largest = self.model.flow.max_fill_ratio
-        fill = max(0.0, pair.total - largest)
-        flow = self.model.flow.evaluate(
-            fill_ratio=fill,
-            opposite_fill_ratio=min(pair.total - fill, largest),
-            gas_pressure=self.gas_pressure,
-            primed=True,
-        )
-        rate = float(flow.velocity) * self.model.tube_area / self.model.chamber_volume
-        return rate if rate > 0 else math.inf
-
     def least_fill(self, *, state: DiscState) -> float:
         """Fill to which injections can bring a chamber: the residual one, or that at which the gas stalls."""
         total = state.pairs[0].total
@@ -275,17 +212,6 @@ class LiquidRing:
         highest = min(total - least, self.model.flow.max_fill_ratio)
         moment = self.model.moment.pair_vector(fill_ratio=highest, opposite_fill_ratio=total - highest)
         return complex(moment)
-
-    def drains(self, state: DiscState, runs_back: Sequence[bool], scene: Scene) -> bool:
-        """Whether the vibration would be above the limit, were the pairs level that still run back."""
-        if not any(runs_back):
-            return False
-        pairs = [
-            replace(pair, fill=pair.total / 2) if back else pair
-            for pair, back in zip(state.pairs, runs_back, strict=True)
-        ]
-        moment = disc_unbalance(moment=self.model.moment, fill_ratio=DiscState(pairs=tuple(pairs)).fills())
-        return abs(complex(scene.rotor.vibration(moment))) > scene.controller.limit
 
     def unreachable_vibration(
         self, *, state: DiscState, rotor: Rotor, least_fill: float | None = None

@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.algorithms.by_name import law_based_of
+from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.ensemble.monte_carlo import Probability, simulate_ensemble
 from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
 from ringbalance.controller.liquid_ring.plant import DiscState
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.simulation import Outcome, Simulation
+from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_gas
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -29,13 +29,13 @@ from ringbalance.scene.models import Scene
 Progress = Callable[[str], None]
 
 MEMBERS: Final = 2000
-"""Compiled runs of the target-vector algorithm."""
+"""Runs of the target-vector algorithm."""
 MOVING_MEMBERS: Final = 200
 """The most of them where inertia, gas or valves are modelled, which takes a hundred times as long."""
 FIRST_MEMBERS: Final = 16
 """Of these come first; more only where their 95 % interval leaves it open that 95 % of them settle."""
 RUNS: Final = 20
-"""Runs one by one, of an algorithm that is not compiled."""
+"""Of another algorithm."""
 FIRST_RUNS: Final = 4
 TOO_MANY: Final = 0.05
 """Fraction of the runs that is kept from settling for one reason, beyond which 95 % cannot settle."""
@@ -120,12 +120,12 @@ def many_runs(
 ) -> SettlingTimes:
     """Few runs first, and more where these leave it open that 95 % settle.
 
-    Args: `members`: the most of compiled runs. `runs`: the most of others.
+    Args: `members`: the most of the target-vector algorithm. `runs`: the most of others.
     """
-    compiled = scene.controller.kind == "target_vector"
+    vector = scene.controller.kind == "target_vector"
     moving = bool(terms_modelled(run_models(scene=scene, model=model)))
-    most = min(members, MOVING_MEMBERS if moving else members) if compiled else runs
-    first = (FIRST_MEMBERS if moving else most) if compiled else FIRST_RUNS
+    most = min(members, MOVING_MEMBERS if moving else members) if vector else runs
+    first = (FIRST_MEMBERS if moving else most) if vector else FIRST_RUNS
     found = _runs(scene, model, widths, number=min(first, most), told=told)
     if first < most and found.settled.high >= QUANTILES["p95"]:
         return _runs(scene, model, widths, number=most, told=told)
@@ -146,15 +146,22 @@ def tried(scene: Scene, model: BalancerModel, widths: MemberUncertainty) -> Sett
 def _runs(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, number: int, told: Progress
 ) -> SettlingTimes:
-    if scene.controller.kind == "target_vector":
-        return _of_ensemble(scene, model, widths, members=number, told=told)
-    found = []
-    for i in range(number):
-        told(f"run {i + 1}")
-        found.append(drawn_run(scene, model, widths, number=i))
-    times = [math.inf if run.settling_time is None else run.settling_time for run in found]
-    drifted = sum(run.outcome is Outcome.DRIFTING for run in found)
-    return replace(summary(times), drifted=drifted / number)
+    found = simulate_ensemble(
+        scene,
+        model,
+        number,
+        scene.run.seed,
+        uncertainty_95=widths,
+        controller=controller_of(scene, model),
+        quantiles=tuple(QUANTILES.values()),
+        progress=lambda done, of: told(f"{done} of {of} runs"),
+    )
+    return SettlingTimes(
+        runs=number,
+        settled=found.settled,
+        quantiles=dict(zip(QUANTILES, found.settling_quantiles, strict=True)),
+        drifted=found.drifted.value,
+    )
 
 
 def summary(times: Sequence[float]) -> SettlingTimes:
@@ -162,26 +169,6 @@ def summary(times: Sequence[float]) -> SettlingTimes:
     settled = Probability.counted(count=sum(map(math.isfinite, times)), of=len(times))
     quantiles = {name: _quantile(np.array(times), q) for name, q in QUANTILES.items()}
     return SettlingTimes(runs=len(times), settled=settled, quantiles=quantiles)
-
-
-def _of_ensemble(
-    scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, members: int, told: Progress
-) -> SettlingTimes:
-    found = simulate_ensemble(
-        scene,
-        model,
-        members,
-        scene.run.seed,
-        uncertainty_95=widths,
-        quantiles=tuple(QUANTILES.values()),
-        progress=lambda done, of: told(f"{done} of {of} runs"),
-    )
-    return SettlingTimes(
-        runs=members,
-        settled=found.settled,
-        quantiles=dict(zip(QUANTILES, found.settling_quantiles, strict=True)),
-        drifted=found.drifted.value,
-    )
 
 
 def _beyond_capacity(

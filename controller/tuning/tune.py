@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,8 @@ from ringbalance.controller.tuning.loop_factor import (
     vibration_rates,
     with_driving_gas,
 )
-from ringbalance.controller.tuning.recommendation import Contribution, FactorUncertainty, factor_uncertainty
+from ringbalance.controller.tuning.recommendation import FactorUncertainty, factor_uncertainty
+from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.search import (
     LIMITS,
     VALVES,
@@ -37,71 +38,10 @@ from ringbalance.controller.tuning.view import tuning_rows
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.terms import ModelUsed, neglected_in_injections
-from ringbalance.results.result import Result, Rows
+from ringbalance.reduced_model.terms import neglected_in_injections
+from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import finite
-from ringbalance.scene.changes import rechecked
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Tuning(Result):
-    """What is recommended for a scene's controller under a law."""
-
-    scene: Scene
-    """With what is recommended."""
-    law: str
-    gain: float | None
-    """Kc, s/m; None for an algorithm without a gain, and where no gain reaches the limit."""
-    present: LoopFactor
-    """With the scene's own gain."""
-    loop: LoopFactor
-    """With the recommended one."""
-    margins: Margins | None
-    contributions: tuple[Contribution, ...]
-    first_gas_time: float | None
-    """s, of the vector, for the initial vibration."""
-    last_gas_time: float | None
-    """s, for an amplitude at the limit."""
-    smallest_correction: float
-    """Change of the vibration by the shortest valve-open time in the fastest chamber, m."""
-    dead_times: tuple[float, ...]
-    """s, of every chamber; empty where runs do not model the filling of gas."""
-    dead_zone: float
-    """Largest amplitude at which no valve may open any more, or none transfers liquid, m."""
-    change: str
-    """Keys and values that are recommended beside the gain; empty: none."""
-    search: Search | None
-    """What was tried because the runs under the first recommendation do not settle; None: they do."""
-    beyond_capacity: float
-    """Vibration that remains with the liquid at its best, m."""
-    reachable: bool | None
-    """Whether valves and gas line can bring the amplitude below the limit; None: the line is not known."""
-    gas_line: tuple[LineAnswer, ...]
-    """What the gas line can deliver, or both ends of a default range of lines."""
-    settling: SettlingTimes | None
-    models_used: tuple[ModelUsed, ...]
-    status: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """The document that the command of the result prints with `--json`."""
-        return tuning_document(self)
-
-    def rows(self) -> Rows:
-        """Quantities, findings and tables."""
-        return tuning_rows(self)
-
-    @property
-    def recommended_scene(self) -> AnyScene:
-        """The scene with what is recommended, checked, with a hash of its own."""
-        return rechecked(self.scene)
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether 95 % of the runs settle in time, and nothing that is known stands against it."""
-        reached = self.settling is not None and self.settling.quantiles["p95"] is not None
-        return reached and self.reachable is not False
 
 
 def tune(
@@ -167,6 +107,7 @@ def _judged(
     # The law-based algorithm asks for the time in which the law moves the whole residual.
     gain = (1.0 / loop.rate if settings.kind == "law_based" else settings.proportional) if flows else None
     return Tuning(
+        presentation=Presentation(document=tuning_document, rows=tuning_rows),
         scene=tuned,
         law=model.name,
         gain=None if settings.kind == "law_based" else gain,

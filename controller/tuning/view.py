@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from ringbalance.controller.tuning.result import Tuning
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.terms import neglected_in_injections
 from ringbalance.results.findings import Finding
@@ -13,9 +13,6 @@ from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.results.table import Table
 from ringbalance.scene.arrays import finite
-
-if TYPE_CHECKING:
-    from ringbalance.controller.tuning.tune import Tuning
 
 
 def tuning_rows(tuning: Tuning) -> Rows:

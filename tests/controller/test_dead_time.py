@@ -23,7 +23,8 @@ from ringbalance.controller.tuning.dead_time import (
     standing_finding,
 )
 from ringbalance.controller.tuning.loop_factor import vibration_rates
-from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
+from ringbalance.controller.tuning.result import Tuning
+from ringbalance.controller.tuning.tune import tune, tuning_document
 from ringbalance.reduced_model.gas_line import line_answers, line_warning, standing_amplitude
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_middle

@@ -16,12 +16,14 @@ from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
-from ringbalance.controller.algorithms.law_based import LawBased, learnt
+from ringbalance.controller.algorithms.law_based import LawBased, _gas_time, learnt
 from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
-from ringbalance.controller.liquid_ring.motion import PairState
+from ringbalance.controller.liquid_ring.interval import packed
+from ringbalance.controller.liquid_ring.motion import Motion
 from ringbalance.controller.liquid_ring.plant import LiquidRing
+from ringbalance.controller.liquid_ring.records import WORKSPACE
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.loop_records import MOMENT_NODES, RUN
+from ringbalance.controller.loop_records import LOOP, MOMENT_NODES, RUN
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -56,6 +58,15 @@ def with_chambers(scene: Scene, chambers: int) -> Scene:
 # --- valve-open times ---
 
 
+def gas_time_of(ring: LiquidRing, *, side: int, wanted: float, longest: float) -> float:
+    """Valve-open time that brings a level pair to a fill of its positive chamber, s; zero: nothing flows."""
+    plant, loop = ring.dynamics.kept_plant(total=0.5), np.zeros(1, dtype=LOOP)
+    loop["maximum_gas_time"] = longest
+    liquid = np.repeat(packed(plant, fill=0.25, primed=False, motion=Motion()), 2)
+    room = np.zeros((2, 1)), np.zeros(WORKSPACE)
+    return float(_gas_time(loop[0], plant[0], liquid, 0, side, wanted, *room))
+
+
 @pytest.fixture
 def gas_time(laws: Mapping[str, Any], model: BalancerModel, ring_of: RingOf) -> Callable[..., float]:
     """Valve-open time by a small law on a level pair, with S/V = 0.02 per metre."""
@@ -63,7 +74,7 @@ def gas_time(laws: Mapping[str, Any], model: BalancerModel, ring_of: RingOf) -> 
     def find(name: str, fill: float, longest: float = 10.0, gas_pressure: float = 1e5) -> float:
         own = replace(model, flow=laws[name], tube_area=0.02 * model.chamber_volume)
         ring = ring_of(own, gas_pressure=gas_pressure)
-        return ring.gas_time(PairState(fill=0.25, total=0.5), first=True, fill=fill, longest=longest)
+        return gas_time_of(ring, side=0, wanted=fill, longest=longest)
 
     return find
 
@@ -92,7 +103,7 @@ def test_a_fill_beyond_empty_goes_on_at_the_last_velocity(gas_time: Callable[...
 
 
 def test_the_papers_gas_time_by_hand(model: BalancerModel, ring_of: RingOf) -> None:
-    found = ring_of(model).gas_time(PairState(fill=0.25, total=0.5), first=False, fill=0.1, longest=5.0)
+    found = gas_time_of(ring_of(model), side=1, wanted=0.4, longest=5.0)
     # Eq. 20 in the limit: 2 D/(u0 + u1) with D the metres of flow.
     flow = model.flow.evaluate(fill_ratio=np.array([0.25, 0.1]), gas_pressure=0.7e6)
     assert found == pytest.approx(

@@ -23,7 +23,8 @@ from ringbalance.controller.eccentric_mass.tuning import FIRST_RUNS, _eccentric_
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
-from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
+from ringbalance.controller.tuning.result import Tuning
+from ringbalance.controller.tuning.tune import tune, tuning_document
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model

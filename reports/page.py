@@ -8,12 +8,14 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from types import MappingProxyType
 from typing import Final
 
 from PIL import Image
 
+from ringbalance.reduced_model.budget import UNSTATED
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
 from ringbalance.reports.figures.calibration import chamber_figures, tube_figures
@@ -31,9 +33,10 @@ from ringbalance.reports.numbers import (
 )
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.eccentric_scene import BALANCER
-from ringbalance.reports.prose import traced
+from ringbalance.reports.prose import named_with_origin, states_uncertainty, traced
 from ringbalance.reports.section import Cells, Record, Table
 from ringbalance.reports.sections import drawings_in, section_views, viewed
+from ringbalance.reports.traced import known_width, placed
 
 Facts = tuple[tuple[str, str], ...]
 """Labels and texts."""
@@ -266,6 +269,10 @@ def page_content(
 def _frame(evidence: Record, sections: list[Record]) -> Record:
     """What the page of any scene has."""
     return {
+        "e": placed(evidence),
+        "known": partial(known_width, stated=states_uncertainty(evidence)),
+        "named": partial(named_with_origin, evidence),
+        "unstated": UNSTATED,
         "scene": evidence["scene"],
         "sections": sections,
         "stamp": _stamp(evidence),

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final, Literal
 
+from markupsafe import Markup
+
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.numbers import MISSING
@@ -25,7 +27,7 @@ Place = Literal["report", "annex"]
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Texts in rows and columns; a column is set as numbers when most of its cells begin like one."""
+    """Texts or markup in rows and columns; a column is set as numbers when most cells begin like one."""
 
     caption: str = ""
     heads: Cells
@@ -38,7 +40,13 @@ class Table:
     def numeric(self) -> list[bool]:
         """By column."""
         columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.heads)
-        return [_numeric([untraced(cell) for cell in column if cell.strip(MISSING)]) for column in columns]
+        plain = ([striptags(untraced(cell)) for cell in column] for column in columns)
+        return [_numeric([cell for cell in column if cell.strip(MISSING)]) for column in plain]
+
+
+def striptags(text: str) -> str:
+    """What a reader sees of markup; other text as it is."""
+    return text.striptags() if isinstance(text, Markup) else text
 
 
 def _numeric(cells: Cells) -> bool:

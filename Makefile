@@ -1,7 +1,6 @@
 # `make report` and `make test` are all that a newcomer needs; `make help` lists the rest.
 SHELL := /bin/sh
 VENV := .venv
-BENCH_VENV := .venv-bench
 PYTHON_IN_VENV := $(VENV)/bin/python
 SCENE ?= scenes/liquid_ring_paper.toml
 OUT ?= out
@@ -10,7 +9,7 @@ WORKERS ?= 2
 SHORT_TESTS := tests/scene tests/mesh tests/architecture tests/test_public_names.py tests/test_cli.py \
 	tests/physics/test_pressure.py tests/physics/test_tube_loss.py tests/reduced_model/test_paper_law.py \
 	tests/reduced_model/test_hermite.py tests/controller/test_loop.py tests/controller/test_compiled.py
-CODE := scene mesh physics reduced_model controller identification verification reports tools benchmarks
+CODE := scene results mesh physics reduced_model controller identification verification reports tools benchmarks
 # One thread per process: the tests run side by side, and sums then come out the same on every machine.
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
@@ -55,16 +54,12 @@ format: env ## let ruff write what `make lint` asks for
 	$(VENV)/bin/ruff check --fix .
 	$(VENV)/bin/ruff format .
 
-bench: ## timed comparisons, in an environment of their own with every extra (hundreds of MB)
-	@sh tools/make_env.sh $(BENCH_VENV) requirements/lock-all.txt
-	@sh tools/make_ngsolve.sh "$(CURDIR)/$(BENCH_VENV)/bin/python"
-	$(BENCH_VENV)/bin/python benchmarks/calibrate_command.py
-	$(BENCH_VENV)/bin/python benchmarks/pressure_field.py
-	$(BENCH_VENV)/bin/python benchmarks/tube_flow.py
-	$(BENCH_VENV)/bin/python benchmarks/closed_loop.py
-	$(BENCH_VENV)/bin/python benchmarks/moving_injection.py
-	$(BENCH_VENV)/bin/python benchmarks/closed_loop_moving.py
-	$(BENCH_VENV)/bin/python benchmarks/eccentric_mass.py
+bench: env ## timed comparisons, each a ratio within one run
+	$(PYTHON_IN_VENV) benchmarks/calibrate_command.py
+	$(PYTHON_IN_VENV) benchmarks/closed_loop.py
+	$(PYTHON_IN_VENV) benchmarks/moving_injection.py
+	$(PYTHON_IN_VENV) benchmarks/closed_loop_moving.py
+	$(PYTHON_IN_VENV) benchmarks/eccentric_mass.py
 
 bench-cfd: env ## the tube and the waves beside OpenFOAM, an hour or so; keeps the results
 	@sh tools/make_openfoam.sh
@@ -74,5 +69,5 @@ lock: env ## rewrite the lock files from pyproject.toml (a change of dependencie
 	sh tools/make_lock.sh $(VENV)/bin/uv
 
 clean: ## remove what the other targets made, the environments included
-	rm -rf $(VENV) .venv-3.* $(BENCH_VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-3.* out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -not -path './.git/*' -prune -exec rm -rf {} +

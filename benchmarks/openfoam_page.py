@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ringbalance.reduced_model.budget import rounded
+from ringbalance.results.numbers import rounded
 
 _TITLES = {
     "tube": "Straight turning tube, laminar",

@@ -19,13 +19,13 @@ from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.search import recommended
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.results import CommandResult
 
 _ModelOf = Callable[[Scene], BalancerModel]
 """Makes the model of a liquid ring from its scene on the common rotor."""

@@ -23,9 +23,9 @@ from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.results import CommandResult
 
 _LITRE = 1e-3
 

@@ -22,7 +22,7 @@ from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
-from ringbalance.reduced_model.budget import rounded
+from ringbalance.results.numbers import rounded
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.units import format_quantity

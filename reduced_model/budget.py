@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from decimal import ROUND_HALF_EVEN, Decimal
 from typing import Final, Protocol
 
 import numpy as np
@@ -41,10 +40,6 @@ UNSTATED: Final = (
     "The scene states no uncertainty of its inputs, so no ± here holds what they would add; a value without "
     "± is known no better than the inputs."
 )
-_DIGITS: Final = 9
-_UNSTATED_DIGITS: Final = 4
-_INPUT_ROUNDING: Final = 5e-4
-"""Relative half-width of an input of three digits, the fewest that scene files have."""
 _NEGLIGIBLE: Final = 1e-12
 """Relative change of a quantity that counts as rounding, not as an effect of an input."""
 
@@ -93,51 +88,6 @@ class _Calibrated(Protocol):
     @property
     def residual(self) -> ResidualLiquid:
         """Under that law."""
-
-
-def last_place(total: float) -> int:
-    """Decimal exponent of the second digit of a total uncertainty: that to which a value with it is printed.
-
-    Source: at most two digits, as the GUM (JCGM 100:2008, 7.2.6) asks.
-    Raises: ValueError: an uncertainty that is not positive.
-    """
-    if not total > 0:
-        raise ValueError("an uncertainty must be positive")
-    width = Decimal(repr(float(total)))
-    # Twice, because 0.0996 becomes 0.10 and then its second digit is another one.
-    return width.quantize(Decimal(1).scaleb(width.adjusted() - 1)).adjusted() - 1
-
-
-def believed(value: float | None, total: float | None, *, stated: bool) -> float | None:
-    """A value's total uncertainty; None where it is finer than inputs of which the scene says nothing.
-
-    Args: `stated`: whether the scene states the uncertainty of any input.
-    """
-    fine = value is not None and total and total <= _INPUT_ROUNDING * abs(value)
-    return None if fine and not stated else total
-
-
-def rounded(value: float, total: float | None) -> str:
-    """A value, or its uncertainty, to the place of the second digit of the total uncertainty.
-
-    Nine digits of the value at most, and that many where the uncertainty is zero; four where it is None, as
-    `believed` has it. An exact zero has none.
-    """
-    if total is None:
-        total = 10.0 ** (Decimal(f"{value:.{_UNSTATED_DIGITS - 1}e}").adjusted() + 2 - _UNSTATED_DIGITS)
-    if not total > 0 or value == 0:
-        return f"{value + 0.0:.{_DIGITS}g}"
-    exact = Decimal(repr(float(value)))
-    place = max(last_place(total), exact.adjusted() - _DIGITS + 1)
-    shown = exact.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
-    plain = shown if shown else abs(shown)
-    return f"{plain:f}" if place > -_DIGITS else f"{plain:e}"
-
-
-def measured(value: float, total: float | None) -> str:
-    """Value ± total uncertainty, both to the second digit of that; the value alone where it is None."""
-    shown = rounded(value, total)
-    return shown if total is None else f"{shown} ± {rounded(total, total)}"
 
 
 def budgets(*, scene: Scene, calibration: _Calibrated) -> Mapping[str, Budget]:

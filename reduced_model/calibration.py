@@ -34,10 +34,10 @@ from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
 from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
 from ringbalance.reduced_model.selection.tube_terms import with_tube_models
 from ringbalance.reduced_model.tube.heads import TubeHeads
+from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
-from ringbalance.scene.results import CommandResult
 
 VELOCITY_POINTS: Final = 47
 IDENTIFIABILITY: Final = (

@@ -14,7 +14,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.reduced_model.budget import UNSTATED, believed, measured, rounded
+from ringbalance.reduced_model.budget import UNSTATED
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
 from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
@@ -29,6 +29,7 @@ from ringbalance.reduced_model.documents import (
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
+from ringbalance.results.numbers import believed, measured, plain, rounded
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.files import check_file
@@ -121,7 +122,7 @@ def _measured(
 ) -> str:
     """Value ± uncertainty and unit, as far as the scene's inputs can be believed."""
     known = believed(value, total, stated=_stated(calibration))
-    return f"{measured(scale * value, None if known is None else scale * known)} {unit}".rstrip()
+    return f"{plain(measured(scale * value, None if known is None else scale * known))} {unit}".rstrip()
 
 
 def _shown(calibration: Calibration, name: str, unit: str = "", *, scale: float = 1.0) -> str:
@@ -185,7 +186,7 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
     if not chamber.status.ok:
         yield "note", chamber.status.text
     for finding in mesh_findings(calibration.scene):
-        yield "warning", finding.change
+        yield "warning", finding.text
     if calibration.instability is not None and calibration.instability.warning:
         yield "warning", calibration.instability.warning
 

@@ -62,7 +62,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "holding": _holding(calibration),
         "gas_line": line_document(calibration.gas_line),
         "models_used": [asdict(term) for term in calibration.models_used],
-        "findings": [asdict(each) for each in mesh_findings(scene)],
+        "findings": [each.document() for each in mesh_findings(scene)],
         "status": {"code": str(calibration.chamber.status.code), "text": calibration.chamber.status.text},
         "statistics": dict(calibration.statistics),
     }

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ringbalance.reduced_model.budget import believed, measured
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.results.numbers import believed, measured, plain
 
 
 def calibration_lines(calibration: Calibration) -> Iterator[str]:
@@ -17,7 +17,7 @@ def calibration_lines(calibration: Calibration) -> Iterator[str]:
         budget = calibration.budgets[name]
         total = believed(budget.value, budget.total, stated=bool(scene.uncertainty))
         shown = measured(scale * budget.value, None if total is None else scale * total)
-        return f"{shown} {unit}".rstrip()
+        return f"{plain(shown)} {unit}".rstrip()
 
     yield f"Calibration of {scene.name} ({scene.source})"
     yield f"lambda {quantity('lambda', 'mm', 1e3)} per transferred mass"

@@ -7,9 +7,9 @@ from typing import Any
 
 from ringbalance.controller.eccentric_mass.study import eccentric_study
 from ringbalance.reports.evidence import FORMAT, Progress, cases_of_report, scene_record
-from ringbalance.reports.numbers import given, short, with_unit
 from ringbalance.reports.provenance import provenance, versions
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import given, short, with_unit
 from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene, SpeedPoint
 from ringbalance.scene.keys.declaration import Key, keys_of
 from ringbalance.scene.keys.fields import Reader

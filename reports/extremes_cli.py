@@ -12,9 +12,9 @@ from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
-from ringbalance.reports.numbers import number
 from ringbalance.reports.pages.extremes import axis_rows, map_drawings
 from ringbalance.reports.section import Cells
+from ringbalance.results.numbers import number
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.faults import Fault, SceneError, toml_text
 from ringbalance.scene.loader import load_scene

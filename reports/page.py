@@ -21,7 +21,13 @@ from ringbalance.reports.equations import equation_svg, equations
 from ringbalance.reports.figures.calibration import chamber_figures, tube_figures
 from ringbalance.reports.figures.loop import loop_figures
 from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.numbers import (
+from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.pages.eccentric_scene import BALANCER
+from ringbalance.reports.prose import named_with_origin, states_uncertainty, traced
+from ringbalance.reports.section import Cells, Record, Table
+from ringbalance.reports.sections import drawings_in, section_views, viewed
+from ringbalance.reports.traced import known_width, placed
+from ringbalance.results.numbers import (
     PLUS_MINUS,
     display_unit,
     fixed,
@@ -31,12 +37,6 @@ from ringbalance.reports.numbers import (
     short,
     shown,
 )
-from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.eccentric_scene import BALANCER
-from ringbalance.reports.prose import named_with_origin, states_uncertainty, traced
-from ringbalance.reports.section import Cells, Record, Table
-from ringbalance.reports.sections import drawings_in, section_views, viewed
-from ringbalance.reports.traced import known_width, placed
 
 Facts = tuple[tuple[str, str], ...]
 """Labels and texts."""

@@ -9,8 +9,7 @@ from typing import Any, Final
 
 from markupsafe import Markup, escape
 
-from ringbalance.reduced_model.budget import believed
-from ringbalance.reports.numbers import shown
+from ringbalance.results.numbers import believed, shown
 from ringbalance.scene.joint import FITTED
 
 _GREEK: Final = {

@@ -14,7 +14,7 @@ from typing import Final
 from ringbalance.reports.section import Record
 
 _PACKAGES: Final = (
-    *("numpy", "scipy", "scikit-fem", "pyamg", "fluids", "chemicals", "meshio", "pydantic"),
+    *("numpy", "scipy", "scikit-fem", "pyamg", "fluids", "meshio"),
     *("matplotlib", "pyvista", "vtk", "jinja2"),
 )
 _ROOT: Final = Path(__file__).resolve().parents[1]

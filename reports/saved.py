@@ -123,7 +123,7 @@ def _shown(value: Any) -> str:
 
 _PREFIX: Final = "cases-"
 _DECIDING: Final = (
-    *("scene", "mesh", "physics", "reduced_model", "controller", "identification"),
+    *("scene", "results", "mesh", "physics", "reduced_model", "controller", "identification"),
     *("verification", "scenes"),
 )
 """Rooms whose files decide what a case finds."""

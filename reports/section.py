@@ -12,8 +12,8 @@ from markupsafe import Markup
 
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reports.numbers import MISSING
 from ringbalance.reports.prose import untraced
+from ringbalance.results.numbers import MISSING
 from ringbalance.scene import Scene
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of

@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from ringbalance.reports.numbers import percent
 from ringbalance.reports.prose import series
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import percent
 
 CLAIM_VERDICTS: Final = ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run")
 CHECK_VERDICTS: Final = ("passed", "failed", "inconclusive", "not run")

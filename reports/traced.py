@@ -13,10 +13,10 @@ from typing import Any, Final, Literal, overload
 
 from markupsafe import Markup
 
-from ringbalance.reduced_model.budget import believed
-from ringbalance.reports import numbers
 from ringbalance.reports.prose import marked_up
 from ringbalance.reports.section import Table
+from ringbalance.results import numbers
+from ringbalance.results.numbers import believed
 
 Form = Literal["measured", "given", "percent", "change", "fixed"]
 

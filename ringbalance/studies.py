@@ -22,11 +22,11 @@ from ringbalance.reports.cli import draw_pictures
 from ringbalance.reports.extremes_cli import base_of
 from ringbalance.reports.report import Report
 from ringbalance.reports.report import write_report as write_scene_report
+from ringbalance.results.result import CommandResult
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.changes import checked_scene, document_of
 from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.results import CommandResult
 from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
 from ringbalance.verification.result import CaseResult

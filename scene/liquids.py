@@ -15,9 +15,10 @@ from importlib import resources
 from types import MappingProxyType
 from typing import Any
 
-from chemicals.iapws import iapws95_Psat, iapws95_rho
-from chemicals.viscosity import mu_IAPWS
+import numpy as np
+from numpy.polynomial.chebyshev import chebval
 
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, did_you_mean
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.models import Liquid
@@ -44,7 +45,6 @@ COLDEST = 273.15
 """K; water freezes below."""
 HOTTEST = 373.05
 """K (99.9 degC); water boils at atmospheric pressure just above."""
-_ATMOSPHERIC_PRESSURE = 101325.0
 _DENSITY, _VISCOSITY, _VAPOUR = "liquid.density", "liquid.kinematic_viscosity", "liquid.vapour_pressure"
 _OUTRIGHT = "density and kinematic_viscosity given outright"
 
@@ -170,14 +170,17 @@ def _plain(name: str) -> str:
 
 @cache
 def _library() -> Mapping[str, tuple[KnownLiquid, tuple[_Row, ...]]]:
-    data = resources.files("ringbalance.scene") / "data" / "fluid_properties.csv"
-    lines = data.read_text(encoding="utf-8").splitlines()
-    table = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    table = list(csv.DictReader(_data_lines("fluid_properties.csv")))
     entries = (
         _entry(key, [line for line in table if line["fluid"] == key])
         for key in dict.fromkeys(line["fluid"] for line in table)
     )
     return MappingProxyType({liquid.name: (liquid, rows) for liquid, rows in entries})
+
+
+def _data_lines(name: str) -> list[str]:
+    text = (resources.files("ringbalance.scene") / "data" / name).read_text(encoding="utf-8")
+    return [line for line in text.splitlines() if not line.startswith("#")]
 
 
 def _entry(key: str, lines: Iterable[Mapping[str, str]]) -> tuple[KnownLiquid, tuple[_Row, ...]]:
@@ -212,12 +215,17 @@ def _water_properties(*, temperature: float) -> tuple[float, float, float]:
     Returns: Density, kg/m^3; kinematic viscosity, m^2/s; vapour pressure, Pa absolute.
     Range: `COLDEST` to `HOTTEST`, 101 325 Pa; at 10 MPa the density is 0.5 % higher, which is left out.
     Source: density and vapour pressure, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002) 387 (IAPWS-95);
-        viscosity, Huber et al., J. Phys. Chem. Ref. Data 38 (2009) 101 (IAPWS 2008); package `chemicals`.
+        viscosity, Huber et al., ibid. 38 (2009) 101 (IAPWS 2008); as series in `data/water.csv`.
     """
-    density = float(iapws95_rho(temperature, _ATMOSPHERIC_PRESSURE))  # type: ignore[no-untyped-call]
-    viscosity = float(mu_IAPWS(temperature, density))
-    vapour_pressure = float(iapws95_Psat(temperature))  # type: ignore[no-untyped-call]
-    return density, viscosity / density, vapour_pressure
+    x = 2.0 * (temperature - COLDEST) / (HOTTEST - COLDEST) - 1.0
+    density, log_viscosity, log_vapour_pressure = np.asarray(chebval(x, _water_series())).tolist()
+    return density, math.exp(log_viscosity), math.exp(log_vapour_pressure)
+
+
+@cache
+def _water_series() -> FloatArray:
+    lines = _data_lines("water.csv")
+    return np.array([[float(value) for value in line.split(",")] for line in lines[1:]])
 
 
 def with_liquid(reading: Reading) -> tuple[Reading, tuple[Fault, ...]]:

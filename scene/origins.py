@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, cast
@@ -15,7 +15,6 @@ from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
 from ringbalance.scene.keys.fields import Bounds, OneLine, number, numbers, whole
 from ringbalance.scene.loop_models import RunSettings
-from ringbalance.scene.results import summary_text
 
 Number = Annotated[float, number(Bounds())]
 Numbers = Annotated[tuple[float, ...], numbers()]
@@ -165,3 +164,9 @@ class SceneFile:
         if found is None:
             raise ValueError(f"a scene file has no key {path!r}")
         return found
+
+
+def summary_text(lines: Iterable[str]) -> str:
+    """Lines below a title."""
+    title, *others = lines
+    return "\n".join([title, *(f"  {line}" for line in others)])

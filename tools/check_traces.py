@@ -10,8 +10,8 @@ from html import unescape
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.reports.numbers import MINUS, SCALES
 from ringbalance.reports.prose import evidence_at
+from ringbalance.results.numbers import MINUS, SCALES
 
 _TRACED: Final = re.compile(r'<span data-from="([^"]+)">(.*?)</span>')
 _NUMBER: Final = re.compile(

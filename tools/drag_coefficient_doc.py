@@ -15,10 +15,10 @@ import numpy as np
 
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reports.numbers import MISSING, given, measured, number, percent, shown
 from ringbalance.reports.pages.drag_coefficient import SECTION
 from ringbalance.reports.section import Record, Work
 from ringbalance.reports.studies.drag_map import DragMap
+from ringbalance.results.numbers import MISSING, given, measured, number, percent, shown
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.verification.runner import paper_scene

@@ -10,15 +10,15 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Literal, Self
-
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
+from typing import Annotated, Any, Final, Literal
 
 from ringbalance.verification.standing import SUBJECTS
+from ringbalance.verification.typed_record import Pattern, RecordError, record_from
 from ringbalance.verification.verdicts import VOCABULARY, Kind, Metric, Role, Verdict
 
-Text = Annotated[str, StringConstraints(min_length=3, strip_whitespace=True)]
+Text = Annotated[str, Pattern(r".{3,}", "a text of three characters or more")]
 CAUSES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "": "",
@@ -34,7 +34,9 @@ CAUSES: Final[Mapping[str, str]] = MappingProxyType(
     }
 )
 """Common causes of a claim's departure, as readers see them."""
-Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
+Identifier = Annotated[
+    str, Pattern(r"[a-z][a-z0-9_]*", "small letters, digits and underscores, first a letter")
+]
 Basis = Literal["total", "per unit depth", "pointwise", "ratio", "count", "time"]
 _ReferenceKind = Literal[
     "printed number",
@@ -77,11 +79,8 @@ class CaseError(Exception):
     """A case.toml, or its code, that is not what a case must be; each line names the file and one error."""
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class _ReferenceText(_Record):
+@dataclass(frozen=True, kw_only=True)
+class _ReferenceText:
     """Where the reference comes from and how far it is to be trusted."""
 
     kind: _ReferenceKind
@@ -90,10 +89,11 @@ class _ReferenceText(_Record):
     doubts: tuple[Text, ...] = ()
 
 
-class RestsOn(_Record):
+@dataclass(frozen=True, kw_only=True)
+class RestsOn:
     """An input that decides a claim, by its scene path; it widens the claim where nobody gave its value."""
 
-    path: Annotated[str, StringConstraints(pattern=r"^[a-z_]+\.[a-z_]+$")]
+    path: Annotated[str, Pattern(r"[a-z_]+\.[a-z_]+", "table.key")]
     low: float | None = None
     """Smallest and largest value, SI, where this claim has its own reason for them."""
     high: float | None = None
@@ -105,15 +105,14 @@ class RestsOn(_Record):
     why: str = ""
     """Reason for a range of its own, or for taking the documented one."""
 
-    @model_validator(mode="after")
-    def _whole_range(self) -> Self:
+    def __post_init__(self) -> None:
         own = self.low is not None
         if own != (self.high is not None) or bool(self.why) != (own or self.documented):
             raise ValueError(f"{self.path}: low, high and why, or documented and why, or the path alone")
-        return self
 
 
-class LeftOut(_Record):
+@dataclass(frozen=True, kw_only=True)
+class LeftOut:
     """Readings that a validation does not judge; the case's numbers `<name>_points` and so on count them."""
 
     name: Identifier
@@ -123,12 +122,13 @@ class LeftOut(_Record):
     """Whether they taught a coefficient: they are no predictions at all, and not among all readings."""
 
 
-class Quantity(_Record):
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
     """One judged number: its limit and the limit's reason stand before the result."""
 
     name: Identifier
     title: Text
-    unit: str = Field(min_length=1)
+    unit: Annotated[str, Pattern(r".+", 'a unit, or "1"')]
     basis: Basis
     metric: Metric
     limit: float
@@ -139,18 +139,20 @@ class Quantity(_Record):
     """Named correction after which a claim's number is reproduced."""
 
 
-class Mutation(_Record):
+@dataclass(frozen=True, kw_only=True)
+class Mutation:
     """A mutation that must change the verdict: built into the computation by name, or a changed scene."""
 
     id: Identifier
     what: Text
     expect: Verdict
-    scene: Mapping[str, float | Literal["absent"]] = Field(default_factory=dict)
+    scene: Mapping[str, float | Literal["absent"]] = field(default_factory=dict)
     """Overrides of scene quantities in SI, such as "disc.plate_thickness" = 0.0; "absent" takes one away."""
     cost: Literal["light", "heavy"] = "light"
 
 
-class _Study(_Record):
+@dataclass(frozen=True, kw_only=True)
+class _Study:
     """A computation that several cases share, in place of a `case.py`."""
 
     of: Literal["pressure under gravity", "manufactured pressure", "choice of models", "measurements"]
@@ -158,7 +160,8 @@ class _Study(_Record):
     """Arguments of its function, by name."""
 
 
-class CaseDefinition(_Record):
+@dataclass(frozen=True, kw_only=True)
+class CaseDefinition:
     """All of a case that is not computed."""
 
     id: Identifier
@@ -179,7 +182,7 @@ class CaseDefinition(_Record):
     does_not_cover: tuple[Text, ...]
     explanation: str = ""
     """What was found and why, with placeholders for its numbers."""
-    consequence: Mapping[str, Text] = Field(default_factory=dict)
+    consequence: Mapping[str, Text] = field(default_factory=dict)
     """One sentence for a designer, by verdict, or "default"."""
     equations: tuple[Text, ...] = ()
     reference: _ReferenceText
@@ -199,21 +202,18 @@ class CaseDefinition(_Record):
     """Of a validation: what the sources have and no verdict rests on."""
     headline: bool = False
     cost: Literal["light", "heavy"] = "light"
-    quantity: tuple[Quantity, ...] = Field(min_length=1)
-    must_fail: tuple[Mutation, ...] = Field(min_length=1)
+    quantity: tuple[Quantity, ...]
+    must_fail: tuple[Mutation, ...]
 
     @classmethod
     def parse(cls, text: str, *, source: str) -> CaseDefinition:
         """A case.toml as a record. Raises: CaseError: not TOML, or not a case, with all faults at once."""
         try:
-            return CaseDefinition.model_validate(tomllib.loads(text))
+            return record_from(CaseDefinition, tomllib.loads(text))
         except tomllib.TOMLDecodeError as error:
             raise CaseError(f"{source}: {error}") from error
-        except ValidationError as error:
-            faults = [
-                f"{'.'.join(map(str, fault['loc'])) or 'case'}: {fault['msg']}" for fault in error.errors()
-            ]
-            raise CaseError("\n".join(f"{source}: {fault}" for fault in faults)) from error
+        except RecordError as error:
+            raise CaseError("\n".join(f"{source}: {each}" for each in error.errors)) from error
 
     @property
     def prose(self) -> tuple[str, ...]:
@@ -224,8 +224,9 @@ class CaseDefinition(_Record):
         """The sentence for a designer that goes with a verdict, placeholders still in it."""
         return self.consequence.get(verdict.value, self.consequence.get("default", ""))
 
-    @model_validator(mode="after")
-    def _hold_together(self) -> Self:
+    def __post_init__(self) -> None:
+        if not (self.quantity and self.must_fail):
+            raise ValueError("at least one quantity and one must_fail are needed")
         if (self.number is None) == (self.kind == "claim"):
             raise ValueError("a claim has a number, and nothing else has one")
         if self.order is not None and self.kind == "claim":
@@ -247,7 +248,6 @@ class CaseDefinition(_Record):
         self._check_consequence()
         for text in self.prose:
             placeholders(text)
-        return self
 
     def _check_quantity(self, quantity: Quantity) -> None:
         if quantity.metric == "validation" and self.kind not in ("claim", "validation"):

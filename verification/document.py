@@ -21,6 +21,7 @@ from ringbalance.verification.evidence import (
     Table,
 )
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
+from ringbalance.verification.typed_record import plain
 from ringbalance.verification.verdicts import Verdict
 
 Document = dict[str, Any]
@@ -36,12 +37,12 @@ def case_document(result: CaseResult) -> Document:
     """One case's result, and all that a report shows of it; SI units, or the unit named beside the number."""
     definition = result.definition
     return {
-        **definition.model_dump(mode="json", include=_AS_DEFINED),
+        **_part(definition, _AS_DEFINED),
         "verdict": result.verdict.value,
         "quantities": [_quantity(quantity) for quantity in result.quantities],
         "explanation": result.filled(definition.explanation),
         "consequence": _consequence(result),
-        "reference": definition.reference.model_dump(exclude={"doubts"}),
+        "reference": {k: v for k, v in vars(definition.reference).items() if k != "doubts"},
         "doubts": [text for doubt in definition.reference.doubts if (text := result.filled(doubt))],
         "cause": CAUSES[definition.cause] if result.verdict in _DEPARTS else "",
         "judgement": result.filled(definition.judgement),
@@ -53,7 +54,7 @@ def case_document(result: CaseResult) -> Document:
         "time_s": result.time_s,
         "mutations": [_mutation(mutation) for mutation in result.mutations],
         "declared_mutations": [
-            mutation.model_dump(mode="json", exclude={"scene"}) for mutation in definition.must_fail
+            {k: v for k, v in vars(mutation).items() if k != "scene"} for mutation in definition.must_fail
         ],
         "broken": result.broken,
         **_evidence(result.evidence),
@@ -62,8 +63,11 @@ def case_document(result: CaseResult) -> Document:
 
 def definition_document(definition: CaseDefinition) -> Document:
     """What a list of cases says of one of them."""
-    listed = definition.model_dump(mode="json", include=_LISTED)
-    return listed | {"mutations": [mutation.id for mutation in definition.must_fail]}
+    return _part(definition, _LISTED) | {"mutations": [mutation.id for mutation in definition.must_fail]}
+
+
+def _part(definition: CaseDefinition, names: set[str]) -> Document:
+    return {name: value for name, value in plain(definition).items() if name in names}
 
 
 def _consequence(result: CaseResult) -> str:
@@ -75,7 +79,7 @@ def _consequence(result: CaseResult) -> str:
 def _quantity(result: QuantityResult) -> Document:
     quantity, found, reference = result.quantity, result.found, result.reference
     return {
-        **quantity.model_dump(),
+        **vars(quantity),
         "value": None if found is None else found.value,
         "reference": None if reference is None else reference.value,
         "uncertainty": result.half_width,

@@ -11,8 +11,8 @@ import numpy as np
 from ringbalance.controller import deferred
 from ringbalance.controller.eccentric_mass.run_loop import Record
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets
+from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
-from ringbalance.scene.results import CommandResult
 
 _NOTHING: Final = 1e-6
 """Share of the limit below which a vibration is round-off."""

@@ -21,8 +21,8 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
+from ringbalance.results.result import CommandResult
 from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.results import CommandResult
 from ringbalance.scene.uncertain import eccentric_drawn
 
 RUNS: Final = 40

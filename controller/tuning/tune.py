@@ -38,11 +38,11 @@ from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.selection.registry import ModelUsed, neglected_in_injections
+from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.results import CommandResult
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, clipped
+from ringbalance.scene.origins import summary_text
 from ringbalance.scene.platform.files import write_whole
-from ringbalance.scene.results import summary_text
 
 _FILL_SLACK: Final = 1e-9
 """Fill ratios this far outside the range are taken as its end: integrators land there by round-off."""

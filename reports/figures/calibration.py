@@ -12,8 +12,8 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import given, measured, percent, short, shown
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import given, measured, percent, short, shown
 from ringbalance.scene.arrays import FloatArray, stretches
 
 _VELOCITY_TICKS: Final = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import DisplayUnit, display_unit, number
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import DisplayUnit, display_unit, number
 from ringbalance.scene.arrays import FloatArray
 
 _LONGEST_LABEL: Final = 28

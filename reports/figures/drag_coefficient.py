@@ -10,9 +10,9 @@ from matplotlib.lines import Line2D
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import given, number, short
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import given, number, short
 from ringbalance.scene.arrays import FloatArray
 
 _LEVELS: Final = (3, 5, 10, 20, 100, 200, 500, 1000, 10_000, 100_000, 1_000_000)

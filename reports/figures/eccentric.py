@@ -12,8 +12,8 @@ from matplotlib.patches import Circle
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import shown
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import shown
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.eccentric_models import EccentricScene
 

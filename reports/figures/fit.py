@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ringbalance.identification.against_fit import AgainstFit
-from ringbalance.reduced_model.budget import rounded
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.results.numbers import rounded
 from ringbalance.scene.units import unit_factor
 
 _NAMES: Final = {

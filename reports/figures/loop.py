@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.operation import residual_polar
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import shown
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import shown
 
 _SAME: Final = 1e-3
 """Relative change of the amplitude that counts as none."""

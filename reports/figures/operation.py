@@ -13,9 +13,9 @@ from scipy.ndimage import distance_transform_edt
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import given, number, percent, shown
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import given, number, percent, shown
 from ringbalance.scene.arrays import FloatArray
 
 _SHADES: Final = {

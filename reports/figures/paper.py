@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import given, percent, short, shown
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import given, percent, short, shown
 
 _FLOOR: Final = 5e-9
 """m: smaller amplitudes are drawn here."""

@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import ArrayLike
 
-from ringbalance.reports.numbers import MINUS, display_unit, number, power_of_ten
+from ringbalance.results.numbers import MINUS, display_unit, number, power_of_ten
 from ringbalance.scene.arrays import FloatArray
 
 INK: Final = "#010101"

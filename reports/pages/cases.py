@@ -7,7 +7,10 @@ from typing import Any, Final
 
 from ringbalance.reports.equations import equation_svg
 from ringbalance.reports.figures.cases import order_plot, series_plots
-from ringbalance.reports.numbers import (
+from ringbalance.reports.prose import input_name, traced
+from ringbalance.reports.section import Record, Table
+from ringbalance.reports.tables import FOLDER, is_long, table_file
+from ringbalance.results.numbers import (
     MISSING,
     PLUS_MINUS,
     THIN_SPACE,
@@ -19,9 +22,6 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.prose import input_name, traced
-from ringbalance.reports.section import Record, Table
-from ringbalance.reports.tables import FOLDER, is_long, table_file
 
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import MISSING, number, percent, short, shown
 from ringbalance.reports.section import Record, Section, Table, Work
 from ringbalance.reports.studies.consequences import find_consequences
+from ringbalance.results.numbers import MISSING, number, percent, short, shown
 
 _MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
 """Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""

@@ -22,7 +22,12 @@ from ringbalance.reports.figures.eccentric import (
     sampled_poles,
 )
 from ringbalance.reports.figures.operation import requirement_bars
-from ringbalance.reports.numbers import (
+from ringbalance.reports.pages import credibility, document, measured
+from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.prose import input_name, named_with_origin, traced
+from ringbalance.reports.section import Cells, Record, Section, Table
+from ringbalance.reports.summary import OPEN
+from ringbalance.results.numbers import (
     MISSING,
     THIN_SPACE,
     display_unit,
@@ -32,11 +37,6 @@ from ringbalance.reports.numbers import (
     shown,
     with_unit,
 )
-from ringbalance.reports.pages import credibility, document, measured
-from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.prose import input_name, named_with_origin, traced
-from ringbalance.reports.section import Cells, Record, Section, Table
-from ringbalance.reports.summary import OPEN
 
 BALANCER: Final = "eccentric_mass"
 _MODEL: Final = "Plant and filters are models; no measurement of this machine is compared with here."

@@ -13,8 +13,8 @@ from matplotlib.colors import ListedColormap
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import number
 from ringbalance.reports.section import Cells, Record, Section, Table
+from ringbalance.results.numbers import number
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.extremes.axes import MAP_PREFIX, Axis, places_of
 from ringbalance.verification.extremes.point import GAS_TIME, PERIODS, Ending

@@ -10,7 +10,6 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reports.numbers import MISSING, THIN_SPACE, given, number, percent, shown
 from ringbalance.reports.pages.requirements import (
     CAPACITY,
     SMALLEST,
@@ -26,6 +25,7 @@ from ringbalance.reports.pages.requirements import (
 from ringbalance.reports.prose import found_at, key_words, named_with_origin, read, states_uncertainty, traced
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import LIKELY, MISSED, OPEN, tuning_of
+from ringbalance.results.numbers import MISSING, THIN_SPACE, given, number, percent, shown
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.uncertain import half_widths
 from ringbalance.verification.assumptions import assumptions_of

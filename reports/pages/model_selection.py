@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import MISSING, number, percent
 from ringbalance.reports.section import Record, Section, Table, Work
+from ringbalance.results.numbers import MISSING, number, percent
 from ringbalance.scene.models import Scene
 from ringbalance.verification.selection_studies.study import TradeStudy, tolerance_text, trade_study
 

@@ -17,9 +17,9 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.operation import operating_map
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import given, number
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.numbers import given, number
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 

@@ -10,7 +10,6 @@ from typing import Final
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.numbers import given, number, percent, shown
 from ringbalance.reports.prose import evidence_at, read, resting, traced, untraced
 from ringbalance.reports.section import Record, Table
 from ringbalance.reports.summary import (
@@ -30,6 +29,7 @@ from ringbalance.reports.summary import (
     what_enlarges,
     worst,
 )
+from ringbalance.results.numbers import given, number, percent, shown
 from ringbalance.scene import Scene
 
 CAPACITY: Final = "Correction capacity in any direction"

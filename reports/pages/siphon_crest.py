@@ -13,8 +13,8 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import given, shown
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.numbers import given, shown
 from ringbalance.scene.models import Scene
 
 _POINTS: Final = 161

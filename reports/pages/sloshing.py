@@ -13,8 +13,8 @@ from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TR
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.numbers import short
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.numbers import short
 from ringbalance.scene.arrays import FloatArray
 
 _MODES: Final = 4

@@ -21,7 +21,7 @@ from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
-from ringbalance.reports.numbers import given
+from ringbalance.results.numbers import given
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Scene

@@ -13,10 +13,10 @@ from typing import Any, Final
 
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.mesh.export import write_cells
-from ringbalance.reports.numbers import given, shown
 from ringbalance.reports.pictures.fields import shown_field, shown_fill, tube_field
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.style import PICTURE
+from ringbalance.results.numbers import given, shown
 from ringbalance.scene import Scene
 
 Record = dict[str, Any]

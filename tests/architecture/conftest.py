@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 ROOM_ORDER = (
     "scene",
+    "results",
     "mesh",
     "physics",
     "reduced_model",

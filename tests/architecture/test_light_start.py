@@ -17,7 +17,6 @@ HEAVY = (
     "pyvista",
     "skfem",
     "matplotlib",
-    "pydantic",
     "fluids",
     "meshio",
     "numba",

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from scipy.stats import binom
 
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.reduced_model.budget import UNITS, Budget, believed, budgets, measured, rounded
+from ringbalance.reduced_model.budget import UNITS, Budget, budgets
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.device import device_of
 from ringbalance.reduced_model.tube.heads import log_heads
@@ -280,41 +280,3 @@ def test_the_total_is_the_root_of_the_sum_of_squares() -> None:
     )
     assert budget.input == 5.0
     assert budget.total == pytest.approx(math.sqrt(65))
-
-
-@pytest.mark.parametrize(
-    ("value", "total", "text"),
-    [
-        (73.36127, 0.1312, "73.36"),
-        (0.1312, 0.1312, "0.13"),
-        (418386.9, 4312.0, "418400"),
-        (17.0, 0.0996, "17.00"),
-        (0.0996, 0.0996, "0.10"),
-        (-0.04, 1.2, "0.0"),
-        (-152.2, 57.0, "-152"),
-        (3.25, 0.995, "3.2"),
-        (1.5, 0.0, "1.5"),
-        (67.687660543367, 6.8e-11, "67.6876605"),
-        (6.8e-11, 6.8e-11, "6.8e-11"),
-    ],
-)
-def test_a_value_is_printed_to_two_digits_of_its_total(value: float, total: float, text: str) -> None:
-    assert rounded(value, total) == text
-
-
-@pytest.mark.parametrize(
-    ("value", "total", "stated", "text"),
-    [
-        (75.3982237, 7.5e-11, True, "75.3982237 ± 7.5e-11"),
-        (75.3982237, 7.5e-11, False, "75.40"),
-        (99.5917, 0.0047, False, "99.59"),
-        (99.5917, 0.051, False, "99.592 ± 0.051"),
-        (-99.996, 0.0047, False, "-100.0"),
-        (12345.6, 1.0, False, "12350"),
-        (0.0, 0.0, False, "0 ± 0"),
-    ],
-)
-def test_an_interval_finer_than_unstated_inputs_leaves_four_digits(
-    value: float, total: float, stated: bool, text: str
-) -> None:
-    assert measured(value, believed(value, total, stated=stated)) == text

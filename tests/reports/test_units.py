@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.reports.numbers import display_unit, shown
-from ringbalance.reports.numbers import given as as_given
+from ringbalance.results.numbers import display_unit, shown
+from ringbalance.results.numbers import given as as_given
 
 
 @pytest.mark.parametrize(

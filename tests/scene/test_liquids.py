@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
 from importlib import resources
 
@@ -47,6 +48,12 @@ def test_water_literature(celsius: float, density: float, viscosity: float, vapo
     assert water.density == pytest.approx(density, rel=2e-6)
     assert water.density * water.kinematic_viscosity == pytest.approx(viscosity, rel=2e-4)
     assert water.vapour_pressure == pytest.approx(vapour_pressure, rel=1e-4)
+
+
+def test_the_series_of_water_is_the_one_that_was_made() -> None:
+    text = (resources.files("ringbalance.scene") / "data" / "water.csv").read_text(encoding="utf-8")
+    head, body = text.split("\n", 4)[:4], text.split("\n", 4)[4]
+    assert head[3].endswith(hashlib.sha256(body.encode()).hexdigest())
 
 
 @pytest.mark.parametrize("temperature", [273.0, 373.2, math.nan])

@@ -79,7 +79,7 @@ def test_only_code_verification_and_missed_defects_fail_the_run(
     refuted = run_definition(claim, wrong, scene=paper_scene)
     failed = run_definition(verification, wrong, scene=paper_scene)
     solution = dataclasses.replace(
-        failed, definition=verification.model_copy(update={"kind": "solution_verification"})
+        failed, definition=dataclasses.replace(verification, kind="solution_verification")
     )
     assert refuted.verdict == "refuted"
     assert failed.verdict == "failed"

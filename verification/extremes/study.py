@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.scene.results import CommandResult
+from ringbalance.results.result import CommandResult
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import MAP_PREFIX
 from ringbalance.verification.extremes.design import Base, Point, design

@@ -12,9 +12,9 @@ import numpy as np
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.selection.estimates import term_estimates
 from ringbalance.reduced_model.selection.registry import models_used
+from ringbalance.results.result import CommandResult
 from ringbalance.scene.joint import without_fitted
 from ringbalance.scene.models import Scene
-from ringbalance.scene.results import CommandResult
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.selection_studies.chambers import chamber_hierarchies
 from ringbalance.verification.selection_studies.choice import TOLERANCES, Choice, choose

@@ -9,8 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.reduced_model.budget import last_place
-from ringbalance.reports.numbers import fixed, measured, number, percent, short
+from ringbalance.results.numbers import (
+    believed,
+    fixed,
+    last_place,
+    measured,
+    number,
+    percent,
+    plain,
+    rounded,
+    short,
+    shown,
+)
 
 VALUES = st.floats(min_value=-1e12, max_value=1e12, allow_nan=False, allow_subnormal=False)
 WIDTHS = st.floats(min_value=1e-12, max_value=1e9, allow_nan=False)
@@ -111,3 +121,56 @@ def test_a_negative_half_width_is_refused() -> None:
         measured(1.0, -0.1)
     with pytest.raises(ValueError, match="positive"):
         last_place(0.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "total", "text"),
+    [
+        (73.36127, 0.1312, "73.36"),
+        (0.1312, 0.1312, "0.13"),
+        (418386.9, 4312.0, "418400"),
+        (17.0, 0.0996, "17.00"),
+        (0.0996, 0.0996, "0.10"),
+        (-0.04, 1.2, "0.0"),
+        (-152.2, 57.0, "-152"),
+        (3.25, 0.995, "3.2"),
+        (1.5, 0.0, "1.5"),
+        (67.687660543367, 6.8e-11, "67.6876605"),
+        (6.8e-11, 6.8e-11, "6.8e-11"),
+    ],
+)
+def test_a_value_is_printed_to_two_digits_of_its_total(value: float, total: float, text: str) -> None:
+    assert rounded(value, total) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "total", "stated", "text"),
+    [
+        (75.3982237, 7.5e-11, True, "75.3982 ± 8 × 10⁻¹¹"),
+        (75.3982237, 7.5e-11, False, "75.40"),
+        (99.5917, 0.0047, False, "99.59"),
+        (99.5917, 0.051, False, "99.592 ± 0.051"),
+        (-99.996, 0.0047, False, "-100.0"),
+        (0.0, 0.0, False, "0"),
+    ],
+)
+def test_an_interval_finer_than_unstated_inputs_leaves_four_digits(
+    value: float, total: float, stated: bool, text: str
+) -> None:
+    assert plain(measured(value, believed(value, total, stated=stated))) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "sides", "text"),
+    [
+        (418.4e3, (6.4e3, 6.3e3), "(0.4184 ± 0.0064) MPa"),
+        (418.4e3, (3e3, 12e3), "(0.418 -0.003/+0.012) MPa"),
+        (418.4e3, (0.0, 12e3), "(0.418 -0.000/+0.012) MPa"),
+        (418.4e3, (3e3, math.inf), "(0.4184 -0.0030/+∞) MPa"),
+        (0.0, (0.0, 1.5e-6), "(0.0 -0.0/+1.5) um"),
+        (418.4e3, (0.0, 0.0), "0.4184 MPa"),
+    ],
+)
+def test_a_lopsided_interval_is_printed_as_one(value: float, sides: tuple[float, float], text: str) -> None:
+    unit = "m" if value == 0 else "Pa"
+    assert plain(shown(value, unit, sides)) == text

@@ -1,5 +1,8 @@
 """Numbers and quantities as a reader should meet them: SI on the way in, the units that engineers of this
-field read on the way out, no more digits than the uncertainty leaves standing."""
+field read on the way out, no more digits than the uncertainty leaves standing.
+
+Texts are typographic (thin spaces, a true minus sign, µm); `plain` writes them for a terminal or a CSV file.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,6 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal
 from typing import Final
 
-from ringbalance.reduced_model.budget import last_place
-
 THIN_SPACE: Final = "\u202f"
 MINUS: Final = "\u2212"
 PLUS_MINUS: Final = "\u00a0±\u00a0"
@@ -17,6 +18,15 @@ MISSING: Final = "–"
 
 _SUPERSCRIPTS: Final = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _MOST_DIGITS: Final = 6
+_TABLE_DIGITS: Final = 9
+_UNSTATED_DIGITS: Final = 4
+_INPUT_ROUNDING: Final = 5e-4
+"""Relative half-width of an input of three digits, the fewest that scene files have."""
+_LOPSIDED: Final = 0.1
+"""By which the two sides of an interval differ, of the larger, before they are printed apart."""
+_TYPEWRITER: Final = str.maketrans(
+    {"\u202f": " ", "\u00a0": " ", "\u2212": "-", "µ": "u", "²": "^2", "³": "^3"}
+)
 _SMALLEST_PLAIN: Final = -4
 _LARGEST_PLAIN: Final = 6
 
@@ -26,17 +36,56 @@ def power_of_ten(exponent: int) -> str:
     return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
 
 
+def last_place(total: float) -> int:
+    """Decimal exponent of the second digit of a total uncertainty: that to which a value with it is printed.
+
+    Source: at most two digits, as the GUM (JCGM 100:2008, 7.2.6) asks.
+    Raises: ValueError: an uncertainty that is not positive.
+    """
+    if not total > 0:
+        raise ValueError("an uncertainty must be positive")
+    width = Decimal(repr(float(total)))
+    # Twice, because 0.0996 becomes 0.10 and then its second digit is another one.
+    return width.quantize(Decimal(1).scaleb(width.adjusted() - 1)).adjusted() - 1
+
+
+def believed(value: float | None, total: float | None, *, stated: bool) -> float | None:
+    """A value's total uncertainty; None where it is finer than inputs of which the scene says nothing.
+
+    Args: `stated`: whether the scene states the uncertainty of any input.
+    """
+    fine = value is not None and total and total <= _INPUT_ROUNDING * abs(value)
+    return None if fine and not stated else total
+
+
+def rounded(value: float, total: float | None) -> str:
+    """A value, or its uncertainty, to the place of the second digit of the total uncertainty.
+
+    Nine digits of the value at most, and that many where the uncertainty is zero; four where it is None, as
+    `believed` has it. An exact zero has none.
+    """
+    if total is None:
+        total = 10.0 ** (Decimal(f"{value:.{_UNSTATED_DIGITS - 1}e}").adjusted() + 2 - _UNSTATED_DIGITS)
+    if not total > 0 or value == 0:
+        return f"{value + 0.0:.{_TABLE_DIGITS}g}"
+    exact = Decimal(repr(float(value)))
+    place = max(last_place(total), exact.adjusted() - _TABLE_DIGITS + 1)
+    shown = exact.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
+    plain = shown if shown else abs(shown)
+    return f"{plain:f}" if place > -_TABLE_DIGITS else f"{plain:e}"
+
+
 def _leading_exponent(value: Decimal) -> int:
     return value.adjusted() if value else 0
 
 
-def _rounded(value: Decimal, place: int) -> Decimal:
+def _quantized(value: Decimal, place: int) -> Decimal:
     return value.quantize(Decimal(1).scaleb(place), rounding=ROUND_HALF_EVEN)
 
 
 def _plain(value: Decimal, decimals: int) -> str:
     """Fixed-point text with a true minus sign and thin spaces between thousands (from five digits up)."""
-    rounded = _rounded(value, -decimals)
+    rounded = _quantized(value, -decimals)
     whole, _, fraction = f"{abs(rounded):f}".partition(".")
     grouped = f"{int(whole):,}".replace(",", THIN_SPACE) if len(whole) > 4 else whole
     sign = MINUS if rounded < 0 else ""
@@ -59,7 +108,7 @@ def number(value: float | None, *, digits: int = 4) -> str:
     exact = _exact(value)
     if not exact:
         return "0"
-    rounded = _rounded(exact, _leading_exponent(exact) - digits + 1)
+    rounded = _quantized(exact, _leading_exponent(exact) - digits + 1)
     exponent = _leading_exponent(rounded)
     if _SMALLEST_PLAIN < exponent < _LARGEST_PLAIN:
         return _plain(rounded, max(digits - 1 - exponent, 0))
@@ -85,26 +134,38 @@ def fixed(value: float, decimals: int) -> str:
     return _plain(_exact(value), decimals)
 
 
-def measured(value: float | None, half_width: float | None, *, digits: int = 4) -> str:
-    """Value ± half-width without unit, such as 72.043 ± 0.032 or (1.200 ± 0.050) × 10⁻⁶.
+Width = float | tuple[float, float] | None
+"""Expanded uncertainty (95 %): on either side, or below and above, in the value's unit; None, zero: none."""
 
-    Both have the digits that the half-width leaves standing; without one the value has `digits`.
-    Args: `half_width`: at 95 %, in the value's unit; None or zero where there is none.
-    Raises: ValueError: a value or half-width that is not finite, or a negative half-width.
+
+def measured(value: float | None, width: Width, *, digits: int = 4) -> str:
+    """Value with its uncertainty, without unit: 72.043 ± 0.032, (1.20 ± 0.05) × 10⁻⁶ or 0.419 −0.003/+0.012.
+
+    All have the digits that the (larger) uncertainty leaves standing; without one the value has `digits`.
+    Raises: ValueError: a number that is not finite, but for a side without an end, or a negative uncertainty.
     """
-    if value is None or not half_width:
+    below, above = width if isinstance(width, tuple) else (float(_exact(width or 0.0)),) * 2
+    if min(below, above) < 0:
+        raise ValueError("an uncertainty must not be negative")
+    ends = [side for side in (below, above) if math.isfinite(side)]
+    widest = max(ends, default=0.0)
+    if value is None or not widest:
         return number(value, digits=digits)
-    exact, width = _exact(value), _exact(half_width)
-    if width < 0:
-        raise ValueError("a half-width must not be negative")
-    place = last_place(half_width)
+    exact, place = _exact(value), last_place(widest)
     top = max(_leading_exponent(exact), place)
     if top - place + 1 > _MOST_DIGITS:
-        return f"{number(value, digits=_MOST_DIGITS)}{PLUS_MINUS}{number(half_width, digits=1)}"
-    if top < _LARGEST_PLAIN and (place > 0 or top > _SMALLEST_PLAIN):
-        return f"{_plain(exact, -place)}{PLUS_MINUS}{_plain(width, -place)}"
-    body = f"{_plain(exact.scaleb(-top), top - place)}{PLUS_MINUS}{_plain(width.scaleb(-top), top - place)}"
-    return f"({body}){THIN_SPACE}×{THIN_SPACE}{power_of_ten(top)}"
+        return f"{number(value, digits=_MOST_DIGITS)}{PLUS_MINUS}{number(widest, digits=1)}"
+    plain_power = top < _LARGEST_PLAIN and (place > 0 or top > _SMALLEST_PLAIN)
+    power, decimals = (0, -place) if plain_power else (top, top - place)
+
+    def text(part: float) -> str:
+        return _plain(_exact(part).scaleb(-power), decimals) if math.isfinite(part) else "∞"
+
+    if len(ends) == 2 and abs(above - below) <= _LOPSIDED * widest:
+        body = f"{text(value)}{PLUS_MINUS}{text(widest)}"
+    else:
+        body = f"{text(value)}\u00a0{MINUS}{text(below)}/+{text(above)}"
+    return body if plain_power else f"({body}){THIN_SPACE}×{THIN_SPACE}{power_of_ten(power)}"
 
 
 def percent(fraction: float | None, *, digits: int = 2, signed: bool = False) -> str:
@@ -170,19 +231,20 @@ def display_unit(unit: str, *values: float | None) -> DisplayUnit:
     return fitting[-1] if largest else units[-1]
 
 
-def shown(value: float | None, unit: str, half_width: float | None = None, *, digits: int = 4) -> str:
-    """An SI quantity in the unit that suits its size, with its half-width, such as (72.043 ± 0.032) mm.
+def shown(value: float | None, unit: str, width: Width = None, *, digits: int = 4) -> str:
+    """An SI quantity in the unit that suits its size, with its uncertainty, such as (72.043 ± 0.032) mm.
 
-    Args: `half_width`: 95 %, in `unit`; without one the value has `digits` significant digits.
+    Args: `width`: 95 %, in `unit`; without one the value has `digits` significant digits.
     Raises: ValueError: a value that is not finite.
     """
-    # A value that its own half-width exceeds is shown in the unit of that half-width.
-    display = display_unit(unit, value, half_width)
+    sides = width if isinstance(width, tuple) else (width or 0.0, width or 0.0)
+    # A value that its own uncertainty exceeds is shown in the unit of that uncertainty.
+    display = display_unit(unit, value, *(side for side in sides if math.isfinite(side)))
     if value is None:
         return MISSING
-    width = None if half_width is None else half_width * display.factor
-    text = measured(value * display.factor, width, digits=digits)
-    wants_brackets = "±" in text and bool(display.symbol) and not text.startswith("(")
+    below, above = (side * display.factor for side in sides)
+    text = measured(value * display.factor, (below, above), digits=digits)
+    wants_brackets = ("±" in text or "/+" in text) and bool(display.symbol) and not text.startswith("(")
     return with_unit(f"({text})" if wants_brackets else text, display.symbol)
 
 
@@ -193,3 +255,8 @@ def given(value: float | None, unit: str, *, digits: int = 6) -> str:
     """
     display = display_unit(unit, value)
     return with_unit(short(None if value is None else value * display.factor, digits=digits), display.symbol)
+
+
+def plain(text: str) -> str:
+    """A text as it is typed: "-" for the minus sign, um for µm, one kind of space."""
+    return text.translate(_TYPEWRITER)

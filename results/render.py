@@ -1,0 +1,116 @@
+"""Rows, findings and tables as a terminal, a notebook and a CSV file show them."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from io import StringIO
+from typing import Final
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Group, RenderableType
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from ringbalance.results.findings import Finding
+from ringbalance.results.numbers import plain
+from ringbalance.results.rows import Quantity
+from ringbalance.results.table import Table
+
+_STYLES: Final = {"info": "green", "warning": "yellow", "error": "red"}
+Facts = Sequence[tuple[str, str]]
+"""Names and texts."""
+
+
+def findings_text(findings: Iterable[Finding]) -> Group:
+    """One sentence a finding, the first as a headline."""
+    texts = (
+        Text(each.text, style=f"{'bold ' if place == 0 else ''}{_STYLES[each.severity]}")
+        for place, each in enumerate(findings)
+    )
+    return Group(*texts)
+
+
+def quantity_rows(quantities: Iterable[Quantity]) -> Iterator[tuple[str, str]]:
+    """Name and text of each, with its status where it is limited."""
+    for each in quantities:
+        limited = "" if each.status == "ok" else f" ({each.status.replace('_', ' ')})"
+        yield each.name, plain(each.text) + limited
+
+
+def two_columns(rows: Iterable[tuple[str, str]]) -> RichTable:
+    """Names and texts, without head or frame."""
+    table = RichTable(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_column(style="dim")
+    table.add_column()
+    for name, text in rows:
+        table.add_row(Text(name), Text(text))
+    return table
+
+
+def terminal_table(table: Table) -> RichTable:
+    """A table for a rich console, in the signs of a typewriter."""
+    shown = RichTable(
+        title=table.caption or None,
+        caption=table.note or None,
+        title_justify="left",
+        caption_justify="left",
+        title_style="bold",
+        header_style="bold",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+    for head, numeric in zip(table.heads, table.numeric, strict=True):
+        shown.add_column(Text(plain(head)), justify="right" if numeric else "left")
+    for row in table.rows:
+        shown.add_row(*(Text(plain(cell)) for cell in row))
+    return shown
+
+
+def terminal(
+    *,
+    findings: Iterable[Finding] = (),
+    facts: Facts = (),
+    quantities: Iterable[Quantity] = (),
+    tables: Iterable[Table] = (),
+) -> RenderableType:
+    """What a command prints: what it found in sentences, its numbers, and its tables."""
+    return Group(
+        findings_text(findings),
+        two_columns([*facts, *quantity_rows(quantities)]),
+        *(terminal_table(table) for table in tables if table.rows),
+    )
+
+
+def csv_text(table: Table) -> str:
+    """A table as comma-separated values with a line of heads; numbers as they are printed."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([plain(head).replace("\n", " ") for head in table.heads])
+    writer.writerows([plain(cell) for cell in row] for row in table.rows)
+    return text.getvalue()
+
+
+def html_table(table: Table) -> str:
+    """A table for a notebook."""
+    heads = "".join(f"<th>{escape(head)}</th>" for head in table.heads)
+    rows = "".join(f"<tr>{_cells(row, table.numeric)}</tr>" for row in table.rows)
+    caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
+    return f"<table>{caption}<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _cells(row: Sequence[str], numeric: Sequence[bool]) -> str:
+    aligned = ("right" if number else "left" for number in numeric)
+    return "".join(
+        f'<td style="text-align:{side}">{escape(cell)}</td>' for side, cell in zip(aligned, row, strict=True)
+    )
+
+
+def html(title: str, *, findings: Iterable[Finding], quantities: Iterable[Quantity]) -> str:
+    """A result in a notebook: its title, findings and quantities."""
+    sentences = "".join(f"<p>{escape(each.sentence())}</p>" for each in findings)
+    rows = [(each.name, each.symbol, each.text) for each in quantities]
+    table = Table(heads=("quantity", "symbol", "value (95 %)"), rows=rows)
+    return f"<div><strong>{escape(title)}</strong>{sentences}{html_table(table)}</div>"

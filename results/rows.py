@@ -1,0 +1,127 @@
+"""A quantity as one record, and a requirement with its verdict: what every output is made of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any
+
+from ringbalance.results.numbers import Width, shown
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parts:
+    """Expanded uncertainties (95 %) of a quantity by cause, in its SI unit."""
+
+    numerical: float = 0.0
+    input: float = 0.0
+    model: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Root of the sum of their squares (ASME V&V 20-2009)."""
+        return math.hypot(self.numerical, self.input, self.model)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """A number with its name, unit and interval; SI throughout."""
+
+    key: str
+    """Stable, such as "stall_pressure"."""
+    name: str
+    """As a reader knows it, such as "pressure to empty a chamber"."""
+    value: float | None
+    """None: there is none, as `status` says."""
+    unit: str = "1"
+    """SI."""
+    symbol: str = ""
+    lower: float | None = None
+    upper: float | None = None
+    """Ends of the 95 % interval; None: not known, or no end on this side."""
+    parts: Parts | None = None
+    origin: str = "computed"
+    """ "computed", "simulated", "fitted", "given", "inferred", "assumed", "measured" or "default"."""
+    status: str = "ok"
+    """ "ok" or the code of the finding that limits it."""
+    digits: int = 4
+    """Of the value as text, where no uncertainty is known."""
+
+    @property
+    def width(self) -> Width:
+        """What lies between the value and both ends; None without an interval."""
+        if self.value is None or (self.lower is None and self.upper is None):
+            return None
+        below = math.inf if self.lower is None else self.value - self.lower
+        above = math.inf if self.upper is None else self.upper - self.value
+        return max(below, 0.0), max(above, 0.0)
+
+    @property
+    def text(self) -> str:
+        """Value and interval in the unit that suits them, such as (72.043 ± 0.032) mm."""
+        return shown(self.value, self.unit, self.width, digits=self.digits)
+
+    def document(self) -> dict[str, Any]:
+        """For JSON."""
+        document = asdict(self)
+        del document["digits"]
+        return document
+
+
+def around(value: float, total: float) -> tuple[float | None, float | None]:
+    """Ends of an interval as wide on both sides; none without an uncertainty."""
+    return (value - total, value + total) if total else (None, None)
+
+
+class Verdict(StrEnum):
+    """Whether a requirement is met, by the fraction of drawn devices that meet it or by an interval."""
+
+    MET = "met"
+    NOT_MET = "not met"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Requirement:
+    """What is asked for, what is reached, and the verdict."""
+
+    key: str
+    name: str
+    required: Quantity | None
+    """None: nothing is asked for."""
+    reached: Quantity
+    at_least: bool = True
+    """Whether more than required is better."""
+    verdict: Verdict | None = None
+    """None where nothing is asked for."""
+
+    def document(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "key": self.key,
+            "name": self.name,
+            "required": None if self.required is None else self.required.document(),
+            "reached": self.reached.document(),
+            "at_least": self.at_least,
+            "verdict": None if self.verdict is None else self.verdict.value,
+        }
+
+
+def judged(*, reached: Quantity, required: float, at_least: bool) -> Verdict:
+    """Verdict of an interval: undecided where it holds what is required, or has no end on that side."""
+    if reached.value is None:
+        return Verdict.NOT_MET
+    low, high = _ends(reached)
+    worst, best = (low, high) if at_least else (-high, -low)
+    wanted = required if at_least else -required
+    return Verdict.MET if worst >= wanted else Verdict.NOT_MET if best < wanted else Verdict.UNDECIDED
+
+
+def _ends(quantity: Quantity) -> tuple[float, float]:
+    value = quantity.value or 0.0
+    if quantity.width is None:
+        return value, value
+    low = -math.inf if quantity.lower is None else quantity.lower
+    high = math.inf if quantity.upper is None else quantity.upper
+    return low, high

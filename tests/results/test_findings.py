@@ -1,0 +1,67 @@
+"""Every code has one whole sentence, its numbers in units, and its row in the documentation."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import finding_table
+import pytest
+
+from ringbalance.results import findings
+from ringbalance.results.findings import Finding, Sentence, sentences, value_text
+from ringbalance.results.numbers import SCALES
+from ringbalance.results.rows import Quantity
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "findings.md"
+PLACES = re.compile(r"\{(\w+)(?::([^};]*))?(?:;(\d))?\}")
+
+
+@pytest.mark.parametrize("code", sentences())
+def test_a_sentence_fills_its_numbers_in_units_that_exist(code: str) -> None:
+    sentence = sentences()[code]
+    assert sentence.severity in ("info", "warning", "error")
+    for _, unit, _ in PLACES.findall(sentence.text):
+        assert unit in ("", "%") or unit in SCALES
+    text = Finding(code=code, values=dict.fromkeys(sentence.values, 0.25)).text
+    assert "{" not in text
+    assert text == text.strip()
+
+
+def test_the_documentation_lists_every_code_as_the_program_has_it() -> None:
+    assert DOCUMENT.read_text(encoding="utf-8") == finding_table.document()
+
+
+def test_a_number_that_is_missing_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    made_up = {
+        "late": Sentence(severity="warning", text="after {time:s;2}", change={"run.time_limit": "raise"})
+    }
+    monkeypatch.setattr(findings, "sentences", lambda: made_up)
+    with pytest.raises(KeyError, match="time"):
+        Finding(code="late").sentence()
+    late = Finding(code="late", values={"time": 0.0123}, change={"run.time_limit": 200.0})
+    assert late.text == "after 12 ms"
+    assert late.changes == {"run.time_limit": 200.0}
+    assert Finding(code="late").changes == {"run.time_limit": "raise"}
+    assert late.sentence(lambda name, text: f"[{name}|{text}]") == "after [time|12\u202fms]"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (5e-8, "m", "0.05\u202fµm"),
+        (120, "s", "120\u202fs"),
+        (123456, "", "123\u202f456"),
+        (0.1234, "%", "12.34\u202f%"),
+        ("A", "", "A"),
+        (None, "m", "–"),
+        (["a", "b", "c"], "", "a, b and c"),
+        (
+            Quantity(key="x", name="x", value=2e6, lower=1.9e6, upper=2.1e6, unit="Pa"),
+            "m",
+            "(2.00\u00a0±\u00a00.10)\u202fMPa",
+        ),
+    ],
+)
+def test_one_filter_writes_every_value(value: findings.Value, unit: str, text: str) -> None:
+    assert value_text(value, unit) == text

@@ -1,0 +1,166 @@
+"""Dataclasses from TOML tables, checked against their annotations; all errors at once, each with its place.
+
+Understood: `str`, `float` (whole numbers too), `int`, `bool`, string enumerations, `Literal`, `X | Y`,
+`tuple[X, ...]`, `Mapping[str, X]`, further dataclasses, `Any`, and `Annotated[str, Pattern(...)]`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from enum import Enum
+from functools import cache
+from types import MappingProxyType, NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+Record = TypeVar("Record")
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """What a text must match as a whole, and that in words."""
+
+    expression: str
+    allowed: str
+
+
+class RecordError(Exception):
+    """What does not fit a record; `errors` has one line for each, with its place."""
+
+    def __init__(self, errors: list[str]) -> None:
+        super().__init__("\n".join(errors))
+        self.errors = errors
+
+
+def record_from(kind: type[Record], table: Mapping[str, Any]) -> Record:
+    """A record of `kind` from a table.
+
+    Raises: RecordError: unknown, missing or unsuitable values, all of them; or, where each value fits, what
+        the record itself objects to (a ValueError of its `__post_init__`).
+    """
+    errors: list[str] = []
+    result = _record(kind, table, "", errors)
+    if errors:
+        raise RecordError(errors)
+    return result  # type: ignore[no-any-return]
+
+
+def plain(value: Any) -> Any:
+    """A record as JSON-able values: dictionaries, lists, texts and numbers."""
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, tuple):
+        return [plain(each) for each in value]
+    return value.value if isinstance(value, Enum) else value
+
+
+@cache
+def _annotations(kind: type) -> Mapping[str, Any]:
+    return MappingProxyType(get_type_hints(kind, include_extras=True))
+
+
+def _record(kind: type, table: Any, place: str, errors: list[str]) -> Any:
+    if not isinstance(table, Mapping):
+        errors.append(f"{place or 'case'}: a table is needed")
+        return None
+    inside = f"{place}." if place else ""
+    declared = {field.name: field for field in fields(kind)}
+    before = len(errors)
+    errors += [
+        f"{inside}{name}: no such key; allowed: {', '.join(declared)}" for name in table.keys() - declared
+    ]
+    for name, field in declared.items():
+        if name not in table and field.default is MISSING and field.default_factory is MISSING:
+            errors.append(f"{inside}{name}: missing")
+    annotations = _annotations(kind)
+    values = {
+        name: _value(annotations[name], table[name], f"{inside}{name}", errors)
+        for name in table
+        if name in declared
+    }
+    if len(errors) > before:
+        return None
+    try:
+        return kind(**values)
+    except ValueError as error:
+        errors.append(f"{place or 'case'}: {error}")
+        return None
+
+
+def _value(annotation: Any, value: Any, place: str, errors: list[str]) -> Any:
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if is_dataclass(annotation):
+        return _record(annotation, value, place, errors)  # type: ignore[arg-type]
+    if origin is Annotated:
+        return _matching(arguments, value, place, errors)
+    if origin in (Union, UnionType):
+        return _one_of(arguments, value, place, errors)
+    if origin is tuple and isinstance(value, list):
+        return tuple(_value(arguments[0], each, f"{place}.{i}", errors) for i, each in enumerate(value))
+    if origin is not None and issubclass(origin if isinstance(origin, type) else object, Mapping):
+        return _mapping(arguments[1], value, place, errors)
+    return _plain(annotation, value, place, errors)
+
+
+def _matching(arguments: tuple[Any, ...], value: Any, place: str, errors: list[str]) -> Any:
+    value = _value(arguments[0], value, place, errors)
+    pattern: Pattern = arguments[1]
+    value = value.strip() if isinstance(value, str) else value
+    if isinstance(value, str) and not re.fullmatch(pattern.expression, value, re.DOTALL):
+        errors.append(f'{place}: "{value}"; allowed: {pattern.allowed}')
+    return value
+
+
+def _one_of(choices: tuple[Any, ...], value: Any, place: str, errors: list[str]) -> Any:
+    """The first choice that fits; else the errors of the first."""
+    attempts: list[list[str]] = []
+    for choice in choices:
+        wrong: list[str] = []
+        result = _value(choice, value, place, wrong)
+        if not wrong:
+            return result
+        attempts.append(wrong)
+    errors += attempts[0]
+    return None
+
+
+def _mapping(inner: Any, value: Any, place: str, errors: list[str]) -> Any:
+    if not isinstance(value, Mapping):
+        errors.append(f"{place}: a table is needed")
+        return None
+    return MappingProxyType(
+        {key: _value(inner, each, f"{place}.{key}", errors) for key, each in value.items()}
+    )
+
+
+_PLAIN: Mapping[Any, tuple[tuple[type, ...], str]] = MappingProxyType(
+    {
+        str: ((str,), "a text"),
+        float: ((float, int), "a number"),
+        int: ((int,), "a whole number"),
+        bool: ((bool,), "true or false"),
+        NoneType: ((NoneType,), "nothing"),
+    }
+)
+
+
+def _plain(annotation: Any, value: Any, place: str, errors: list[str]) -> Any:
+    if annotation is Any:
+        return value
+    choices: tuple[Any, ...] | None = get_args(annotation) if get_origin(annotation) is Literal else None
+    if choices is None and isinstance(annotation, type) and annotation not in _PLAIN:
+        choices = tuple(annotation)  # type: ignore[arg-type]  # an enumeration
+    if choices is not None:
+        result = next((each for each in choices if each == value), None)
+        if result is None:
+            errors.append(f'{place}: "{value}"; allowed: {", ".join(str(each) for each in choices)}')
+        return result
+    types, needed = _PLAIN.get(annotation, ((tuple,), "a list"))
+    if not isinstance(value, types) or (isinstance(value, bool) and annotation is not bool):
+        errors.append(f"{place}: {needed} is needed")
+        return None
+    convert: Callable[[Any], Any] = float if annotation is float else lambda same: same
+    return convert(value)

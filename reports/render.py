@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 from typing import Final
@@ -37,9 +37,9 @@ def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> 
     return render_pages(page_content(evidence, pictures=pictures))
 
 
-def render_pages(content: PageContent) -> dict[str, str]:
+def render_pages(content: PageContent, *, files: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
     """Fills the template, once for each document."""
-    return {file: _page(content, file) for file in DOCUMENTS}
+    return {file: _page(content, file) for file in files}
 
 
 @cache

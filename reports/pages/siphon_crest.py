@@ -130,12 +130,12 @@ def _record(scene: Scene, law: CalibratedLaw, fill: float, pressure: float, prim
         "cavity_pressure_Pa": found.cavity_pressure,
         "margin_Pa": found.cavitation_margin,
         "margin_uncertainty_Pa": found.cavitation_margin_uncertainty,
-        "column": _column(found.cavitation_margin, found.cavitation_margin_uncertainty),
+        "column": column_code(found.cavitation_margin, found.cavitation_margin_uncertainty),
     }
 
 
-def _column(margin: float | None, width: float | None) -> str:
-    """Code of what a full column does: none, undecided, holds or separates."""
+def column_code(margin: float | None, width: float | None) -> str:
+    """What a full column does, by its margin and half-width, Pa: none, undecided, holds or separates."""
     if margin is None:
         return "none"
     if width is not None and abs(margin) <= width:

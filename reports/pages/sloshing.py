@@ -55,8 +55,8 @@ def _collect(work: Work) -> Record | None:
     near = abs(ratios[0][-1] - 1) <= _NEAR
     return {
         "fill_ratio": fills[:-1].tolist(),
-        "avoid": _avoid(ratios, fills[:-1], [mode for mode, _ in met], imported=imported),
-        "near_from_fill_ratio": _nearing(fills[:-1], swing) if near else None,
+        "avoid": to_avoid(ratios, fills[:-1], [mode for mode, _ in met], imported=imported),
+        "near_from_fill_ratio": nearing(fills[:-1], swing) if near else None,
         "frequency_uncertainty": FREQUENCY_UNCERTAINTY,
         "largest_wave_over_depth": float(np.max(answer.surface_amplitude_interval[:-1, 1] / depth)),
         "frequency_ratio": ratios.tolist(),
@@ -89,10 +89,11 @@ def _view(found: Record, _evidence: Record) -> Record:
     return {"frequencies": _frequencies(found), "swing": _swing(found)}
 
 
-def _avoid(ratios: FloatArray, fills: FloatArray, met: Sequence[int], *, imported: bool) -> list[Record]:
+def to_avoid(ratios: FloatArray, fills: FloatArray, met: Sequence[int], *, imported: bool) -> list[Record]:
     """Fills between which a mode that gravity drives meets the speed, for what its frequency may be.
 
     Even modes of a sector hardly feel gravity, which pulls the whole chamber one way.
+    Args: `ratios`: frequencies over the speed, a row a mode. `met`: modes that meet the speed by theory.
     """
     low, high = _MEETING
     within = [
@@ -104,7 +105,7 @@ def _avoid(ratios: FloatArray, fills: FloatArray, met: Sequence[int], *, importe
     return [{"mode": mode, "from_fill_ratio": a, "to_fill_ratio": b} for mode, (a, b) in ends.items()]
 
 
-def _nearing(fills: FloatArray, swing: FloatArray) -> float:
+def nearing(fills: FloatArray, swing: FloatArray) -> float:
     """Fill from which the swing is more than twice that of a surface that follows at once."""
     quiet = np.flatnonzero(swing < 2)
     return float(fills[min(int(quiet[-1]) + 1, fills.size - 1)]) if quiet.size else float(fills[0])

@@ -37,9 +37,9 @@ def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> 
     return render_pages(page_content(evidence, pictures=pictures))
 
 
-def render_pages(content: PageContent, *, files: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
+def render_pages(content: PageContent, *, documents: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
     """Fills the template, once for each document."""
-    return {file: _page(content, file) for file in files}
+    return {file: _page(content, file) for file in documents}
 
 
 @cache

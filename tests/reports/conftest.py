@@ -337,14 +337,15 @@ def unwritten(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def said(unwritten: None) -> Callable[[dict[str, Any], str], str]:
+def said(request: pytest.FixtureRequest) -> Callable[[dict[str, Any], str], str]:
     """The text of one section's page, without the other sections."""
+    request.getfixturevalue("unwritten")
 
     def text(evidence: dict[str, Any], name: str) -> str:
         views = {s.name: s.view(evidence) if s.name == name else None for s in sections_of(evidence)}
         content = page_content(evidence, sections_by=lambda _: views)
         file = "report.html" if content.context["sections"][0]["place"] == "report" else "annex.html"
-        pages = render_pages(content, files=(file,))
+        pages = render_pages(content, documents=(file,))
         return page_text(pages[file])
 
     return text

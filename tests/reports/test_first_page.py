@@ -23,6 +23,7 @@ from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
+Said = Callable[[Record, str], str]
 
 
 def view(evidence: Record) -> Record:
@@ -96,9 +97,7 @@ def test_no_run_is_compared_with_another_by_a_ratio(evidence: Record) -> None:
     assert told.count("times the") == 0
 
 
-def test_the_recommended_gain_stands_beside_the_scene_s(
-    evidence: Record, said: Callable[[Record, str], str]
-) -> None:
+def test_the_recommended_gain_stands_beside_the_scene_s(evidence: Record, said: Said) -> None:
     found = view(with_consequences(evidence))
     told = untraced(" ".join(found["loop_lead"]))
     assert "Recommended gain: 0.024\u202fs/µm (the scene has 0.080\u202fs/µm)" in told
@@ -114,7 +113,7 @@ def test_a_gain_under_which_the_loop_does_not_stay_is_not_praised(evidence: Reco
     assert "With it this run hovers about its limit" in told
 
 
-def test_a_chamber_that_runs_dry_is_a_warning(evidence: Record, said: Callable[[Record, str], str]) -> None:
+def test_a_chamber_that_runs_dry_is_a_warning(evidence: Record, said: Said) -> None:
     assert view(evidence)["alerts"] == []
     evidence["closed_loop"]["calibrated"]["injections"][0]["event"] = "empty"
     (warning,) = view(evidence)["alerts"]

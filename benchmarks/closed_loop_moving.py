@@ -32,7 +32,7 @@ from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
+from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.models import Scene
 
 GAIN = 0.3

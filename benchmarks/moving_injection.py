@@ -33,7 +33,7 @@ from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
+from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import bundled_scene, load_scene

@@ -13,7 +13,7 @@ from ringbalance.controller.terms import can_carry
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
+from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.models import Scene
 
 

@@ -21,6 +21,7 @@ from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidR
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.outcome import Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
+from ringbalance.controller.run_findings import run_findings
 from ringbalance.controller.simulation import (
     Injection,
     Outcome,
@@ -33,7 +34,7 @@ from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
-from ringbalance.reduced_model.selection.registry import ModelUsed
+from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 
@@ -77,8 +78,8 @@ def simulate(
         integrator: how operations are carried through time by the flow law alone; default the closed form
             when the law has one, else the quadrature. With one given no further term is modelled.
         sensor: default the scene's noise from the scene's seed.
-        modelled: of "tube inertia", "gas filling" and "valve lag" those to model; default those whose
-            estimated contribution is above the scene's tolerance.
+        modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
+            default all that the scene gives numbers for.
         residual_fill: of a driven chamber; injections are shortened so that none falls below it. Default the
             fill at which gas enters the port.
     Raises: SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
@@ -339,7 +340,7 @@ def _record(run: _Run, *, integrator: str, used: tuple[ModelUsed, ...]) -> Simul
         settling_time=run.settling_time if settled else None,
         hold_time=run.scene.controller.hold_time,
         loop=run.loop,
-        status=run.status,
+        findings=run_findings(run),
         time=time,
         amplitude=run.amplitude,
         phase=np.angle(seen),

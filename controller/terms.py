@@ -1,4 +1,4 @@
-"""What a run models beyond its flow law: the registry's selection, and the plant's terms made from it."""
+"""What a run models beyond its flow law: the registry's list, and the plant's terms made from it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,15 @@ from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Lift
 from ringbalance.physics.gas import VENTED, GasLine
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG, term_estimates
-from ringbalance.reduced_model.selection.registry import IN_INJECTIONS, ModelUsed, models_used
+from ringbalance.reduced_model.terms import (
+    FILLING,
+    HELD,
+    IN_INJECTIONS,
+    INERTIA,
+    LAG,
+    ModelUsed,
+    models_used,
+)
 from ringbalance.scene.models import Scene
 
 
@@ -19,7 +26,7 @@ def run_models(
     """Model of every term in a run; under the calibrated law the same list as `calibrate` gives.
 
     Args: `model`: the balancer; a law that gives no forces can carry no term of an injection. `asked`: names
-        of the terms to model instead, whatever the tolerance; None: as the tolerance selects.
+        of the terms to model instead; None: all.
     Raises: ValueError: a term that is not known, or that the scene or the law gives no numbers for.
     """
     _check(scene, model, asked or ())
@@ -77,7 +84,8 @@ def _check(scene: Scene, model: BalancerModel, asked: Collection[str]) -> None:
     for term in asked:
         if term not in IN_INJECTIONS:
             raise ValueError(f"no term {term!r}; there are {', '.join(IN_INJECTIONS)}")
-        unknown = term not in (INERTIA, HELD) and term_estimates(scene)[term].value is None
+        gas = scene.gas
+        unknown = (term == FILLING and gas.conductance is None) or (term == LAG and gas.valve_lag is None)
         no_crest = term == HELD and isinstance(model.flow, PaperLaw)
         if unknown or no_crest or not can_carry(scene, model):
             raise ValueError(f"{term} cannot be modelled: the scene or the law gives no numbers for it")

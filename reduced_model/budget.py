@@ -136,7 +136,7 @@ def _chamber_parts(scene: Scene, chamber: ChamberCalibration) -> dict[str, _Part
 
 
 def _curve_parts(curve: Curve, at: int) -> _Parts:
-    model = math.hypot(float(curve.left_out[at]), float(curve.unmodelled[at]))
+    model = float(curve.unmodelled[at])
     return float(curve.value[at]), float(curve.numerical[at]), model
 
 

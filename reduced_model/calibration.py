@@ -31,8 +31,7 @@ from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
-from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
-from ringbalance.reduced_model.selection.tube_terms import with_tube_models
+from ringbalance.reduced_model.terms import ModelUsed, models_used
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import FloatArray
@@ -55,7 +54,6 @@ class Calibration(CommandResult):
     _summary: ClassVar[str] = "calibration_lines"
 
     scene: Scene
-    """With the models of the tube's loss that its tolerance asks for."""
     chamber: ChamberCalibration
     """Wall pressure, moment and lambda."""
     tube: TubeLoss
@@ -132,7 +130,7 @@ def calibrate(scene: AnyScene) -> Calibration:
     Source: closed forms for the chamber, checked by finite elements; tables of finite elements for the
         laminar tube, correlations beyond; see the parts.
     """
-    scene = with_tube_models(liquid_ring_scene(scene))
+    scene = liquid_ring_scene(scene)
     chamber, law = chamber_and_law(scene)
     heads, point = law.heads, OperatingPoint.of(scene=scene, law=law)
     return Calibration(
@@ -167,7 +165,7 @@ def calibrated_model(scene: Scene) -> BalancerModel:
 
     Raises: SceneError, ValueError: as `calibrate`.
     """
-    return BalancerModel.of(chamber_and_law(with_tube_models(scene))[1])
+    return BalancerModel.of(chamber_and_law(scene)[1])
 
 
 def law_by_name(scene: Scene, law: str) -> BalancerModel:
@@ -181,7 +179,7 @@ def law_by_name(scene: Scene, law: str) -> BalancerModel:
 
 
 def chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
-    """The chamber, and the law with the tube's models that the scene has.
+    """The chamber, and the law.
 
     Raises: SceneError, ValueError: as `calibrate`.
     """

@@ -53,7 +53,7 @@ def calibrate(
         json: print one JSON document instead of tables.
         save: also write the flow law to this file, for `simulate --law`.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code 0.
@@ -179,8 +179,8 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
     yield "gas line", line_text(calibration.gas_line)
     if line_warning(calibration.gas_line):
         yield "note", line_warning(calibration.gas_line)
-    if calibration.holding.warning:
-        yield "warning", calibration.holding.warning
+    if calibration.holding.finding is not None:
+        yield "warning", calibration.holding.finding.text
     if not _stated(calibration):
         yield "note", UNSTATED[0].lower() + UNSTATED[1:].rstrip(".")
     if not chamber.status.ok:

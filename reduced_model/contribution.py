@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from ringbalance.scene.narrowing import FINEST
-
 NEGLIGIBLE: Final = 1e-3
 """Of the tolerance: a smaller contribution is left out unchecked."""
 _NO_BASIS: Final = "the scene gives no basis for an estimate"
@@ -16,7 +14,7 @@ _NO_BASIS: Final = "the scene gives no basis for an estimate"
 class Contribution:
     """What leaving one thing out is worth, judged before anything is solved."""
 
-    term: str
+    term: str = ""
     value: float | None
     """Relative to the quantity that it changes; None where the scene gives no basis for an estimate."""
     formula: str
@@ -33,18 +31,18 @@ class Contribution:
         """Whether it exceeds a tolerance."""
         return self.value is not None and self.value > tolerance
 
-    def reason(self, tolerance: float) -> str:
-        """Formula, and comparison with a tolerance; the same text in every command."""
+    def reason(self, tolerance: float | None) -> str:
+        """Formula and value, compared with a tolerance where one is given; the same text in every command."""
         return f"{self.formula}; {self._comparison(tolerance)}"
 
-    def _comparison(self, tolerance: float) -> str:
+    def _comparison(self, tolerance: float | None) -> str:
         if self.default_range is not None:
             low, high = (percent(end) for end in self.default_range)
             return f"not in the scene: {low if low == high else f'{low} to {high}'} over a default range"
         if self.value is None:
             return _NO_BASIS
-        if tolerance == FINEST:
-            return f"{percent(self.value)}; every term is modelled that has a model"
+        if not tolerance:
+            return percent(self.value)
         side = "above" if self.above(tolerance) else "below"
         return f"{percent(self.value)} is {side} the tolerance of {percent(tolerance)}"
 

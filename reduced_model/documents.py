@@ -80,7 +80,6 @@ def _curve(curve: Curve, at: list[int], name: str, unit: str) -> dict[str, Any]:
         f"{name}_input_uncertainty": _listed(curve.inputs[at]),
         f"{name}_uncertainty_parts": {
             "numerical": _listed(curve.numerical[at]),
-            "left_out_gravity": _listed(curve.left_out[at]),
             "unmodelled_terms": _listed(curve.unmodelled[at]),
         },
     }
@@ -290,7 +289,7 @@ def _holding(calibration: Calibration) -> dict[str, Any]:
         "holds": found.holds,
         "fill_ratio": calibration.residual.largest_fill_ratio,
         "largest_hump_radius_m": found.largest_hump_radius,
-        "warning": found.warning,
+        "warning": "" if found.finding is None else found.finding.text,
     }
 
 

@@ -19,6 +19,7 @@ from ringbalance.verification.evidence import Level
 DONE: Final = 0
 NOT_SOUND: Final = 1
 MOST_WORKERS: Final = 2
+WITH_LIQUID: Final = ("liquid_ring",)
 
 
 def report(
@@ -36,7 +37,7 @@ def report(
         out: folder for report.html, annex.html, evidence.json, figures/, fields/ and tables/.
         level: "heavy" also runs the cases that take long.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code: 0; 1 when a code-verification case failed, or the loop settled under neither law; the

@@ -19,7 +19,6 @@ from ringbalance.reduced_model.device import HEAD_INPUTS, device_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
-from ringbalance.reduced_model.selection.tube_terms import with_tube_models
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.scene.joint import FITTED, independent_half_widths
 from ringbalance.scene.models import Scene
@@ -74,7 +73,6 @@ def recommended_gain(
 
 def factor_uncertainty(scene: Scene, model: BalancerModel) -> FactorUncertainty:
     """All that makes the loop factor uncertain, under a law; inputs move a law that the program can make."""
-    scene = with_tube_models(scene)
     own = MemberUncertainty.of(scene, _without_inputs(scene, model))
     effects = _input_effects(scene, model)
     parts = [

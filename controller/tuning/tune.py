@@ -37,7 +37,7 @@ from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, Sett
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.selection.registry import ModelUsed, neglected_in_injections
+from ringbalance.reduced_model.terms import ModelUsed, neglected_in_injections
 from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.changes import rechecked
@@ -315,7 +315,7 @@ def _status_of(
         f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
     )
     if settling.let_go:
-        return f"{share}; {settling.let_go}"
+        return f"{share}; {settling.let_go.text}"
     if not _valves_reach(scene, zone=zone, smallest=smallest) and not settling.out_of_capacity:
         return (
             f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "

@@ -28,11 +28,10 @@ from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.holding import Holding
-from ringbalance.reduced_model.selection.estimates import FILLING, HELD, INERTIA, LAG
-from ringbalance.reduced_model.selection.tube_terms import tube_models
+from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import START_ERROR, TubeModels
+from ringbalance.scene.tube_models import START_ERROR
 from ringbalance.scene.uncertain import NORMAL_95
 
 RELATIVE_ERROR: Final = 1e-5
@@ -49,7 +48,6 @@ _LEAST_LEFT: Final = 0.1
 class Models:
     """Models that predictions of a scene and its neighbours take, by the scene's own tolerance."""
 
-    tube: TubeModels
     gravity: bool
     """Whether the chamber's values hold gravity."""
     velocity: float
@@ -62,11 +60,9 @@ class Models:
     @classmethod
     def of(cls, scene: Scene) -> Models:
         """The models that `calibrate` takes."""
-        tube = tube_models(scene)
         gravity = mean_gravity(scene) > scene.tolerance
-        law = nominal_law(replace(scene, tube=replace(scene.tube, models=tube)), gravity=gravity)
+        law = nominal_law(scene, gravity=gravity)
         return cls(
-            tube=tube,
             gravity=gravity,
             velocity=_primed_velocity(law, scene),
             gas_pressure=scene.gas.pressure - scene.gas.gauge_correction,
@@ -81,8 +77,8 @@ def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
 
 def runs_back(scene: Scene, _: Observations) -> str:
     """Why no injection leaves a change behind; empty where the tube holds at equal fills."""
-    warning = Holding.of(scene, fill_ratio=scene.disc.initial_fill).warning
-    return f"by this scene no injection leaves a change behind: {warning}" if warning else ""
+    found = Holding.of(scene, fill_ratio=scene.disc.initial_fill).finding
+    return "" if found is None else f"by this scene no injection leaves a change behind: {found.text}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -164,8 +160,7 @@ class Device:
             scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=0.0, initial_phase=0.0
         )
         disc = replace(scene.disc, lambda_factor=None)
-        tube = replace(scene.tube, models=models.tube)
-        return _device(replace(scene, rotor=rotor, disc=disc, tube=tube), models)
+        return _device(replace(scene, rotor=rotor, disc=disc), models)
 
 
 @lru_cache(maxsize=_KEPT)

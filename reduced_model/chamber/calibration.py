@@ -12,7 +12,6 @@ import numpy as np
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
-from ringbalance.reduced_model.chamber.gravity import SAFETY, GravityEffect
 from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
 from ringbalance.reduced_model.chamber.pressure_table import even_table, pressure_table
 from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
@@ -39,8 +38,6 @@ class Curve:
     """By closed forms, or by quadrature where gravity is modelled."""
     numerical: FloatArray
     """Expanded uncertainty (95 %) by rounding, quadrature, and what finite elements contradict."""
-    left_out: FloatArray
-    """Expanded uncertainty (95 %) for gravity where it is left out; zero where it is modelled."""
     unmodelled: FloatArray
     """95 % uncertainty for what no model holds: surface tension, friction at walls, high waves."""
     inputs: FloatArray
@@ -55,11 +52,11 @@ class Curve:
 
     @property
     def uncertainty(self) -> FloatArray:
-        """Half-width of the value for the scene's inputs as they stand: numerical and left-out terms."""
-        return np.sqrt(self.numerical**2 + self.left_out**2 + self.unmodelled**2)
+        """Half-width of the value for the scene's inputs as they stand: numerical and unmodelled terms."""
+        return np.hypot(self.numerical, self.unmodelled)
 
     def uncertainty_table(self, *, inputs: FloatArray) -> HermiteTable:
-        """Half-width over the fill ratio: numerical, left-out terms, interpolation and some inputs.
+        """Half-width over the fill ratio: numerical, unmodelled terms, interpolation and some inputs.
 
         Args: `inputs`: expanded uncertainty (95 %) by those inputs, along the fill ratio.
         """
@@ -99,10 +96,6 @@ class ChamberCalibration:
     """Expanded uncertainty (95 %) of lambda by the scene's uncertain inputs, m."""
     input_effects: Mapping[str, InputEffect]
     """Effect of each uncertain input."""
-    gravity: GravityEffect
-    """Along `fill_ratio`."""
-    gravity_modelled: bool
-    """Whether the values hold it."""
     status: Status
     """Of the solves or, where these are sound, of the ring's waves over the range of fills."""
     statistics: Statistics
@@ -125,23 +118,22 @@ def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
 def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     """Evaluate the closed forms over the fill range and check them by finite elements at a few fills.
 
-    Gravity is modelled when its effect exceeds the scene's tolerance at some fill; otherwise the effect goes
-    into the uncertainties. A ring must exist.
+    The values hold gravity's mean over a turn; finite elements hold it where it exceeds the scene's tolerance
+    at some fill, for it takes them ten times as long. A ring must exist.
     Raises: SceneError: as `scene_ring`.
     Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates; moments and lambda times the scene's
         measured factor.
     """
-    modelled = mean_gravity(scene) > scene.tolerance
     nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio)
     fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
-    effect = GravityEffect.of(scene, fill_ratio=fills)
-    ring = RingValues.of(scene, fill_ratio=fills, gravity=modelled)
-    check = ElementCheck.of(scene, values=ring, gravity=modelled)
+    ring = RingValues.of(scene, fill_ratio=fills, gravity=scene.environment.gravity > 0)
+    held = mean_gravity(scene) > scene.tolerance
+    compared = ring if held else RingValues.of(scene, fill_ratio=fills, gravity=False)
+    check = ElementCheck.of(scene, values=compared, gravity=held)
     unmodelled = unmodelled_fractions(scene, fills)
     effects = input_effects(scene=scene, fill_ratio=fills)
-    ring, effect = _as_measured(scene, ring, effect)
+    ring = _as_measured(scene, ring)
     waves = chamber_status(scene)
-    scale = 0.0 if modelled else SAFETY
 
     def curve(quantity: str, share: str) -> Curve:
         value: Estimate = getattr(ring, quantity)
@@ -151,7 +143,6 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
             replace(value, status=_first(ring.status, check.status_of(quantity), waves)),
             quantity,
             excess=check.excess_of(quantity),
-            gravity=scale * np.abs(getattr(effect, quantity)),
             unmodelled=unmodelled[share],
             inputs=[getattr(each, quantity) for each in effects.values()],
         )
@@ -163,7 +154,6 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
             ring.moment_per_volume, status=_first(ring.status, check.status_of("moment_per_volume"), waves)
         ),
         check.excess_of("moment_per_volume"),
-        scale * effect.moment,
         unmodelled["moments"],
         ring.moment.value,
     )
@@ -181,8 +171,6 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         moment_per_mass_numerical=numerical,
         moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
         input_effects=effects,
-        gravity=effect,
-        gravity_modelled=modelled,
         status=_first(ring.status, check.status, waves),
         statistics=check.elements.statistics,
     )
@@ -193,17 +181,14 @@ def _first(*statuses: Status) -> Status:
     return next((each for each in statuses if not each.ok), statuses[-1])
 
 
-def _as_measured(scene: Scene, ring: RingValues, effect: GravityEffect) -> tuple[RingValues, GravityEffect]:
+def _as_measured(scene: Scene, ring: RingValues) -> RingValues:
     """Moments times the scene's measured factor; finite elements check the geometry, so before it."""
     factor = scene.disc.moment_factor
     moment, slope = (
         replace(each, value=factor * each.value, uncertainty=factor * each.uncertainty)
         for each in (ring.moment, ring.moment_per_volume)
     )
-    return (
-        replace(ring, moment=moment, moment_per_volume=slope),
-        replace(effect, moment=factor * effect.moment),
-    )
+    return replace(ring, moment=moment, moment_per_volume=slope)
 
 
 def _curve(
@@ -213,7 +198,6 @@ def _curve(
     quantity: str,
     *,
     excess: float,
-    gravity: FloatArray,
     unmodelled: FloatArray,
     inputs: list[FloatArray],
 ) -> Curve:
@@ -224,7 +208,6 @@ def _curve(
     return Curve(
         value=value,
         numerical=estimate.uncertainty + (ROUND_OFF + excess) * np.abs(value),
-        left_out=gravity,
         unmodelled=unmodelled * np.abs(value),
         inputs=np.sqrt(sum((i**2 for i in inputs), start=np.zeros_like(value))),
         table=table,
@@ -238,7 +221,6 @@ def _central(
     nodes: FloatArray,
     slope: Estimate,
     excess: float,
-    gravity: FloatArray,
     unmodelled: FloatArray,
     moment: FloatArray,
 ) -> tuple[Estimate, float]:
@@ -250,11 +232,11 @@ def _central(
     value = 2 * float(slope.value[m]) / density
     numerical = 2 * float(slope.uncertainty[m]) / density + (ROUND_OFF + excess) * value
     mass = density * chamber_volume(disc=scene.disc) * float(nodes[m + 1] - nodes[m - 1])
-    left_out, missing = (2 * abs(float(u[m + 1] - u[m - 1])) / mass for u in (gravity, unmodelled * moment))
-    missing = max(missing, float(unmodelled[m]) * value)
+    share = unmodelled * moment
+    missing = max(2 * abs(float(share[m + 1] - share[m - 1])) / mass, float(unmodelled[m]) * value)
     central = Estimate(
         value=np.asarray(value),
-        uncertainty=np.asarray(math.hypot(numerical, left_out, missing)),
+        uncertainty=np.asarray(math.hypot(numerical, missing)),
         status=slope.status,
     )
     return central, numerical

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
@@ -14,9 +13,6 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-
-SAFETY: Final = 1.5
-"""Factor on the effect where it is left out and enters an uncertainty instead."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,8 +34,8 @@ _VARIED_PRESSURES: Final = np.array([0.7, 1.0, 1.4])
 """Of the scene's gas pressure."""
 _LITTLE: Final = 1e-2
 """Of the largest effect of a direction, below which it is left out: its square counts."""
-_NEXT_TO_NOTHING: Final = 0.01
-"""Of the tolerance: no mesh of a symmetric chamber is quite symmetric."""
+_NEXT_TO_NOTHING: Final = 1e-4
+"""Angle, rad: no mesh of a symmetric chamber is quite symmetric."""
 
 
 def calibrated_law(*, scene: Scene, chamber: ChamberCalibration, heads: TubeHeads) -> CalibratedLaw:
@@ -202,7 +202,7 @@ def _across_table(scene: Scene, fills: FloatArray) -> HermiteTable | None:
     Source: rho int y dV over the liquid, times the scene's factor on moments.
     """
     disc = scene.disc
-    if np.max(np.abs(share_across(disc, fills))) <= _NEXT_TO_NOTHING * scene.tolerance:
+    if np.max(np.abs(share_across(disc, fills))) <= _NEXT_TO_NOTHING:
         return None
     a = surface_radius(disc=disc, fill_ratio=fills)
     value = scene.liquid.density * disc.axial_width * moment_across(disc=disc, surface_radius=a)

@@ -21,7 +21,7 @@ from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reduced_model.selection.estimates import INERTIA
+from ringbalance.reduced_model.terms import INERTIA
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import HumpGas, Scene

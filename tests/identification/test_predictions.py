@@ -20,7 +20,7 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.selection.estimates import HELD, INERTIA
+from ringbalance.reduced_model.terms import HELD, INERTIA
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene

@@ -50,7 +50,7 @@ def test_a_tighter_tolerance_takes_a_finer_mesh(table_1_scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("shaft", ["horizontal", "vertical"])
-def test_gravity_is_in_the_check_where_it_is_in_the_values(table_1_scene: Scene, shaft: Shaft) -> None:
+def test_gravity_is_in_the_check_above_the_tolerance(table_1_scene: Scene, shaft: Shaft) -> None:
     slow = dataclasses.replace(
         table_1_scene,
         tolerance=1e-3,
@@ -58,7 +58,6 @@ def test_gravity_is_in_the_check_where_it_is_in_the_values(table_1_scene: Scene,
         environment=dataclasses.replace(table_1_scene.environment, shaft=shaft),
     )
     chamber = calibrate(slow).chamber
-    assert chamber.gravity_modelled
     assert chamber.check.gravity
     assert chamber.check.status.ok
     assert chamber.statistics.unknowns > 0

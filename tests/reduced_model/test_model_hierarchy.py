@@ -1,4 +1,4 @@
-"""Terms are chosen by their estimate against the tolerance, and what is missing says so."""
+"""Every term that has a model is modelled, and what is missing says so."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ import dataclasses
 import pytest
 
 from ringbalance.reduced_model.calibration import Calibration
-from ringbalance.reduced_model.selection.registry import ModelUsed, models_used
+from ringbalance.reduced_model.terms import LEFT_OUT, NOT_MODELLED, TERMS, ModelUsed, models_used
 from ringbalance.reduced_model.time_scales import first_gas_time
 from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import LEFT_OUT
-
-INERTIA = "rho L du/dt of the liquid in the tube, in injections"
 
 
 def chosen(scene: Scene) -> dict[str, ModelUsed]:
@@ -26,10 +23,30 @@ def test_every_term_says_model_and_reason(table_1_calibration: Calibration) -> N
     assert all(t.model and t.why for t in table_1_calibration.models_used)
 
 
-@pytest.mark.parametrize(("tolerance", "model"), [(0.9, LEFT_OUT), (0.01, INERTIA)])
-def test_tolerance_decides_on_the_tubes_inertia(table_1_scene: Scene, tolerance: float, model: str) -> None:
-    scene = dataclasses.replace(table_1_scene, tolerance=tolerance)
-    assert chosen(scene)["tube inertia"].model == model
+@pytest.mark.parametrize("tolerance", [0.9, 0.01, 1e-6])
+def test_the_tolerance_decides_on_no_model(table_1_scene: Scene, tolerance: float) -> None:
+    used = chosen(dataclasses.replace(table_1_scene, tolerance=tolerance))
+    models = {term.name: term.model for term in TERMS if term.model}
+    without = {"gas filling": LEFT_OUT, "valve lag": LEFT_OUT}
+    assert {name: used[name].model for name in models} == models | without
+    # What no model holds is compared with it.
+    assert used["surface tension"].model == (NOT_MODELLED if tolerance < 1e-3 else LEFT_OUT)
+    assert "tolerance" in used["surface tension"].why
+
+
+def test_leaving_a_part_of_the_loss_out_changes_k_by_its_share(table_1_scene: Scene) -> None:
+    """Bends alone: 2 of K = 1.1 on k of about 4 to 5."""
+    plain = dataclasses.replace(table_1_scene.tube, bends=())
+    used = chosen(dataclasses.replace(table_1_scene, tube=plain))
+    assert used["bends of the tube"].estimated_contribution == 0.0
+    assert used["bends of the tube"].model == LEFT_OUT
+    smooth = dataclasses.replace(table_1_scene.tube, roughness=0.0)
+    assert (
+        chosen(dataclasses.replace(table_1_scene, tube=smooth))[
+            "roughness of the tube's wall"
+        ].estimated_contribution
+        == 0.0
+    )
 
 
 def test_valve_and_filling_are_unknown_until_the_scene_asks(table_1_scene: Scene) -> None:
@@ -60,3 +77,4 @@ def test_prescribed_k_and_blocked_tubes_have_no_rotation_fraction(table_1_scene:
     weak = dataclasses.replace(table_1_scene, gas=dataclasses.replace(table_1_scene.gas, pressure=1e3))
     blocked = chosen(weak)
     assert blocked["friction by rotation"].estimated_contribution is None
+    assert blocked["loss of the tube"].model.startswith("k(u)")

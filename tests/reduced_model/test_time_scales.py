@@ -9,7 +9,7 @@ from typing import Literal
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.reduced_model.selection.estimates import FILLING, LAG, term_estimates
+from ringbalance.reduced_model import estimates
 from ringbalance.reduced_model.short_injection import _ridden
 from ringbalance.reduced_model.time_scales import (
     deciding_gas_time,
@@ -71,17 +71,16 @@ def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) ->
 def test_a_line_that_is_not_given_is_a_range_and_not_unknown(table_1_scene: Scene) -> None:
     """C of 0.2 to 1 l/(s bar) and 5 to 10 ms of lag are longer than an injection of 4 ms."""
     gas = dataclasses.replace(table_1_scene.gas, conductance=None, critical_ratio=None, valve_lag=None)
-    estimates = term_estimates(dataclasses.replace(table_1_scene, gas=gas))
-    for term in (FILLING, LAG):
-        found = estimates[term]
+    scene = dataclasses.replace(table_1_scene, gas=gas)
+    for found in (estimates.filling(scene), estimates.lag(scene)):
         assert found.value is None
         assert found.default_range == (1.0, 1.0)
-        assert "100 % over a default range" in found.reason(table_1_scene.tolerance)
-    assert "5 to 10 ms" in estimates[LAG].formula
+        assert "100 % over a default range" in found.reason(None)
+    assert "5 to 10 ms" in estimates.lag(scene).formula
     own = dataclasses.replace(gas, conductance=1e-8, critical_ratio=0.3, valve_lag=1e-3)
-    given = term_estimates(dataclasses.replace(table_1_scene, gas=own))
-    assert given[LAG].value == pytest.approx(0.25)
-    assert given[LAG].default_range is None
+    given = estimates.lag(dataclasses.replace(table_1_scene, gas=own))
+    assert given.value == pytest.approx(0.25)
+    assert given.default_range is None
 
 
 @pytest.mark.parametrize("push", [300.0, 0.0, -200.0])

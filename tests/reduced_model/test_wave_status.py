@@ -44,11 +44,11 @@ def slow(table_1_scene: Scene) -> Calibration:
 def test_moment_pressure_and_lambda_inherit_the_status(slow: Calibration) -> None:
     chamber = slow.chamber
     for part in (chamber, chamber.moment, chamber.wall_pressure, chamber.moment_per_mass):
-        assert part.status.code is StatusCode.OUT_OF_RANGE
+        assert part.status.code is StatusCode.NO_RING
     document = calibration_document(slow)
-    assert document["lambda"]["status"] == "out_of_range"
-    assert document["chamber"]["moment_status"] == "out_of_range"
-    assert document["chamber"]["wall_pressure_status"] == "out_of_range"
+    assert document["lambda"]["status"] == "no_ring"
+    assert document["chamber"]["moment_status"] == "no_ring"
+    assert document["chamber"]["wall_pressure_status"] == "no_ring"
 
 
 def test_the_interval_holds_the_waves_of_finite_elements(slow: Calibration) -> None:

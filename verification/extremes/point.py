@@ -134,7 +134,7 @@ def _ending(calibration: Calibration) -> Ending:
 def _worst_ratio(calibration: Calibration, width_factor: float) -> float:
     """Of the finite elements against the concentric closed form, which is exact where gravity is left out."""
     chamber, scene = calibration.chamber, calibration.scene
-    if chamber.gravity_modelled:
+    if chamber.check.gravity:
         return -1.0
     solved = chamber.check.elements
     x = solved.fill_ratio

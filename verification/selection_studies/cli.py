@@ -46,7 +46,7 @@ def trade(
         level: "light" leaves out the settling time, which takes whole runs of the loop.
         save_costs: also write a cost model fitted to this run's times to this file.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
-        models: "finest" models every term that has a model, whatever the tolerance.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
         Exit code 0.

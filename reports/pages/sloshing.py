@@ -8,7 +8,8 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 
-from ringbalance.physics.sloshing.modes import IMPORTED_SHARES, resonant_fills, sloshing_modes
+from ringbalance.mesh.section import NoPlaneWavesError
+from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reports.figures import style
@@ -16,6 +17,7 @@ from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.numbers import short
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
 
 _MODES: Final = 4
 _POINTS: Final = 17
@@ -32,14 +34,21 @@ def _collect(work: Work) -> Record | None:
     scene = work.scene
     if scene.environment.shaft == "vertical" or scene.environment.gravity == 0:
         return None
+    try:
+        return _waves(scene)
+    except NoPlaneWavesError as error:
+        return {"left_out": str(error)}
+
+
+def _waves(scene: Scene) -> Record:
     largest = scene.disc.max_fill_ratio
     met = resonant_fills(disc=scene.disc, modes=_MODES)
     imported = scene.disc.geometry is not None
     # A peak is narrower than the distance of even points.
     peaks = [x * side for _, x in met for side in (0.96, 0.99, 1.0, 1.01, 1.04) if x * side <= largest]
     even = np.linspace(0.02, 1.0, _POINTS) * largest
-    # Each fill of an imported chamber takes seconds.
-    shown = largest * IMPORTED_SHARES if imported else np.unique([*even, *peaks])
+    # Each fill of an imported chamber takes two cuts of its mesh.
+    shown = even if imported else np.unique([*even, *peaks])
     fills = np.append(shown, scene.disc.initial_fill)
     modes = sloshing_modes(disc=scene.disc, fill_ratio=fills[:-1], modes=_MODES, cells=_COARSE)
     answer = sloshing_response(
@@ -86,7 +95,7 @@ def _collect(work: Work) -> Record | None:
 
 
 def _view(found: Record, _evidence: Record) -> Record:
-    return {"frequencies": _frequencies(found), "swing": _swing(found)}
+    return {} if "left_out" in found else {"frequencies": _frequencies(found), "swing": _swing(found)}
 
 
 def to_avoid(ratios: FloatArray, fills: FloatArray, met: Sequence[int], *, imported: bool) -> list[Record]:

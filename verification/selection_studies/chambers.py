@@ -12,8 +12,9 @@ import numpy as np
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.cut.tilted import tilted_liquid
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics import deferred
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.sloshing.response import sloshing_response
+from ringbalance.physics.sloshing.system import imported_system
 from ringbalance.reduced_model.chamber.element_check import ImportedElements, scene_ring
 from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
 from ringbalance.reduced_model.chamber.terms import (
@@ -307,7 +308,7 @@ def _sloshing_factors(scene: Scene, fill: float) -> tuple[float, float]:
 
     Source: `sloshing_response`.
     """
-    found = deferred.sloshing_response(
+    found = sloshing_response(
         disc=scene.disc,
         fill_ratio=[fill],
         angular_velocity=abs(scene.rotor.speed),
@@ -320,5 +321,5 @@ def _sloshing_factors(scene: Scene, fill: float) -> tuple[float, float]:
 
 def forget_solves() -> None:
     """Do every solve again when it is next asked for, so that it can be timed."""
-    for kept in (by_elements, _sloshing_factors, tilted_liquid, deferred.wave_system):
+    for kept in (by_elements, _sloshing_factors, tilted_liquid, imported_system):
         kept.cache_clear()

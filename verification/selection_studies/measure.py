@@ -16,8 +16,8 @@ from statistics import median
 from typing import Final
 
 import numpy as np
+from scipy.optimize import nnls
 
-from ringbalance.physics import deferred
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Values, Work
 
 _QUICK: Final = 0.1
@@ -86,7 +86,7 @@ def fitted_costs(
     wanted = [*np.ones(len(works)), *(_PULL if kind in known else 0.0 for kind in kinds)]
     scaled = np.vstack([scaled, pulls])
     sizes = np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
-    found, _ = deferred.nnls(scaled / sizes, np.array(wanted))
+    found, _ = nnls(scaled / sizes, np.array(wanted))
     return CostModel(
         seconds={kind: float(value) for kind, value in zip(kinds, found / sizes, strict=True)},
         fitted_on=fitted_on,

@@ -344,9 +344,8 @@ def said(request: pytest.FixtureRequest) -> Callable[[dict[str, Any], str], str]
     def text(evidence: dict[str, Any], name: str) -> str:
         views = {s.name: s.view(evidence) if s.name == name else None for s in sections_of(evidence)}
         content = page_content(evidence, sections_by=lambda _: views)
-        file = "report.html" if content.context["sections"][0]["place"] == "report" else "annex.html"
-        pages = render_pages(content, documents=(file,))
-        return page_text(pages[file])
+        file = f"{content.context['sections'][0]['place']}.html"
+        return page_text(render_pages(content, documents=(file,))[file])
 
     return text
 

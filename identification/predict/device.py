@@ -110,8 +110,6 @@ class Device:
         dynamics = dynamics_of(
             scene=self.scene, model=BalancerModel.of(self.law), modelled=terms, checked=True
         )
-        if dynamics is None:
-            raise ValueError("the calibrated law has a column in the tube")
         return dynamics.plant(total=2 * self.scene.disc.initial_fill, relative_error=RELATIVE_ERROR)
 
     @cached_property

@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.ensemble.run import MemberRuns, MomentTable
 from ringbalance.controller.ensemble.samples import Members
-from ringbalance.controller.ensemble.transfer import PairTransfer
+from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.models import Scene
@@ -85,7 +85,7 @@ class LoopGain:
         return 2 / self.slope
 
 
-def loop_gain(scene: Scene, model: BalancerModel, *, transfer: PairTransfer) -> LoopGain | None:
+def loop_gain(scene: Scene, model: BalancerModel, *, dynamics: Dynamics) -> LoopGain | None:
     """Linearise the loop about level chambers, and find its margins by simulation as well.
 
     e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V, so a residual turns round from h
@@ -105,7 +105,7 @@ def loop_gain(scene: Scene, model: BalancerModel, *, transfer: PairTransfer) -> 
     arm = per_fill / (model.density * model.chamber_volume)
     h = scene.controller.proportional * slope
     slowed, simulated = (np.sqrt((k + 1) / (k * f + 1)) for f in (CURVE_FACTORS, SIMULATED_FACTORS))
-    overshoot, growth = _onsets(scene, model, transfer, slope, simulated)
+    overshoot, growth = _onsets(scene, model, dynamics, slope, simulated)
     return LoopGain(
         law=model.name,
         velocity=u,
@@ -135,14 +135,14 @@ def _moment_per_fill(scene: Scene, model: BalancerModel) -> float:
 
 
 def _onsets(
-    scene: Scene, model: BalancerModel, transfer: PairTransfer, slope: float, slowed: FloatArray
+    scene: Scene, model: BalancerModel, dynamics: Dynamics, slope: float, slowed: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest gains with an overshoot and with growth, at factors of the velocity."""
     quiet = _small_and_exact(scene, model)
 
     def run(gains: FloatArray) -> MemberRuns:
         members = _members(quiet, gains, slowed)
-        return simulate_members(quiet, model, members=members, transfer=transfer)
+        return simulate_members(quiet, model, members=members, dynamics=dynamics)
 
     low, high = (end / (slope * slowed) for end in SEARCH)
     first = np.geomspace(low, high, GAINS, axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
-from ringbalance.controller.ensemble.monte_carlo import ensemble_transfer
+from ringbalance.controller.ensemble.monte_carlo import ensemble_dynamics
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -43,7 +43,7 @@ def found(noisy: Scene, true_model: BalancerModel) -> Consequences:
 
 
 def gain_of(scene: Scene, model: BalancerModel) -> LoopGain:
-    gain = loop_gain(scene, model, transfer=ensemble_transfer(scene, model))
+    gain = loop_gain(scene, model, dynamics=ensemble_dynamics(scene, model))
     assert gain is not None
     return gain
 
@@ -117,7 +117,7 @@ def test_the_lag_margin_is_where_the_loop_turns_over(
 
 def test_no_flow_no_gain(scene: Scene, model: BalancerModel) -> None:
     weak = replace(scene, gas=replace(scene.gas, pressure=0.0), run=replace(scene.run, time_limit=5.0))
-    assert loop_gain(weak, model, transfer=ensemble_transfer(weak, model)) is None
+    assert loop_gain(weak, model, dynamics=ensemble_dynamics(weak, model)) is None
     record = find_consequences(weak, replace(model, name="calibrated"), paper=model, members=20)
     assert record.gains == ()
     assert record.retuned_proportional is None

@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.integrators import closed_form
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.pressure.ring import ring_quantities
@@ -22,7 +21,7 @@ from ringbalance.verification.extremes.axes import AXES, Axis
 from ringbalance.verification.extremes.design import Base, Point
 from ringbalance.verification.extremes.point import ROUND_OFF, Ending, Judgement
 from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
-from ringbalance.verification.reference.transfers import explicit_segments, paper_drive
+from ringbalance.verification.reference.transfers import closed_form, explicit_segments, paper_drive
 
 Progress = Callable[[int, int], None]
 

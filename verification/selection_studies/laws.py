@@ -10,8 +10,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.integrators import quadrature
-from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber.gravity import GravityEffect, closed_ring
@@ -41,6 +39,7 @@ from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import with_tolerance
+from ringbalance.verification.reference.transfers import Integrator
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy, Work
 
 EQ_12: Final = "Eq. 12"
@@ -77,7 +76,8 @@ class Course(NamedTuple):
     lacks: tuple[str, ...] = ()
     work: Work = {"law": 1.0}  # noqa: RUF012 - a mapping that nobody changes
     """For one point of a hierarchy."""
-    integrator: Integrator = quadrature
+    integrator: Integrator | None = None
+    """By the flow law alone; None: the march."""
     modelled: tuple[str, ...] = ()
     """Terms of an injection that the plant carries."""
 

@@ -9,14 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.integrators import closed_form
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.contribution import Contribution
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
-from ringbalance.reduced_model.law.paper_law import paper_law
+from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.selection.estimates import (
     FILLING,
     HELD,
@@ -30,7 +29,7 @@ from ringbalance.reduced_model.selection.tube_terms import flow_contributions
 from ringbalance.reduced_model.time_scales import first_gas_time
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.transfers import explicit_segments
+from ringbalance.verification.reference.transfers import closed_form, explicit_segments, paper_drive
 from ringbalance.verification.selection_studies.hierarchy import Fidelity, ModelHierarchy
 from ringbalance.verification.selection_studies.laws import CLOSED, EQ_12, Course, LawBook, LawModels
 
@@ -55,7 +54,7 @@ def courses(scene: Scene) -> tuple[Course, ...]:
             Course(name, (name, *left), {"segment": float(count)}, explicit_segments(count))
             for count, name in zip(_SEGMENTS, EXPLICIT, strict=True)
         ),
-        Course("quadrature in time", left, {"quadrature_operation": 1.0}),
+        Course("march by the flow law alone", left, {"dynamic_operation": 1.0}),
     ]
     carried = dict.fromkeys([left[:1], left])
     dynamic = [
@@ -139,16 +138,19 @@ def mass_hierarchy(book: LawBook) -> ModelHierarchy:
 def moved_mass(scene: Scene, *, law: CompleteLaw, course: Course, gas_time: float) -> float:
     """Mass that leaves the driven chamber by one injection of `gas_time`, s, and the wait after it, kg."""
     model = BalancerModel.of(law)
+    if course.integrator is not None and isinstance(law, PaperLaw):
+        fill = scene.disc.initial_fill
+        drive = paper_drive(law, gas_pressure=scene.gas.pressure, fill=fill, total=2 * fill)
+        valve = course.integrator(drive, np.array([gas_time]))
+        return (fill - float(valve.fill[-1])) * model.density * model.chamber_volume
     plant = LiquidRing(
         model=model,
         chambers=scene.disc.chambers,
-        gas_pressure=scene.gas.pressure,
-        integrator=course.integrator,
         dynamics=dynamics_of(scene=scene, model=model, modelled=course.modelled),
     )
     start = DiscState.initial(disc=scene.disc)
-    valve = plant.advance(start, gas_times={0: gas_time}, duration=gas_time, points=1)
-    end = plant.advance(valve.state, gas_times={}, duration=scene.controller.period, points=1)
+    opened = plant.advance(start, gas_times={0: gas_time}, duration=gas_time, points=1)
+    end = plant.advance(opened.state, gas_times={}, duration=scene.controller.period, points=1)
     return (start.fills()[0] - end.state.fills()[0]) * model.density * model.chamber_volume
 
 
@@ -162,13 +164,10 @@ def settling_hierarchy(book: LawBook) -> ModelHierarchy:
     )
     first, *others = _laws(book)
     laws = [law for law in others if law.level == CLOSED and law.loss != CONSTANT]
-    ways = [course for course in courses(scene) if course.name != EXPLICIT[-1]]
+    ways = [course for course in courses(scene) if course.integrator is None]
 
     def solve(_: int, *, law: LawModels, course: Course) -> FloatArray:
-        made, modelled = _law(book, law, course), course.modelled or None
-        found = simulate(
-            exact, flow_law=made, integrator=None if modelled else course.integrator, modelled=modelled
-        )
+        found = simulate(exact, flow_law=_law(book, law, course), modelled=course.modelled)
         return np.array([found.settling_time or 0.0])
 
     return replace(

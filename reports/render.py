@@ -55,6 +55,7 @@ def _environment() -> jinja2.Environment:
         "tone": summary.tone,
         "verbatim": escape,
         "series": series,
+        "opening": lambda text: f"{text[0].upper()}{text[1:]}",
         "as_in": lambda name, names: names.get(name, name),
         "sentence": lambda text: f"{text[0].upper()}{text[1:].rstrip('.')}.",
         "input_name": input_name,

@@ -100,13 +100,13 @@ class Section:
     """From its own evidence and the whole to what the template calls `view`: texts, `Drawing`s, or None."""
     always: bool = False
     """Whether it is shown without evidence of its own, which is then empty."""
-    in_parts: bool = False
-    """Whether its view is a list of kinds and contents, which one template sets in turn."""
+    template: str = ""
+    """File in `templates`; by default that of its name."""
 
     @property
-    def template(self) -> str:
+    def file(self) -> str:
         """File in `templates`."""
-        return "parts.html" if self.in_parts else f"{self.name}.html"
+        return self.template or f"{self.name}.html"
 
     def view(self, evidence: Record) -> Record | None:
         """What the template shows of the whole evidence; None: no such section."""

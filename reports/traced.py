@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 from typing import Any, Final, Literal, overload
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from ringbalance.reports.prose import marked_up
 from ringbalance.reports.section import Table
@@ -154,6 +155,40 @@ def _text(value: float, width: float | None, digits: int | None, unit: str, form
     return numbers.shown(value, unit, None if width is None else float(width), digits=digits or 4)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """Numbers in one unit and to one decimal place, that of the last digit of the largest."""
+
+    symbol: str
+    texts: list[str]
+
+
+def column(values: Items, digits: int = 6) -> Column:
+    """A column of the evidence in the unit that suits its largest value, which has so many digits."""
+    numbers_of = list(values)
+    display = numbers.display_unit(unit_of(numbers_of[0].path), *numbers_of)
+    largest = max(abs(value) for value in numbers_of) * display.factor
+    decimals = max(digits - 1 - math.floor(math.log10(largest)), 0) if largest else 0
+    texts = [_marked(numbers.fixed(value * display.factor, decimals), value.path) for value in numbers_of]
+    return Column(symbol=display.symbol, texts=texts)
+
+
+def span(ends: Sequence[float] | None, unit: str | None = None, digits: int = 3) -> str:
+    """Both ends of an interval in one unit; empty without one, or with none that so many digits show."""
+    if ends is None:
+        return ""
+    low, high = ends
+    display = numbers.display_unit(unit or "1", low, high)
+    texts = [numbers.number(end * display.factor, digits=digits) for end in (low, high)]
+    if texts[0] == texts[1]:
+        return ""
+    least, most = (
+        _marked(text, getattr(end, "path", "")) for text, end in zip(texts, (low, high), strict=True)
+    )
+    both = Markup("up to {}").format(most) if low == 0 else Markup("{} to {}").format(least, most)
+    return both + escape(numbers.with_unit("", display.symbol))
+
+
 def table_of(texts: Sequence[str], caption: str = "", style: str = "narrow") -> Table:
     """A table of which each text is a row: a line `Head :: cell` for each column.
 
@@ -217,6 +252,7 @@ def finished(value: object) -> object:
 
 _FORMS: Final[tuple[Form, ...]] = ("given", "percent", "change", "fixed")
 FILTERS: Final = MappingProxyType(
-    {"q": printed, "part_of": part_of} | {form: partial(printed, form=form) for form in _FORMS}
+    {"q": printed, "part_of": part_of, "column": column, "span": span}
+    | {form: partial(printed, form=form) for form in _FORMS}
 )
 """Filters of the templates: each formats, and traces what it prints."""

@@ -36,7 +36,7 @@ Record = dict[str, Any]
 def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
     folder = files("ringbalance.reports").joinpath("templates")
     present = {item.name for item in folder.iterdir() if item.name.endswith(".html")}
-    assert present == {section.template for section in (*SECTIONS, *eccentric_scene.SECTIONS)} | {
+    assert present == {section.file for section in (*SECTIONS, *eccentric_scene.SECTIONS)} | {
         "report.html",
         "macros.html",
     }
@@ -62,7 +62,7 @@ def test_drawings_are_found_however_deep() -> None:
 
 def test_a_plain_section_needs_no_functions() -> None:
     plain = Section(name="plain", title="Plain")
-    assert plain.template == "plain.html"
+    assert plain.file == "plain.html"
     assert plain.view({}) == {}
 
 

@@ -93,6 +93,9 @@ class Part(Mapping[str, Any]):
         self._record, self._path = record, path
 
     def __getitem__(self, key: str) -> Any:
+        if "." in key:
+            # A quantile's name, which no dotted place can hold.
+            return self._record[key]
         return placed(self._record[key], f"{self._path}.{key}" if self._path else key)
 
     def __iter__(self) -> Iterator[str]:

@@ -68,7 +68,7 @@ def _consequences() -> Record:
 
 def test_every_number_is_the_evidences_own(evidence: Record, said: Said) -> None:
     text = said({**evidence, "consequences": _consequences()}, "consequences")
-    assert "| | the paper’s law | the calibrated law |" in text
+    assert "| the paper’s law | the calibrated law |" in text
     assert "| share that one operation takes away | 60.0 % | 194 % |" in text
     assert re.search(r"same controller \| 0.0800 s/µm \| hovering \| 115 \| 96 \| 2 \|", text)
     assert "| half of all runs settled by (5 %; 95 %) | 4.20 s (3.10 s; 5.30 s)" in text

@@ -10,7 +10,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.ensemble.run import MemberRuns, MomentTable
+from ringbalance.controller.ensemble.run import MemberRuns
 from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -128,10 +128,10 @@ def loop_gain(scene: Scene, model: BalancerModel, *, dynamics: Dynamics) -> Loop
 
 def _moment_per_fill(scene: Scene, model: BalancerModel) -> float:
     """|dM/dx| at equal fills with the total held, kg m."""
-    table = MomentTable.of(model=model, total=2 * scene.disc.initial_fill)
     x, step = scene.disc.initial_fill, SMALL_FILL
-    ends = table.at(np.array([x - step, x + step]))
-    return float(abs(ends[1] - ends[0])) / (2 * step)
+    ends = np.array([x - step, x + step])
+    moments = model.moment.pair_vector(fill_ratio=ends, opposite_fill_ratio=2 * x - ends)
+    return float(abs(moments[1] - moments[0])) / (2 * step)
 
 
 def _onsets(

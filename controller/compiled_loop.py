@@ -14,7 +14,6 @@ import numpy.typing as npt
 from ringbalance.controller.algorithms.law_based import law_based_step
 from ringbalance.controller.algorithms.target_vector import target_vector_step
 from ringbalance.controller.algorithms.trial import trial_step
-from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.formulas import (
     NONE,
     NOTICEABLE,
@@ -24,12 +23,7 @@ from ringbalance.controller.formulas import (
     has_turned,
     stop_cause,
 )
-from ringbalance.controller.liquid_ring.compiled_events import command, rests, would_start
-from ringbalance.controller.liquid_ring.compiled_gas import gas_volume
-from ringbalance.controller.liquid_ring.compiled_lift import shown
-from ringbalance.controller.liquid_ring.compiled_march import advance, least_later, opening_within
 from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
-from ringbalance.controller.liquid_ring.records import WORK, P, X
 from ringbalance.controller.loop_records import (
     GAS_POINTS,
     LAW_BASED,
@@ -44,7 +38,13 @@ from ringbalance.controller.loop_records import (
     Record,
 )
 from ringbalance.controller.moment_table import pair_moment
+from ringbalance.reduced_model.injection.events import command, rests, would_start
+from ringbalance.reduced_model.injection.gas import gas_volume
+from ringbalance.reduced_model.injection.lift import shown
+from ringbalance.reduced_model.injection.march import advance, least_later, opening_within
+from ringbalance.reduced_model.injection.records import WORK, P, X
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import in_place
 
 _has_held: Final = in_place(has_held)
 _has_risen: Final = in_place(has_risen)

@@ -14,12 +14,12 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.interval import pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Switch
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
 from ringbalance.physics.roots import bracketed_root
 from ringbalance.reduced_model.gas_line import line_ends, standing_amplitude
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.pair import Motion, PairState, Switch, pass_time
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.short_injection import Fills, short_injections
 from ringbalance.reduced_model.terms import FILLING, HELD

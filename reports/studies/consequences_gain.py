@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.ensemble.run import MemberRuns
 from ringbalance.controller.ensemble.samples import Members
-from ringbalance.controller.liquid_ring.motion import Dynamics
+from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.models import Scene

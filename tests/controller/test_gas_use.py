@@ -12,10 +12,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.interval import Passage
-from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import GasUse
 from ringbalance.mesh.geometry import surface_radius
@@ -27,6 +24,9 @@ from ringbalance.reduced_model.gas_line import (
     line_text,
     line_warning,
 )
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.pair import Passage
+from ringbalance.reduced_model.injection.records import Event
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.short_injection import Fills, short_injections
 from ringbalance.reduced_model.tube.path import crest_span

@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import in_place
-from ringbalance.controller.liquid_ring.compiled_column import open_to_gas
-from ringbalance.controller.liquid_ring.compiled_events import (
+from ringbalance.reduced_model.injection.column import open_to_gas
+from ringbalance.reduced_model.injection.events import (
     EMPTY,
     FULL,
     NONE,
@@ -35,9 +34,10 @@ from ringbalance.controller.liquid_ring.compiled_events import (
     starts,
     would_start,
 )
-from ringbalance.controller.liquid_ring.compiled_gas import end_pressure, near_end
-from ringbalance.controller.liquid_ring.compiled_lift import arrived, front, set_out, shown
-from ringbalance.controller.liquid_ring.compiled_step import (
+from ringbalance.reduced_model.injection.gas import end_pressure, near_end
+from ringbalance.reduced_model.injection.lift import arrived, front, set_out, shown
+from ringbalance.reduced_model.injection.records import EVENTS, Event, P, Record, U, X
+from ringbalance.reduced_model.injection.step import (
     BETWEEN,
     END,
     between,
@@ -45,8 +45,8 @@ from ringbalance.controller.liquid_ring.compiled_step import (
     shorten,
     take,
 )
-from ringbalance.controller.liquid_ring.records import EVENTS, Event, P, Record, U, X
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import in_place
 
 _ROUND_OFF: Final = 1e-12
 """s, of the clock of a valve."""

@@ -1,4 +1,4 @@
-"""What moves the liquid of a pair: a law's column, its gas lines and valves, as a record for compiled code."""
+"""What moves the liquid of a pair: a law's column, gas lines and valves, as a record for compiled code."""
 
 from __future__ import annotations
 

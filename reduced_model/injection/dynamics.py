@@ -183,6 +183,8 @@ class Dynamics:
     """Fill of a driven chamber that no command goes below."""
     lift: Lift | None = None
     """None: liquid passes the crest as soon as the gas can hold it there."""
+    relative_error: float = RELATIVE_ERROR
+    """Of each state, allowed to one step."""
 
     @classmethod
     def of(
@@ -218,9 +220,9 @@ class Dynamics:
         """Whether the flow law alone moves the liquid."""
         return not self.inertia and self.line is None and self.valve_lag == 0 and self.lift is None
 
-    def plant(self, *, total: float, relative_error: float = RELATIVE_ERROR) -> npt.NDArray[np.void]:
+    def plant(self, *, total: float, relative_error: float | None = None) -> npt.NDArray[np.void]:
         """Record of type `PLANT`, shape (1,), of a pair with a sum of fill ratios."""
-        return _filled(self, total, relative_error)
+        return _filled(self, total, self.relative_error if relative_error is None else relative_error)
 
     @cached_property
     def _plants(self) -> dict[float, npt.NDArray[np.void]]:

@@ -169,6 +169,8 @@ def _march(
     while left > 0.0:
         if not goes_on:
             _settle(plant, motion)
+        if motion.primed and motion.filled < 0.0:
+            motion.filled = motion.now
         if motion.steps >= plant.most_steps:
             motion.event = _UNFINISHED
             _pass(plant, motion, left, notes, row, count)

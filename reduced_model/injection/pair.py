@@ -112,6 +112,8 @@ class Passage:
     """At the end; its record's event is UNFINISHED when the bound on the number of steps was reached."""
     ended: float
     """s, at which the flow out of the chamber that was driven last ended; zero where it has not."""
+    filled: float | None
+    """s, at which the tube was first primed; None where it has not been."""
     ran_back: float
     """Change of x by flow out of the chamber that was not driven last, with both valves closed."""
 
@@ -130,6 +132,7 @@ def pass_time(dynamics: Dynamics, pair: PairState, *, instants: FloatArray) -> P
         primed=bool(state["primed"][0]),
         motion=_unpacked(plant, state),
         ended=float(state["ended"][0]),
+        filled=float(state["filled"][0]) if state["filled"][0] >= 0 else None,
         ran_back=float(state["ran_back"][0]),
     )
 
@@ -177,6 +180,7 @@ def packed(plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Mo
         "residual": known["residual"],
         "closing_pressure": record.closing_pressure,
         "run_dry": record.run_dry,
+        "filled": -1.0,
         "primed": primed,
         "valve_0": motion.valves[0],
         "valve_1": motion.valves[1],

@@ -97,7 +97,7 @@ class LoopPlan:
 
         Args:
             relative_error: allowed to one step of a pair's states.
-            most_samples: of one run.
+            most_samples: after which a run ends undecided.
             sensed: whether the caller's sensor writes its samples into the run.
             to_time_limit: whether a settled run continues.
         """

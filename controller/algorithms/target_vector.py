@@ -68,6 +68,7 @@ class TargetVector(BuiltIn):
         return 2
 
     def fill(self, loop: Record, run: Record) -> None:
+        """As `BuiltIn.fill`."""
         loop["algorithm"], loop["chambers"], loop["rest_limit"] = TARGET_VECTOR, self.chambers, self.limit
         loop["assumed_lag"], loop["resets"] = self.lag_angle, self.on_reversal == "reset"
         loop["integral_time"] = math.inf if self.integral_time is None else self.integral_time
@@ -77,6 +78,7 @@ class TargetVector(BuiltIn):
         run["proportional"], run["before_time"] = self.proportional, math.inf
 
     def react(self, loop: Record, memory: Memory) -> None:
+        """As `BuiltIn.react`."""
         target_vector_step(loop, memory.run[0])
 
 

@@ -49,6 +49,7 @@ class Trial(BuiltIn):
         return len(self.sequence)
 
     def fill(self, loop: Record, run: Record) -> None:
+        """As `BuiltIn.fill`."""
         run["position"] = 0
         loop["algorithm"], loop["chambers"], loop["rest_limit"] = TRIAL, self.chambers, self.limit
         loop["trials"], loop["sequence"][: len(self.sequence)] = len(self.sequence), self.sequence
@@ -57,6 +58,7 @@ class Trial(BuiltIn):
         loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
 
     def react(self, loop: Record, memory: Memory) -> None:
+        """As `BuiltIn.react`."""
         trial_step(loop, memory.run[0])
 
 

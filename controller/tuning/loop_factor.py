@@ -19,8 +19,9 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, split_change
+from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.algorithms.target_vector import TargetVector
+from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
 from ringbalance.controller.liquid_ring.reach import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,

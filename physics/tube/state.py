@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.bends import BEND_UNCERTAINTY, bend_loss, straight_length, turbulent_bend_loss
+from ringbalance.physics.tube.bends import bend_loss, straight_length, turbulent_bend_loss
 from ringbalance.physics.tube.ends import (
     TURBULENT_KINETIC_FACTOR,
     entrance_loss,
@@ -47,8 +47,6 @@ class TubeState:
     """f with rotation."""
     bends: tuple[FloatArray, ...]
     """K of each bend, in order along the path."""
-    bend_half_width: FloatArray
-    """Expanded uncertainty (95 %) of their sum: one cause, so theirs add up."""
     kinetic_factor: FloatArray
     """alpha."""
     terms: Mapping[str, FloatArray]
@@ -119,7 +117,7 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
             "entrance": entrance,
             "friction": straight_length(tube=tube) / tube.bore * straight,
             "rotation": tube.length / tube.bore * (turning - straight),
-            "bends": np.asarray(sum((k for k, _ in bends), start=np.zeros(re.shape)), dtype=np.float64),
+            "bends": np.asarray(sum(bends, start=np.zeros(re.shape)), dtype=np.float64),
             "exit": leaving,
             "extra": np.full(re.shape, tube.extra_loss),
         }
@@ -128,8 +126,7 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
         rotation_reynolds=rotation,
         critical_ratio=critical,
         rotating_friction=turning,
-        bends=tuple(k for k, _ in bends),
-        bend_half_width=np.asarray(sum((w for _, w in bends), start=np.zeros(re.shape))),
+        bends=bends,
         kinetic_factor=alpha,
         terms=terms,
     )
@@ -187,15 +184,14 @@ def _ends(
 
 def _bends(
     tube: Tube, re: FloatArray, rotation: FloatArray, critical: FloatArray, straight: FloatArray
-) -> list[tuple[FloatArray, FloatArray]]:
-    """K and half-width of each bend; bends of one shape are evaluated once."""
+) -> tuple[FloatArray, ...]:
+    """K of each bend; bends of one shape are evaluated once."""
 
-    def loss(bend: Bend) -> tuple[FloatArray, FloatArray]:
+    def loss(bend: Bend) -> FloatArray:
         if tube.models.bends == LEFT_OUT:
-            return straight * bend.angle * bend.radius / tube.bore, np.zeros(re.shape)
+            return straight * bend.angle * bend.radius / tube.bore
         if tube.models.bends == CORRELATION:
-            turbulent = turbulent_bend_loss(bend=bend, bore=tube.bore, friction_factor=straight)
-            return turbulent, BEND_UNCERTAINTY * turbulent
+            return turbulent_bend_loss(bend=bend, bore=tube.bore, friction_factor=straight)
         return bend_loss(
             bend=bend,
             bore=tube.bore,
@@ -205,5 +201,7 @@ def _bends(
             critical_ratio=critical,
         )
 
-    known = {bend: loss(bend) for bend in set(tube.bends)}
-    return [known[bend] for bend in tube.bends]
+    # Numbers of many designs are arrays, which have no hash.
+    shapes = [(np.asarray(b.angle).tobytes(), np.asarray(b.radius).tobytes()) for b in tube.bends]
+    known = {shape: loss(bend) for shape, bend in dict(zip(shapes, tube.bends, strict=True)).items()}
+    return tuple(known[shape] for shape in shapes)

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.chamber.inputs import chamber_pressure
-from ringbalance.reduced_model.law.building import tube_path
+from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
+from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.regime import TubeEnds, can_flow, column_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray

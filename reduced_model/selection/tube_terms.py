@@ -14,7 +14,6 @@ from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.terms import MEAN, PLATES, chamber_contributions
 from ringbalance.reduced_model.contribution import Contribution
-from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.selection.range_flow import (
     CONSTANT_MODELS,
     MODELS,
@@ -26,6 +25,7 @@ from ringbalance.reduced_model.selection.range_flow import (
     range_velocities,
     steady,
 )
+from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.regime import SiphonCrest
 from ringbalance.scene.arrays import FloatArray

@@ -119,8 +119,8 @@ def test_up_to_the_largest_correction_every_vibration_is_brought_to_the_limit(ch
 def test_a_fast_line_delivers_what_its_lag_lets_it(calibrated: BalancerModel, scene: Scene) -> None:
     """As C grows the chamber fills at once, and a valve open for its lag moves u S T less half of the arc.
 
-    The mass of the column takes its start-up time, 2 L/((k + 1) u), of it, of which 0.2 s has little; the levels
-    shift meanwhile.
+    The mass of the column takes its start-up time, 2 L/((k + 1) u), of it, of which 0.2 s has little;
+    the levels shift meanwhile.
     """
     gas = replace(scene.gas, conductance=1e-4, critical_ratio=0.3, valve_lag=2e-1)
     (given,) = line_answers(replace(scene, gas=gas), calibrated)

@@ -12,8 +12,8 @@ import numpy as np
 
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.chamber.closed_forms import chamber_closed_forms, chamber_pressure
 from ringbalance.reduced_model.chamber.gravity import GravityEffect, closed_ring
-from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms, chamber_pressure
 from ringbalance.reduced_model.chamber.range import chamber_status
 from ringbalance.reduced_model.chamber.terms import MEAN
 from ringbalance.reduced_model.chamber.values import paper_closed_forms

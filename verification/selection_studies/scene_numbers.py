@@ -10,7 +10,6 @@ import numpy as np
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.friction import reynolds_number, rotation_reynolds_number
 from ringbalance.reduced_model.chamber.terms import amplification, surface_tension, wall_layers
-from ringbalance.reduced_model.law.building import column_pressure
 from ringbalance.reduced_model.selection.estimates import (
     FILLING,
     INERTIA,
@@ -19,6 +18,7 @@ from ringbalance.reduced_model.selection.estimates import (
     injection_time,
 )
 from ringbalance.reduced_model.selection.range_flow import equal_velocity
+from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.scene.models import Scene
 
 _Row = tuple[str, float | None, str, str]

@@ -110,8 +110,7 @@ def advance(
 def _pause(plant: Record, motion: Record) -> None:
     """Liquid without mass has no motion of its own: the next instant finds it again."""
     if motion.direction != 0 and not (plant.inertia or motion.lifting):
-        motion.primed = 1 if holds_column(plant, motion, now(motion)) else 0
-        motion.direction = 0
+        motion.primed, motion.direction = 1 if holds_column(plant, motion, now(motion)) else 0, 0
 
 
 @in_place

@@ -17,9 +17,7 @@ from ringbalance.controller.checks import check_fit, check_settings
 from ringbalance.controller.document import simulation_rows
 from ringbalance.controller.formulas import Cause
 from ringbalance.controller.line_runs import command_document
-from ringbalance.controller.liquid_ring.motion import RELATIVE_ERROR
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, Operation
-from ringbalance.controller.liquid_ring.records import EVENTS
 from ringbalance.controller.loop_plan import CHUNK, LoopPlan, RunsInHand, Trace, joined
 from ringbalance.controller.outcome import Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
@@ -28,6 +26,8 @@ from ringbalance.controller.simulation import Injection, Outcome, Sample, Simula
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.injection.dynamics import RELATIVE_ERROR
+from ringbalance.reduced_model.injection.records import EVENTS
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio

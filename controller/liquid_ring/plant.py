@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.formulas import NOTICEABLE
-from ringbalance.controller.liquid_ring.interval import opened, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, PairState, Record
-from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.rotor import chamber_directions
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.pair import PairState, Record, opened, pass_time
+from ringbalance.reduced_model.injection.records import Event
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import stalled_fill_ratio

@@ -86,7 +86,7 @@ _HOME = {
     "Sensor": "ringbalance.controller.rotor",
     "Simulation": "ringbalance.controller.simulation",
     "TradeStudy": "ringbalance.verification.selection_studies.study",
-    "Tuning": "ringbalance.controller.tuning.tune",
+    "Tuning": "ringbalance.controller.tuning.result",
     "ValveCommand": "ringbalance.controller.algorithms.algorithm",
     "bundled_scene": "ringbalance.scene",
     "calibrate": "ringbalance.calibration",

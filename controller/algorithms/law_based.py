@@ -34,7 +34,7 @@ LEAST_LAW_STANDARD_DEVIATION: Final = 0.05
 """Standard deviation, relative, below which no flow law's velocity is trusted."""
 MAGNITUDE_RANGE: Final = 10.0
 """Factor around the assumed magnitude that the estimate keeps to: no response proves no coefficient."""
-FILL_ERROR: Final = 1e-9
+FILL_ERROR: Final = 1e-12
 """Error in fill ratio at which a valve-open time is good enough."""
 _HALVINGS: Final = 60
 _BLOCKED: Final = EVENTS.index(Event.BLOCKED)

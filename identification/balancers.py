@@ -18,9 +18,9 @@ from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene
 from ringbalance.scene.joint import with_model_error
+from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.uncertain import (
     NORMAL_95,
     UNCERTAIN_QUANTITIES,

@@ -29,7 +29,7 @@ MEASUREMENTS: Final = Path(PAPER).parent / "measurements"
 MODELS: Final = "rungs"
 BY_NAME: Final = {
     *("tube.terms", "tube.uncertainty_parts", "fill_ratio", "tuned", "gain", "outcomes"),
-    *("held", "pulls", "cost_model.seconds", "quantities.choices.models", "times.refit_seconds"),
+    *("held", "pulls", "times"),
     *(f"quantities.{MODELS}.{each}" for each in ("models", "work", "fixed_work")),
     f"times.{MODELS}",
     *("numbers", "tables.columns", "tables.units", "endings", "loop_endings", "violations.point"),

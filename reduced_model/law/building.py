@@ -22,8 +22,8 @@ from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.joint import FITTED, direction_sides, fitted_causes, independent_half_widths
+from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.uncertain import NORMAL_95
 
 # Density and speed act on both chambers and on the tube at once, so the law handles them separately.

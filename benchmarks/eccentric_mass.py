@@ -24,7 +24,8 @@ import numpy as np
 import ringbalance
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
+from ringbalance.scene import bundled_scene, load_scene
 
 LONGEST = 1.0
 """Time that the whole run may take, s."""

@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from ringbalance.controller import deferred
-from ringbalance.controller.compare_rotor import OneRotor, own_scene
-from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.sampled_loops import advised
-from ringbalance.controller.loop import simulate
-from ringbalance.controller.rotor import chamber_letters
-from ringbalance.controller.tuning.recommendation import factor_uncertainty
-from ringbalance.controller.tuning.search import recommended
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.controller.balancer import Balancer, CommonRotor, Draws
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.result import CommandResult
 from ringbalance.scene.arrays import finite
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.loop_models import ControllerSettings
-from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.origins import SceneFile
 
-_ModelOf = Callable[[Scene], BalancerModel]
-"""Makes the model of a liquid ring from its scene on the common rotor."""
 RUNS: Final = 5
 """Of each balancer, with the seeds that follow its scene's."""
 
@@ -53,7 +41,7 @@ class Result:
 class Side:
     """One balancer of a comparison."""
 
-    scene: AnyScene
+    scene: SceneFile
     """As it was run, on the common rotor and tuned, with the seed of the first run."""
     tuned: Mapping[str, float]
     """Scene keys that tuning has changed, with their values, SI."""
@@ -97,7 +85,7 @@ class Comparison(CommandResult):
     _deferred: ClassVar[Any] = deferred
     _summary: ClassVar[str] = "comparison_lines"
 
-    rotor: OneRotor
+    rotor: CommonRotor
     """That of the first scene."""
     span: float
     """s, from the start of balancing, of every run: the longer time limit of both scenes."""
@@ -144,96 +132,46 @@ class Comparison(CommandResult):
         }
 
 
-def compare(first: AnyScene, second: AnyScene, *, model_of: _ModelOf, runs: int = RUNS) -> Comparison:
-    """Put two balancers on the rotor of the first scene, tune each, and let each balance it over one span.
+def compare(first: Balancer, second: Balancer, *, runs: int = RUNS) -> Comparison:
+    """Put two balancers on the rotor of the first, tune each, and let each balance it over one span.
 
-    Of the second scene its balancer alone counts; `model_of` makes the model of a liquid ring.  A liquid ring
-    has the gain that `tune` recommends for the target-vector algorithm, eccentric masses have theirs lowered
-    to the recommended ones.
+    Of the second its balancer alone counts.  Each has the settings that its formulas recommend.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
-    rotor = OneRotor.of(first)
+    rotor = first.rotor()
     try:
         # Whether the second can work there at all is known before anything is run.
-        scenes = own_scene(first), rotor.scene(second)
-        span = max(_span(scene) for scene in scenes)
-        one, other = (_side(rotor, scene, model_of, span=span, runs=runs) for scene in scenes)
+        both = first.on_rotor(None), second.on_rotor(rotor)
+        span = max(balancer.span() for balancer in both)
+        one, other = (_side(rotor, balancer, span=span, runs=runs) for balancer in both)
     except SceneError as error:
-        raise SceneError(_placed(first, fault) for fault in error.faults) from error
+        raise SceneError(_placed(first.scene, fault) for fault in error.faults) from error
     return Comparison(rotor=rotor, span=span, sides=(one, other))
 
 
-def _span(scene: AnyScene) -> float:
-    start = scene.supervisor.start if isinstance(scene, EccentricScene) else 0.0
-    return scene.run.time_limit - start
-
-
-def _placed(first: AnyScene, fault: Fault) -> Fault:
+def _placed(first: SceneFile, fault: Fault) -> Fault:
     if fault.file == first.file:
         return fault
     return replace(fault, problem=f"on the rotor of {first.source}: {fault.problem}")
 
 
-def _side(rotor: OneRotor, scene: AnyScene, model_of: _ModelOf, *, span: float, runs: int) -> Side:
-    if isinstance(scene, EccentricScene):
-        return _driven_side(rotor, scene, span=span, runs=runs)
-    return _liquid_side(scene, model_of(scene), span=span, runs=runs)
-
-
-def _liquid_side(scene: Scene, model: BalancerModel, *, span: float, runs: int) -> Side:
-    # Valve-open times of the trial algorithm are the scene's.
-    best = None
-    if scene.controller.kind != "trial":
-        best = recommended(scene, model, factor_uncertainty(scene, model))
-    ready = scene if best is None else best.scene
-    changes = _changes(scene.controller, ready.controller, chambers=scene.disc.chambers)
-    ready = replace(ready, run=replace(ready.run, time_limit=span))
-    done = [
-        simulate(replace(ready, run=replace(ready.run, seed=ready.run.seed + i)), model, to_time_limit=True)
-        for i in range(runs)
-    ]
+def _side(rotor: CommonRotor, balancer: Balancer, *, span: float, runs: int) -> Side:
+    advised, changes = balancer.advised()
+    ready = advised.lasting(span)
+    found = ready.run({}, Draws.first(runs, devices=False), trace=True)
     results = tuple(
         Result(
-            time=math.inf if run.settling_time is None else run.settling_time,
-            residual_ratio=float(run.amplitude[-1] / run.amplitude[0]),
-            energy=run.gas.energy,
-            worst_amplitude=float(np.max(run.amplitude)),
+            time=float(time),
+            residual_ratio=float(final) / rotor.amplitude,
+            energy=energy,
+            worst_amplitude=worst,
             status=run.status,
         )
-        for run in done
-    )
-    return Side(scene=ready, tuned=changes, results=results, models_used=done[0].models_used)
-
-
-def _changes(before: ControllerSettings, after: ControllerSettings, *, chambers: int) -> dict[str, float]:
-    """Scene keys that tuning has changed, with their values, SI."""
-    changes = {}
-    if after.proportional != before.proportional:
-        changes["controller.proportional"] = after.proportional
-    if after.gas_time_offset != before.gas_time_offset:
-        offsets = zip(chamber_letters(chambers), after.offsets(chambers), strict=True)
-        changes |= {f"controller.gas_time_offset.{letter}": offset for letter, offset in offsets}
-    return changes
-
-
-def _driven_side(rotor: OneRotor, scene: EccentricScene, *, span: float, runs: int) -> Side:
-    start = scene.supervisor.start
-    ready, changes = advised(replace(scene, run=replace(scene.run, time_limit=span + start)))
-    results = []
-    for i in range(runs):
-        run = simulate_eccentric(replace(ready, run=replace(ready.run, seed=ready.run.seed + i)))
-        settled = run.settled and run.settling_time is not None
-        time = run.settling_time if settled and run.settling_time is not None else math.inf
-        results.append(
-            Result(
-                time=max(0.0, time - start),
-                residual_ratio=run.final_amplitude / rotor.amplitude,
-                energy=run.electrical_energy,
-                worst_amplitude=float(np.max(run.amplitude[run.time >= start])),
-                status=run.status,
-            )
+        for (run, energy, worst), time, final in zip(
+            found.runs, found.settling_time, found.final_amplitude, strict=True
         )
-    return Side(scene=ready, tuned=changes, results=tuple(results))
+    )
+    return Side(scene=ready.scene, tuned=changes, results=results, models_used=ready.models_used)
 
 
 _NUMBERS: Final = {

@@ -11,12 +11,12 @@ from typing import Final
 from rich.console import Console
 from rich.table import Table
 
+from ringbalance.controller.balancer import balancer_of, takes
 from ringbalance.controller.compare import Comparison, Side
-from ringbalance.controller.compare import compare as compare_scenes
+from ringbalance.controller.compare import compare as compare_balancers
 from ringbalance.controller.tuning.dead_time import offset_text
-from ringbalance.reduced_model.calibration import law_by_name
+from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.loader import load_scene
-from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.terminal import activity, results_console
 
@@ -58,9 +58,13 @@ def compare(
     Raises:
         SceneError: a scene that cannot be used, or a balancer that cannot work on that rotor.
     """
-    told = [with_tolerance(load_scene(path), tolerance=tolerance, models=models) for path in (first, second)]
+    one, other = (
+        balancer_of(scene, flow_law=law if takes(scene, "flow_law") else None)
+        for path in (first, second)
+        for scene in [with_tolerance(load_scene(path), tolerance=tolerance, models=models)]
+    )
     with activity("compare", "both balancers on one rotor ..."):
-        found = compare_scenes(*told, model_of=lambda scene: law_by_name(scene, law))
+        found = compare_balancers(one, other)
     if json:
         print(json_format.dumps(found.document(), allow_nan=False))
     else:
@@ -115,11 +119,11 @@ def _settled(side: Side) -> str:
 def _tuned_text(side: Side) -> str:
     """What tuning has changed, as a scene file has it."""
     told = [_written(key, value) for key, value in side.tuned.items() if not key.startswith(_OFFSETS)]
-    if len(told) < len(side.tuned) and isinstance(side.scene, Scene):
-        told.append(offset_text(side.scene.controller.offsets(side.scene.disc.chambers)))
+    if offsets := [value for key, value in side.tuned.items() if key.startswith(_OFFSETS)]:
+        told.append(offset_text(offsets))
     return ", ".join(told) or "as it is"
 
 
 def _written(key: str, value: float) -> str:
-    unit, factor = _UNITS[key]
+    unit, factor = _UNITS.get(key) or (usual_unit(key), in_usual_unit(key, 1.0))
     return f'{key} = "{factor * value:.4g} {unit}"' if unit else f"{key} = {value:.4g}"

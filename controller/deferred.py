@@ -15,9 +15,9 @@ _HOME: Final = MappingProxyType(
         "comparison_lines": "ringbalance.controller.summary",
         "eccentric_document": "ringbalance.controller.eccentric_mass.document",
         "eccentric_lines": "ringbalance.controller.summary",
-        "eccentric_tuning_document": "ringbalance.controller.tuning.eccentric",
+        "eccentric_tuning_document": "ringbalance.controller.eccentric_mass.tuning",
         "eccentric_tuning_lines": "ringbalance.controller.summary",
-        "simulation_lines": "ringbalance.controller.summary",
+        "simulation_rows": "ringbalance.controller.document",
         "tuning_document": "ringbalance.controller.tuning.tune",
         "tuning_lines": "ringbalance.controller.summary",
     }

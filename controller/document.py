@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
 import numpy as np
-from rich.console import Console, Group, RenderableType
-from rich.table import Table
+from rich.console import Console
 from rich.text import Text
 
 from ringbalance.controller.liquid_ring.transfer import Event
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_text, line_warning
 from ringbalance.reduced_model.terms import neglected_in_injections
+from ringbalance.results.findings import Finding
+from ringbalance.results.result import Rows
+from ringbalance.results.rows import Quantity
+from ringbalance.results.table import Table, models_table
 from ringbalance.scene.arrays import FloatArray, finite
-from ringbalance.scene.platform.terminal import two_columns
 
 
 def simulation_document(simulation: Simulation) -> dict[str, Any]:
@@ -26,7 +28,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
     `time_s`, `amplitude_m`, `phase_rad` and each list of `fill_ratio` run together and hold the true state;
     what the sensor showed is under `samples`, null where a sample was dropped or not a number.
     """
-    scene = simulation.scene
+    scene, gas = simulation.scene, simulation.gas
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "balancer": simulation.balancer,
@@ -55,14 +57,14 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "injections_shortened": simulation.shortened,
         "energy_J": simulation.energy,
         "gas": {
-            "fillings": simulation.gas.fillings,
-            "normal_litres": simulation.gas.normal_volume * 1e3,
-            "compression_energy_J": simulation.gas.energy,
-            "injections_run_dry": simulation.gas.run_dry,
-            "residual_fill_ratio": simulation.gas.residual_fill_ratio,
-            "injections_below_residual_fill": simulation.gas.below_residual,
-            "passed_through_normal_litres": simulation.gas.passed_through * 1e3,
-            "warning": simulation.gas.warning,
+            "fillings": gas.fillings,
+            "normal_litres": gas.normal_volume * 1e3,
+            "compression_energy_J": gas.energy,
+            "injections_run_dry": gas.run_dry,
+            "residual_fill_ratio": gas.residual_fill_ratio,
+            "injections_below_residual_fill": gas.below_residual,
+            "passed_through_normal_litres": gas.passed_through * 1e3,
+            "warning": "" if gas.finding is None else gas.finding.text,
         },
         "gas_line": line_document(simulation.gas_line),
         "noise_floor_m": simulation.noise_floor,
@@ -72,6 +74,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "models_used": [asdict(used) for used in simulation.models_used],
         "neglected": asdict(neglected_in_injections(simulation.models_used)),
         "model_status": {"code": str(simulation.model_status.code), "text": simulation.model_status.text},
+        **simulation.rows().document(),
     }
 
 
@@ -124,15 +127,102 @@ def _samples(samples: tuple[Sample, ...]) -> dict[str, Any]:
 
 
 _BARS: Final = "▁▂▃▄▅▆▇█"
-_SPARK_WIDTH: Final = 60
+_SPARK_WIDTH: Final = 48
 _MOST_INJECTIONS: Final = 40
 _DECADES: Final = 3.0
 """Depth of the sparkline below the largest amplitude."""
 
 
+def simulation_rows(simulation: Simulation) -> Rows:
+    """Quantities, findings, injections and terms of a run."""
+    gas = simulation.gas.finding
+    scene, line = simulation.scene, line_warning(simulation.gas_line)
+    model = simulation.model_status
+    return Rows(
+        title=f"Run of {scene.name} ({scene.source}), {simulation.law} law, {simulation.controller}",
+        quantities=_quantities(simulation),
+        findings=(
+            *simulation.findings,
+            *(() if gas is None else (gas,)),
+            *(Finding(code="gas_line", values={"text": line}) for _ in (line,) if line),
+            *(Finding(code="out_of_range", values={"text": model.text}) for _ in (model,) if not model.ok),
+        ),
+        facts=(
+            ("flow law", f"{simulation.law} ({simulation.integrator.replace('_', ' ')})"),
+            ("gas line", line_text(simulation.gas_line)),
+            ("neglected", neglected_in_injections(simulation.models_used).text),
+        ),
+        tables=(_injection_table(simulation.injections), models_table(simulation.models_used)),
+    )
+
+
+def _quantities(simulation: Simulation) -> tuple[Quantity, ...]:
+    loop, gas, injections = simulation.loop, simulation.gas, simulation.injections
+    fills = simulation.fill_ratio.items()
+    rows: list[tuple[str, str, str, float | None]] = [
+        ("settling_time", "settling time", "s", simulation.settling_time),
+        ("initial_amplitude", "amplitude before", "m", float(simulation.amplitude[0])),
+        ("final_amplitude", "amplitude at the end", "m", float(simulation.amplitude[-1])),
+        ("limit", "limit", "m", simulation.limit),
+        ("hold_time", "hold time", "s", simulation.hold_time),
+        ("loop_factor", "loop factor", "1", loop.value),
+        ("loop_factor_limit", "loop factor, at most", "1", loop.limit),
+        ("stationary_deviation", "standard deviation that noise leaves", "m", finite(loop.deviation)),
+        ("valve_open_time", "valve-open time", "s", math.fsum(i.operation.duration for i in injections)),
+        ("injections", "injections", "1", len(injections)),
+        ("energy", "work on the liquid", "J", simulation.energy),
+        ("gas_volume", "gas, normal volume", "m^3", gas.normal_volume),
+        ("compression_energy", "compression of the gas", "J", gas.energy),
+        ("overshoots", "overshoots", "1", simulation.overshoots),
+        ("misadjustments", "misadjustments", "1", simulation.misadjustments),
+        *(
+            (f"fill_ratio_{letter}", f"fill ratio of {letter}", "1", float(fill[-1]))
+            for letter, fill in fills
+        ),
+    ]
+    origins = {"limit": "given", "hold_time": "given"}
+    return tuple(
+        Quantity(key=key, name=name, unit=unit, value=value, origin=origins.get(key, "simulated"))
+        for key, name, unit, value in rows
+    )
+
+
+def _injection_table(injections: tuple[Injection, ...]) -> Table:
+    """The first injections."""
+    more = len(injections) - _MOST_INJECTIONS
+    return Table(
+        caption="Injections",
+        heads=("time, s", "chamber", "gas, s", "fill before", "fill after", "regime"),
+        rows=[
+            (
+                f"{each.time:.3f}",
+                each.chamber,
+                f"{each.operation.duration:.4f}",
+                f"{each.operation.fill_before:.5f}",
+                f"{each.operation.fill_after:.5f}",
+                _regime(each),
+            )
+            for each in injections[:_MOST_INJECTIONS]
+        ],
+        note=f"and {more} more: see --json" if more > 0 else "",
+    )
+
+
+def _regime(injection: Injection) -> str:
+    operation = injection.operation
+    names = dict.fromkeys((operation.regime_start.label, operation.regime_end.label))
+    event = "" if operation.event in {Event.NONE, Event.BLOCKED} else f" ({operation.event.value})"
+    return " to ".join(names) + event
+
+
 def show(simulation: Simulation, *, console: Console) -> None:
-    """Print a run: summary, amplitude over time, injections."""
-    console.print(Group(*_parts(simulation)))
+    """Print a run: how it ended, its numbers, its amplitude over time, injections and terms."""
+    closed = [i.time + i.operation.duration for i in simulation.injections]
+    # Until shortly after the last valve has closed.
+    end = min(float(simulation.time[-1]), 1.2 * max(closed, default=math.inf))
+    console.print(
+        simulation_rows(simulation).view(amplitude_line(simulation.time, simulation.amplitude, end=end))
+    )
 
 
 def amplitude_line(time: FloatArray, amplitude: FloatArray, *, end: float) -> Text:
@@ -148,95 +238,3 @@ def _sparkline(values: FloatArray) -> str:
         return _BARS[0] * values.size
     depth = np.log10(np.maximum(values / top, 10.0**-_DECADES)) / _DECADES + 1
     return "".join(_BARS[round(share * (len(_BARS) - 1))] for share in depth)
-
-
-def _parts(simulation: Simulation) -> Iterable[RenderableType]:
-    colour = "green" if simulation.settled else "yellow"
-    yield Text(simulation.status, style=f"bold {colour}")
-    for warning in (simulation.gas.warning, line_warning(simulation.gas_line)):
-        if warning:
-            yield Text(warning, style="yellow")
-    yield _summary(simulation)
-    closed = [i.time + i.operation.duration for i in simulation.injections]
-    # Until shortly after the last valve has closed.
-    end = min(float(simulation.time[-1]), 1.2 * max(closed, default=math.inf))
-    yield amplitude_line(simulation.time, simulation.amplitude, end=end)
-    if simulation.injections:
-        yield _injections(simulation.injections)
-    yield _terms(simulation)
-    yield Text(neglected_in_injections(simulation.models_used).text, style="dim")
-    if not simulation.model_status.ok:
-        yield Text(simulation.model_status.text, style="yellow")
-
-
-def _summary(simulation: Simulation) -> Table:
-    when = "-" if simulation.settling_time is None else f"{simulation.settling_time:.3f} s"
-    last = {letter: fill[-1] for letter, fill in simulation.fill_ratio.items()}
-    rows = (
-        ("flow law", f"{simulation.law} ({simulation.integrator.replace('_', ' ')})"),
-        ("settling time", when),
-        ("amplitude", f"{_um(simulation.amplitude[0])} -> {_um(simulation.amplitude[-1])}"),
-        ("limit", f"{_um(simulation.limit)} for {simulation.hold_time:.4g} s"),
-        ("loop factor", _loop(simulation)),
-        ("valve-open time", f"{_gas_time(simulation):.3f} s in {len(simulation.injections)} injections"),
-        ("gas energy", f"{simulation.energy:.4g} J of work on the liquid"),
-        ("gas consumption", simulation.gas.text),
-        ("gas line", line_text(simulation.gas_line)),
-        ("overshoots", str(simulation.overshoots)),
-        ("misadjustments", str(simulation.misadjustments)),
-        *([("shortened injections", str(simulation.shortened))] if simulation.shortened else []),
-        ("fill ratios", "  ".join(f"{letter} {fill:.4f}" for letter, fill in last.items())),
-    )
-    return two_columns(rows)
-
-
-def _loop(simulation: Simulation) -> str:
-    loop = simulation.loop
-    if loop.value is None or loop.deviation is None:
-        return "none: this algorithm has no gain"
-    left = f"noise leaves {_um(loop.deviation)}" if math.isfinite(loop.deviation) else "nothing holds it"
-    return f"{loop.value:.3g} of at most {loop.limit:.3g}, {left}"
-
-
-def _gas_time(simulation: Simulation) -> float:
-    return math.fsum(injection.operation.duration for injection in simulation.injections)
-
-
-def _injections(injections: tuple[Injection, ...]) -> Table:
-    table = Table(title="injections", title_justify="left")
-    for name in ("time, s", "chamber", "gas, s", "fill before", "fill after"):
-        table.add_column(name, justify="center" if name == "chamber" else "right")
-    table.add_column("regime")
-    for injection in injections[:_MOST_INJECTIONS]:
-        operation = injection.operation
-        table.add_row(
-            f"{injection.time:.3f}",
-            injection.chamber,
-            f"{operation.duration:.4f}",
-            f"{operation.fill_before:.5f}",
-            f"{operation.fill_after:.5f}",
-            _regime(injection),
-        )
-    if len(injections) > _MOST_INJECTIONS:
-        table.caption = f"and {len(injections) - _MOST_INJECTIONS} more: see --json"
-    return table
-
-
-def _terms(simulation: Simulation) -> Table:
-    table = Table(title="terms", title_justify="left")
-    for name in ("term", "model", "why"):
-        table.add_column(name)
-    for used in simulation.models_used:
-        table.add_row(used.term, used.model, used.why)
-    return table
-
-
-def _regime(injection: Injection) -> str:
-    operation = injection.operation
-    names = dict.fromkeys((operation.regime_start.label, operation.regime_end.label))
-    event = "" if operation.event in {Event.NONE, Event.BLOCKED} else f" ({operation.event.value})"
-    return " to ".join(names) + event
-
-
-def _um(length: float) -> str:
-    return f"{length * 1e6:.4g} um"

@@ -21,6 +21,7 @@ from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidR
 from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.outcome import Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
+from ringbalance.controller.run_findings import run_findings
 from ringbalance.controller.simulation import (
     Injection,
     Outcome,
@@ -339,7 +340,7 @@ def _record(run: _Run, *, integrator: str, used: tuple[ModelUsed, ...]) -> Simul
         settling_time=run.settling_time if settled else None,
         hold_time=run.scene.controller.hold_time,
         loop=run.loop,
-        status=run.status,
+        findings=run_findings(run),
         time=time,
         amplitude=run.amplitude,
         phase=np.angle(seen),

@@ -1,21 +1,17 @@
-"""How a run ended, found from its facts, and one text for each that says what to do next."""
+"""How a run ended, by its facts."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.advice import lowered_gain, raised_gain
 from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, runs_back_text
 from ringbalance.controller.liquid_ring.transfer import Event
-from ringbalance.controller.shortfall import liquid_not_driven, moment_missing
 from ringbalance.controller.simulation import (
     NOISE_DEVIATIONS,
     Injection,
@@ -24,14 +20,10 @@ from ringbalance.controller.simulation import (
     noise_floor,
     overshoots,
 )
-from ringbalance.controller.tuning.dead_time import standing_remedy
-from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
-from ringbalance.controller.tuning.recommendation import recommended_gain
+from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
-MICROMETRE: Final = 1e-6
-MANY_OVERSHOOTS: Final = 2
 NO_SAMPLE: Final = "no usable sample"
 """Reason that every algorithm gives for doing nothing on a dropped sample or a NaN."""
 
@@ -139,37 +131,26 @@ class Facts:
             return Outcome.HOLD_INCOMPLETE if self.loop.stays else Outcome.HOVERING
         if self.refused and self.cause is Cause.IDLE:
             return Outcome.CHAMBER_EMPTY
-        if self.last_command and not _longest(self).operation.moved:
+        if self.last_command and not longest(self).operation.moved:
             return _unmoved(self)
         return Outcome.TOO_MANY_SAMPLES if self.cause is Cause.SAMPLES else _out_of_time(self)
 
-    @property
-    def status(self) -> str:
-        """One or two sentences: how the run ended, with its numbers, and what to do next."""
-        text = _TEXTS[self.outcome](self)
-        if not self.shortened:
-            return text
-        injections = "injection was" if self.shortened == 1 else "injections were"
-        return (
-            f"{text}; {self.shortened} {injections} shortened or left out to keep the residual fill of "
-            f"{self.plant.residual_fill:.3g} in the driven chamber"
-        )
 
-
-def _longest(facts: Facts) -> Injection:
+def longest(facts: Facts) -> Injection:
+    """The longest injection of the last command; there must have been one."""
     return max(facts.last_command, key=lambda injection: injection.operation.duration)
 
 
 def _unmoved(facts: Facts) -> Outcome:
     """Why the last command moved nothing."""
-    if _longest(facts).operation.event in {Event.EMPTY, Event.FULL}:
+    if longest(facts).operation.event in {Event.EMPTY, Event.FULL}:
         return Outcome.CHAMBER_EMPTY
     return Outcome.GAS_TIME_TOO_SHORT if _over_too_soon(facts) else Outcome.STALLED
 
 
 def _over_too_soon(facts: Facts) -> bool:
     """Whether the gas would drive liquid, had it the time to fill the chamber."""
-    plant, done = facts.plant, _longest(facts).operation
+    plant, done = facts.plant, longest(facts).operation
     if plant.dynamics is None:
         return False
     flow, total = plant.model.flow, facts.state.pairs[0].total
@@ -180,12 +161,13 @@ def _over_too_soon(facts: Facts) -> bool:
     return bool(found.velocity > 0)
 
 
-def _unusable(facts: Facts) -> int:
+def unusable(facts: Facts) -> int:
+    """Number of samples that every algorithm passed over."""
     return sum(sample.command.reason == NO_SAMPLE for sample in facts.samples)
 
 
 def _out_of_time(facts: Facts) -> Outcome:
-    if 2 * _unusable(facts) > len(facts.samples):
+    if 2 * unusable(facts) > len(facts.samples):
         return Outcome.NO_SAMPLES
     if facts.drift > NOTICEABLE:
         return Outcome.DRIFTING
@@ -195,202 +177,3 @@ def _out_of_time(facts: Facts) -> Outcome:
     if not last.resting and not last.valves and last.reason.startswith("the valve-open time"):
         return Outcome.GAS_TIME_TOO_SHORT
     return Outcome.TIME_LIMIT
-
-
-def _um(length: float) -> str:
-    return f"{length / MICROMETRE:.4g} um"
-
-
-def _settled(facts: Facts) -> str:
-    many = facts.overshoots > MANY_OVERSHOOTS
-    cure = f"{facts.overshoots} overshoots: {_lower(facts)}" if many else "no further correction needed"
-    return (
-        f"settled: within the limit of {_um(facts.scene.controller.limit)} from "
-        f"{facts.settling_time:.4g} s on, for the hold time of {facts.scene.controller.hold_time:.4g} s, "
-        f"{_um(facts.final_amplitude)} at the end; {cure}"
-    )
-
-
-def _lower(facts: Facts) -> str:
-    """What to change in a loop that overshoots; the law-based algorithm has no gain to lower."""
-    if facts.scene.controller.kind == "law_based" and not facts.own_algorithm:
-        return _standing(facts) or "check controller.assumed_influence_coefficient and assumed_lag_angle"
-    return lowered_gain(facts.own_algorithm, _to_gain(facts))
-
-
-def _to_gain(facts: Facts) -> str:
-    """The gain that would be recommended, where there is one and it is lower."""
-    settings = facts.scene.controller
-    gain = recommended_gain(facts.scene, facts.plant.model, loop=facts.loop)
-    if facts.loop.value is None or settings.kind == "law_based" or not 0 < gain < settings.proportional:
-        return ""
-    return f" to {gain * MICROMETRE:.3g} s/um"
-
-
-def _hovering(facts: Facts) -> str:
-    """Within the limit at the end or for a while, in a loop that is not expected to stay there."""
-    settings, loop = facts.scene.controller, facts.loop
-    head = (
-        f"hovering: {_um(facts.final_amplitude)} at {facts.time:.4g} s, limit {_um(settings.limit)}, "
-        f"hold time {settings.hold_time:.4g} s; "
-    )
-    sigma = facts.scene.sensor.amplitude_noise
-    if NOISE_DEVIATIONS * sigma > settings.limit:
-        cure = f"the sensor's own is {_um(sigma)}: raise controller.limit or average the sensor"
-    else:
-        cure = f"{_lower(facts)}, raise controller.limit or average the sensor"
-    left = "" if loop.deviation is None else f" of {_um(loop.deviation)}"
-    return head + (
-        f"it is not expected to stay: noise keeps up a standard deviation{left}, and the limit must hold "
-        f"{STAYING_DEVIATIONS:g} of them; {cure}"
-    )
-
-
-def _hold_incomplete(facts: Facts) -> str:
-    return (
-        f"{_not_settled(facts)}; within it from {facts.since:.4g} s on, but the hold time of "
-        f"{facts.scene.controller.hold_time:.4g} s is not complete within the time limit of "
-        f"{facts.scene.run.time_limit:.4g} s: raise run.time_limit"
-    )
-
-
-def _unstable(facts: Facts) -> str:
-    return (
-        f"unstable: the loop factor is {facts.loop.value:.3g}, and a residual grows from "
-        f"{facts.loop.limit:.3g} on; {_um(facts.final_amplitude)} at {facts.time:.4g} s: lower "
-        f"controller.proportional{_to_gain(facts)}"
-    )
-
-
-def _standing(facts: Facts) -> str:
-    return "" if facts.own_algorithm else standing_remedy(facts.scene, facts.plant.model)
-
-
-def _not_settled(facts: Facts) -> str:
-    return (
-        f"not settled: {_um(facts.final_amplitude)} at {facts.time:.4g} s against the limit of "
-        f"{_um(facts.scene.controller.limit)}"
-    )
-
-
-def _time_limit(facts: Facts) -> str:
-    if facts.overshoots > MANY_OVERSHOOTS:
-        cure = f"{facts.overshoots} overshoots: {_lower(facts)}, or shorten the trial steps"
-    else:
-        cure = _standing(facts) or f"{raised_gain(facts.own_algorithm)} or raise run.time_limit"
-    return f"{_not_settled(facts)}; time is up ({facts.scene.run.time_limit:.4g} s): {cure}"
-
-
-def _stalled(facts: Facts) -> str:
-    last = _longest(facts) if facts.last_command else None
-    still = None if last is None or last.operation.moved else last
-    beyond = facts.unreachable_amplitude > facts.scene.controller.limit
-    return (
-        f"{_not_settled(facts)}; stalled: {liquid_not_driven(facts.plant, facts.state, still)}"
-        f"{f'; {_moments(facts)}' if beyond else ''}: raise gas.pressure, or lower rotor.speed"
-    )
-
-
-def _capacity(facts: Facts) -> str:
-    return f"{_not_settled(facts)}; capacity exceeded: {_moments(facts)}: {BEYOND_CAPACITY}"
-
-
-def _moments(facts: Facts) -> str:
-    return moment_missing(facts.plant, facts.state, facts.scene.rotor)
-
-
-def _empty(facts: Facts) -> str:
-    chamber = facts.refused[0] if facts.refused else _longest(facts).chamber
-    cure = "check rotor.influence_coefficient, the assumed lag angle, and the sense of rotation"
-    return (
-        f"{_not_settled(facts)}; no usable liquid is left in chamber {chamber} although the "
-        f"unbalance is within the disc's capacity: {cure}"
-    )
-
-
-def _diverging(facts: Facts) -> str:
-    if facts.overshoots >= 2:
-        cure = (
-            f"the residual turned round {facts.overshoots} times: {_lower(facts)}; if it still grows, "
-            "check influence coefficient, lag angle and sense of rotation"
-        )
-    else:
-        cure = (
-            "check the influence coefficient, the lag angle that the controller assumes (more than 90 "
-            "degrees off drives the liquid the wrong way) and the sense of rotation"
-        )
-    # The rises that end a run need not take it above its start.
-    higher = facts.final_amplitude > facts.initial_amplitude
-    since = f"from {_um(facts.initial_amplitude)} " if higher else "several times in a row, "
-    return (
-        f"unstable: diverging, stopped at {facts.time:.4g} s: the amplitude rose {since}to "
-        f"{_um(facts.final_amplitude)}: {cure}"
-    )
-
-
-def _drifting(facts: Facts) -> str:
-    return f"{_not_settled(facts)}; {runs_back_text(facts.scene, residual_fill=facts.plant.residual_fill)}"
-
-
-def _too_short(facts: Facts) -> str:
-    if facts.last_command and not _longest(facts).operation.moved:
-        last = _longest(facts)
-        return (
-            f"{_not_settled(facts)}; {last.operation.duration * 1e3:.4g} ms of gas into chamber "
-            f"{last.chamber} end before the pressure has moved any liquid: "
-            f"{_standing(facts) or _pushed(facts)}"
-        )
-    return (
-        f"{_not_settled(facts)}; the commanded valve-open times have fallen below the valves' minimum of "
-        f"{facts.scene.controller.minimum_gas_time * 1e3:.4g} ms: {raised_gain(facts.own_algorithm)}, lower "
-        "controller.minimum_gas_time or raise controller.limit"
-    )
-
-
-def _pushed(facts: Facts) -> str:
-    """What moves liquid where an amplitude stands still."""
-    settings = facts.scene.controller
-    from_scene = settings.kind == "target_vector" and not facts.own_algorithm
-    without = from_scene and settings.integral_time is None
-    first = "set controller.integral_time to some periods, " if without else ""
-    return f"{first}raise controller.limit, or use a larger or faster valve"
-
-
-def _noise(facts: Facts) -> str:
-    return (
-        f"{_not_settled(facts)}; the limit lies below {NOISE_DEVIATIONS:g} standard deviations of the sensor "
-        f"({_um(facts.scene.sensor.amplitude_noise)}): raise controller.limit or average the sensor"
-    )
-
-
-def _no_samples(facts: Facts) -> str:
-    return (
-        f"{_not_settled(facts)}; {_unusable(facts)} of {len(facts.samples)} samples were dropped or not a "
-        "number, and no valve is opened on such a sample: check the vibration sensor and its phase reference"
-    )
-
-
-def _too_many(facts: Facts) -> str:
-    return (
-        f"{_not_settled(facts)}; stopped after {len(facts.samples)} samples, the most that one run takes, "
-        f"before its time limit of {facts.scene.run.time_limit:.4g} s: raise controller.period or lower "
-        "run.time_limit"
-    )
-
-
-_TEXTS: Final[Mapping[Outcome, Callable[[Facts], str]]] = {
-    Outcome.SETTLED: _settled,
-    Outcome.HOVERING: _hovering,
-    Outcome.HOLD_INCOMPLETE: _hold_incomplete,
-    Outcome.UNSTABLE: _unstable,
-    Outcome.TIME_LIMIT: _time_limit,
-    Outcome.STALLED: _stalled,
-    Outcome.CAPACITY_EXCEEDED: _capacity,
-    Outcome.CHAMBER_EMPTY: _empty,
-    Outcome.DIVERGING: _diverging,
-    Outcome.DRIFTING: _drifting,
-    Outcome.GAS_TIME_TOO_SHORT: _too_short,
-    Outcome.NOISE: _noise,
-    Outcome.NO_SAMPLES: _no_samples,
-    Outcome.TOO_MANY_SAMPLES: _too_many,
-}

@@ -23,7 +23,8 @@ from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.terms import ModelUsed
-from ringbalance.results.result import CommandResult
+from ringbalance.results.findings import Finding
+from ringbalance.results.result import DeferredResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -50,28 +51,18 @@ class GasUse:
     """Injections that left their chamber below it, those that ran it dry included."""
 
     @property
-    def text(self) -> str:
-        """Consumption in one phrase."""
-        litres = self.normal_volume / _LITRE
-        work = f"{self.energy / 1e3:.1f} kJ of compression"
-        return f"{litres:.1f} normal litres, {work} in {self.fillings} fillings"
-
-    @property
-    def warning(self) -> str:
-        """Empty when no gas entered a port."""
+    def finding(self) -> Finding | None:
+        """That gas entered a port; None where none did."""
         if not self.below_residual:
-            return ""
-        dry = (
-            f", {self.run_dry} of them ran it dry: up to {self.passed_through / _LITRE:.3g} normal litres of "
-            "gas passed through the tube into the opposite chamber"
-            if self.run_dry
-            else ""
-        )
-        return (
-            f"{self.below_residual} of {self.fillings} injections left their chamber below a fill ratio of "
-            f"{self.residual_fill_ratio:.3g}, where gas enters the port{dry}; open the valve for less time "
-            "or fill in more liquid"
-        )
+            return None
+        numbers = {
+            "count": self.below_residual,
+            "fillings": self.fillings,
+            "residual_fill": self.residual_fill_ratio,
+            "run_dry": self.run_dry,
+            "normal_litres": self.passed_through / _LITRE,
+        }
+        return Finding(code="gas_passed_through" if self.run_dry else "gas_entered_port", values=numbers)
 
     @classmethod
     def of(cls, *, scene: Scene, model: BalancerModel, operations: Sequence[Operation]) -> GasUse:
@@ -175,12 +166,12 @@ class Injection:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Simulation(CommandResult):
+class Simulation(DeferredResult):
     """One closed-loop run."""
 
     _deferred: ClassVar[Any] = deferred
     _document: ClassVar[str] = "command_document"
-    _summary: ClassVar[str] = "simulation_lines"
+    _rows: ClassVar[str] = "simulation_rows"
 
     scene: Scene
     model: BalancerModel
@@ -201,8 +192,8 @@ class Simulation(CommandResult):
     """s."""
     loop: LoopFactor
     """The loop about the balanced state."""
-    status: str
-    """The verdict, how the run ended, and what to do next."""
+    findings: tuple[Finding, ...]
+    """How the run ended, what stands behind it, and what to do next."""
     time: FloatArray
     """s, shape (m,): samples, and instants within operations and waits."""
     amplitude: FloatArray
@@ -227,6 +218,11 @@ class Simulation(CommandResult):
     """Every physical term, with its model and its estimated contribution."""
     terms_modelled: tuple[str, ...]
     """Names of the terms that are modelled beyond the flow law; empty: it alone carries the operations."""
+
+    @property
+    def status(self) -> str:
+        """The findings as sentences."""
+        return "; ".join(finding.text for finding in self.findings)
 
     @property
     def verdict(self) -> Verdict:

@@ -6,18 +6,9 @@ from collections.abc import Iterator
 
 from ringbalance.controller.compare import Comparison
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.controller.simulation import Simulation
-from ringbalance.controller.tuning.eccentric import EccentricTuning
+from ringbalance.controller.eccentric_mass.tuning import EccentricTuning
 from ringbalance.controller.tuning.settling import SettlingTimes
 from ringbalance.controller.tuning.tune import Tuning
-
-
-def simulation_lines(run: Simulation) -> Iterator[str]:
-    """Of a liquid ring."""
-    yield f"Run of {run.scene.name} ({run.scene.source}): {run.law} law, controller {run.controller}"
-    yield _amplitudes(run.amplitude[0], run.amplitude[-1], run.limit, run.time[-1])
-    yield f"{len(run.injections)} injections, {run.overshoots} overshoots; {run.gas.text}"
-    yield run.status
 
 
 def eccentric_lines(run: EccentricRun) -> Iterator[str]:

@@ -10,26 +10,23 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.inputs import eccentric_value, eccentric_with
+from ringbalance.controller.eccentric_mass.scene_records import (
+    ECCENTRIC_MASS,
+    EccentricScene,
+    eccentric_scene,
+)
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import BUILT_CAUSES, MODEL_CAUSES
-from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene
 from ringbalance.scene.joint import with_model_error
 from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.uncertain import (
-    NORMAL_95,
-    UNCERTAIN_QUANTITIES,
-    eccentric_value,
-    eccentric_with,
-    half_widths,
-    nominal_value,
-    shifted,
-)
+from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, half_widths, nominal_value, shifted
 
 _LITTLE: Final = 1e-4
 """Of a quantity, or in SI units where it is zero."""
@@ -67,7 +64,7 @@ def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ..
         raise FitError("name at least one parameter, and each once")
     if isinstance(scene, Scene):
         return tuple(Parameter.of(scene, name) for name in names)
-    return tuple(_eccentric_parameter(scene, name) for name in names)
+    return tuple(_eccentric_parameter(eccentric_scene(scene), name) for name in names)
 
 
 def informed(scene: AnyScene, data: Sequence[Observations]) -> list[str]:
@@ -86,13 +83,14 @@ def held_for(scene: AnyScene, fitted: Sequence[str]) -> dict[str, float]:
 
 def _widths(scene: AnyScene) -> Mapping[str, float]:
     """Expanded uncertainties (95 %), SI."""
-    return half_widths(scene) if isinstance(scene, Scene) else _eccentric_widths(scene)
+    return half_widths(scene) if isinstance(scene, Scene) else _eccentric_widths(eccentric_scene(scene))
 
 
 def _values(scene: AnyScene) -> dict[str, float]:
     """Value, SI, of every quantity that may be uncertain and that the scene has."""
     if not isinstance(scene, Scene):
-        return {name: eccentric_value(scene, name) for name in _fitted_names(scene)}
+        driven = eccentric_scene(scene)
+        return {name: eccentric_value(driven, name) for name in _fitted_names(driven)}
     values = {name: nominal_value(scene=scene, quantity=name) for name in UNCERTAIN_QUANTITIES}
     return {name: value for name, value in values.items() if value is not None}
 
@@ -107,7 +105,7 @@ def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, Any
 def changed(scene: AnyScene, name: str, change: float) -> AnyScene:
     """The scene with one uncertain quantity changed, SI, or an error of a model, in standard deviations."""
     if not isinstance(scene, Scene):
-        return _eccentric_shifted(scene, name, change)
+        return _eccentric_shifted(eccentric_scene(scene), name, change)
     if name in MODEL_ERRORS:
         return with_model_error(scene, name, change)
     return shifted(scene=scene, quantity=name, change=change)

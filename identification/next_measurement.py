@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.identification.balancers import both_sides
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.measurements import Observations
@@ -20,7 +21,6 @@ from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.units import DIMENSIONS, format_quantity
@@ -152,7 +152,7 @@ def _first_series(block: Block) -> FloatArray:
 
 def _grids(scene: AnyScene) -> dict[str, Grid]:
     """Values of what is set, by kind and column, SI, over the ranges of a scene."""
-    return _ring_grids(scene) if isinstance(scene, Scene) else _eccentric_grids(scene)
+    return _ring_grids(scene) if isinstance(scene, Scene) else _eccentric_grids(eccentric_scene(scene))
 
 
 def _eccentric_grids(scene: EccentricScene) -> dict[str, Grid]:

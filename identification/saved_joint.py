@@ -8,6 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.inputs import eccentric_value
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, path_of
 from ringbalance.identification.saved_places import Place, place_of
@@ -16,7 +18,7 @@ from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.model_errors import ERROR_NAME, ModelError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.uncertain import NORMAL_95, eccentric_value, nominal_value
+from ringbalance.scene.uncertain import NORMAL_95, nominal_value
 
 _DIGITS: Final = 9
 _PARTS: Final = ("even", "odd")
@@ -106,7 +108,7 @@ def put_joint(
 
 def _value(scene: AnyScene, name: str) -> float:
     if not isinstance(scene, Scene):
-        return eccentric_value(scene, name)
+        return eccentric_value(eccentric_scene(scene), name)
     value = nominal_value(scene=scene, quantity=name)
     if value is None:
         raise ValueError(f"the scene has no {name}")

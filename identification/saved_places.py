@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ringbalance.scene import deferred
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.keys.fields import Reader
-from ringbalance.scene.keys.schema import LIQUID_RING, Schema
+from ringbalance.scene.kinds import scene_kind
+from ringbalance.scene.registry import balancers
 from ringbalance.scene.units import DIMENSIONS, format_quantity, unit_factor, unit_of
 
 _DIGITS: Final = 9
@@ -67,8 +67,7 @@ def place_of(path: str, document: Mapping[str, Any]) -> Place:
 
     Raises: ValueError: a scene file has no such value.
     """
-    eccentric = document.get("balancer") == "eccentric_mass"
-    schema: Schema = deferred.ECCENTRIC_MASS if eccentric else LIQUID_RING
+    schema = scene_kind(document.get("balancer", balancers()[0])).schema
     match = _ENTRY.fullmatch(path)
     if match is None or match[1] not in schema.tables or match[2] not in schema.tables[match[1]].keys:
         raise ValueError(f"a scene file has no value {path!r}")
@@ -80,7 +79,7 @@ def place_of(path: str, document: Mapping[str, Any]) -> Place:
         table=table,
         key=key,
         entry=None if entry is None else int(entry),
-        by_table=eccentric,
+        by_table=table in schema.tables["uncertainty"].keys,
         dimension=dimension,
         unit=_unit(here, path, dimension),
     )

@@ -179,8 +179,8 @@ def _summary_rows(calibration: Calibration) -> Iterator[tuple[str, str]]:
     yield "gas line", line_text(calibration.gas_line)
     if line_warning(calibration.gas_line):
         yield "note", line_warning(calibration.gas_line)
-    if calibration.holding.warning:
-        yield "warning", calibration.holding.warning
+    if calibration.holding.finding is not None:
+        yield "warning", calibration.holding.finding.text
     if not _stated(calibration):
         yield "note", UNSTATED[0].lower() + UNSTATED[1:].rstrip(".")
     if not chamber.status.ok:

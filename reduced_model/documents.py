@@ -289,7 +289,7 @@ def _holding(calibration: Calibration) -> dict[str, Any]:
         "holds": found.holds,
         "fill_ratio": calibration.residual.largest_fill_ratio,
         "largest_hump_radius_m": found.largest_hump_radius,
-        "warning": found.warning,
+        "warning": "" if found.finding is None else found.finding.text,
     }
 
 

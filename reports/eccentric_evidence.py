@@ -5,15 +5,15 @@ from __future__ import annotations
 from datetime import date
 from typing import Any
 
+from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS, EccentricScene, SpeedPoint
 from ringbalance.controller.eccentric_mass.study import eccentric_study
 from ringbalance.reports.evidence import FORMAT, Progress, cases_of_report, scene_record
 from ringbalance.reports.provenance import provenance, versions
 from ringbalance.reports.section import Record
 from ringbalance.results.numbers import given, short, with_unit
-from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, EccentricScene, SpeedPoint
 from ringbalance.scene.keys.declaration import Key, keys_of
 from ringbalance.scene.keys.fields import Reader
-from ringbalance.scene.models import InputUncertainty
+from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.scene.units import DIMENSIONS
 from ringbalance.verification.catalogue import load_cases

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Final
+from types import MappingProxyType
+from typing import Any, Final
 
 from ringbalance.reports.eccentric_evidence import collect_eccentric
 from ringbalance.reports.evidence import Progress, collect_evidence
@@ -27,8 +28,7 @@ from ringbalance.reports.sections import section_view, sections_of
 from ringbalance.reports.summary import lead_sentence
 from ringbalance.reports.tables import FOLDER as TABLES
 from ringbalance.reports.tables import csv_tables
-from ringbalance.scene import AnyScene, Scene
-from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene import AnyScene, Scene, liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.processes import Workers, beside, seldom_collected
 from ringbalance.verification.evidence import Level
@@ -36,6 +36,8 @@ from ringbalance.verification.runner import paper_scene
 
 FILES: Final = ("evidence.json", *DOCUMENTS)
 """Of a report, the page last: where it is, all else is."""
+DRIVEN: Final[Mapping[str, Callable[..., Record]]] = MappingProxyType({"eccentric_mass": collect_eccentric})
+"""By balancer, what collects the evidence of those that have no liquid."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,21 +140,14 @@ def write_report(
         beside(workers, loading=paper_scene) as pool,
     ):
         views = _Views(pool=pool)
-        if isinstance(scene, EccentricScene):
-            evidence = collect_eccentric(
-                scene, level=level, scene_text=scene_text, pool=pool, progress=progress
-            )
+        common: dict[str, Any] = {"level": level, "pool": pool, "progress": progress}
+        common["scene_text"] = scene_text
+        if scene.balancer in DRIVEN:
+            evidence = DRIVEN[scene.balancer](scene, **common)
         else:
-            with _pictures(scene, stage, opengl) as pictures:
-                evidence = collect_evidence(
-                    scene,
-                    level=level,
-                    scene_text=scene_text,
-                    saved=saved,
-                    pool=pool,
-                    progress=progress,
-                    judged=views.begin_cases,
-                )
+            ring = liquid_ring_scene(scene)
+            with _pictures(ring, stage, opengl) as pictures:
+                evidence = collect_evidence(ring, saved=saved, judged=views.begin_cases, **common)
                 _tell(progress, "pictures")
                 evidence["pictures"] = pictures()
         _tell(progress, "page")

@@ -9,7 +9,7 @@ from io import StringIO
 from typing import Final
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Group, RenderableType
+from rich.console import Group
 from rich.table import Table as RichTable
 from rich.text import Text
 
@@ -69,21 +69,6 @@ def terminal_table(table: Table) -> RichTable:
     return shown
 
 
-def terminal(
-    *,
-    findings: Iterable[Finding] = (),
-    facts: Facts = (),
-    quantities: Iterable[Quantity] = (),
-    tables: Iterable[Table] = (),
-) -> RenderableType:
-    """What a command prints: what it found in sentences, its numbers, and its tables."""
-    return Group(
-        findings_text(findings),
-        two_columns([*facts, *quantity_rows(quantities)]),
-        *(terminal_table(table) for table in tables if table.rows),
-    )
-
-
 def csv_text(table: Table) -> str:
     """A table as comma-separated values with a line of heads; numbers as they are printed."""
     text = StringIO()
@@ -106,11 +91,3 @@ def _cells(row: Sequence[str], numeric: Sequence[bool]) -> str:
     return "".join(
         f'<td style="text-align:{side}">{escape(cell)}</td>' for side, cell in zip(aligned, row, strict=True)
     )
-
-
-def html(title: str, *, findings: Iterable[Finding], quantities: Iterable[Quantity]) -> str:
-    """A result in a notebook: its title, findings and quantities."""
-    sentences = "".join(f"<p>{escape(each.sentence())}</p>" for each in findings)
-    rows = [(each.name, each.symbol, each.text) for each in quantities]
-    table = Table(heads=("quantity", "symbol", "value (95 %)"), rows=rows)
-    return f"<div><strong>{escape(title)}</strong>{sentences}{html_table(table)}</div>"

@@ -1,15 +1,27 @@
-"""What every answer is: a title, quantities, findings, and the document that its command prints as JSON."""
+"""What every answer is: rows, and the document that its command prints as JSON."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from html import escape
 from typing import Any, ClassVar, Final
+
+from rich.console import Group, RenderableType
 
 from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import plain
-from ringbalance.results.render import html
+from ringbalance.results.render import (
+    Facts,
+    findings_text,
+    html_table,
+    quantity_rows,
+    terminal_table,
+    two_columns,
+)
 from ringbalance.results.rows import Quantity
+from ringbalance.results.table import Table
 from ringbalance.scene.origins import summary_text
 
 _MAIN: Final = 3
@@ -18,34 +30,36 @@ _MOST: Final = 10
 """In a notebook."""
 
 
-class Result:
-    """Base of what the commands, and the functions of the same names, answer with."""
+@dataclass(frozen=True, kw_only=True)
+class Rows:
+    """A result as every output shows it."""
 
-    @property
-    @abstractmethod
-    def title(self) -> str:
-        """What was computed for which scene."""
+    title: str
+    """What was computed for which scene."""
+    quantities: tuple[Quantity, ...]
+    """The main ones first, each key once."""
+    findings: tuple[Finding, ...] = ()
+    """The verdict first."""
+    facts: Facts = ()
+    """Names and texts that are no quantities, for a terminal."""
+    tables: tuple[Table, ...] = ()
+    """For a terminal; those without rows are left out."""
 
-    @property
-    @abstractmethod
-    def quantities(self) -> tuple[Quantity, ...]:
-        """The main ones first."""
-
-    @property
-    @abstractmethod
-    def findings(self) -> tuple[Finding, ...]:
-        """The verdict first."""
-
-    @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """The document that the command of the result prints with `--json`."""
-
-    def rows(self) -> dict[str, Any]:
-        """Quantities and findings as every such document has them."""
+    def document(self) -> dict[str, Any]:
+        """What the JSON of every command has of them."""
         return {
             "quantities": [each.document() for each in self.quantities],
             "findings": [each.document() for each in self.findings],
         }
+
+    def view(self, *more: RenderableType) -> RenderableType:
+        """What a command prints: findings as sentences, quantities, then `more`, then the tables."""
+        return Group(
+            findings_text(self.findings),
+            two_columns([*self.facts, *quantity_rows(self.quantities)]),
+            *more,
+            *(terminal_table(table) for table in self.tables if table.rows),
+        )
 
     def lines(self) -> Iterator[str]:
         """About five lines: what it is, its main numbers with units, and the verdict."""
@@ -55,24 +69,61 @@ class Result:
         for finding in self.findings[:1]:
             yield finding.text
 
+    def html(self) -> str:
+        """For a notebook."""
+        sentences = "".join(f"<p>{escape(each.sentence())}</p>" for each in self.findings)
+        rows = [(each.name, each.symbol, each.text) for each in self.quantities[:_MOST]]
+        table = Table(heads=("quantity", "symbol", "value (95 %)"), rows=rows)
+        return f"<div><strong>{escape(self.title)}</strong>{sentences}{html_table(table)}</div>"
+
+
+class Result:
+    """Base of what the commands, and the functions of the same names, answer with."""
+
+    @abstractmethod
+    def rows(self) -> Rows:
+        """Quantities, findings and tables."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """The document that the command of the result prints with `--json`."""
+
     def __repr__(self) -> str:
-        """The same as one text."""
-        return summary_text(self.lines())
+        """About five lines."""
+        return summary_text(self.rows().lines())
 
     def _repr_html_(self) -> str:
         """For a notebook."""
-        return html(self.title, findings=self.findings, quantities=self.quantities[:_MOST])
+        return self.rows().html()
 
 
-class CommandResult:
-    """Base of what the commands, and the functions of the same names, answer with."""
+class DeferredResult(Result):
+    """A result whose rows and document are made by functions of modules that import it."""
 
     _deferred: ClassVar[Any]
     """Module that loads the functions below when they are first used."""
     _document: ClassVar[str]
     """Name of the one that lays the result out as a document."""
+    _rows: ClassVar[str]
+    """Name of the one that makes its rows."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document that the command of the result prints with `--json`."""
+        document: dict[str, Any] = getattr(self._deferred, self._document)(self)
+        return document
+
+    def rows(self) -> Rows:
+        """Quantities, findings and tables."""
+        rows: Rows = getattr(self._deferred, self._rows)(self)
+        return rows
+
+
+class CommandResult:
+    """Base of results that have no rows yet."""
+
+    _deferred: ClassVar[Any]
+    _document: ClassVar[str]
     _summary: ClassVar[str]
-    """Name of the one that gives its main lines, the title first."""
 
     def to_dict(self) -> dict[str, Any]:
         """The document that the command of the result prints with `--json`."""
@@ -80,7 +131,7 @@ class CommandResult:
         return document
 
     def lines(self) -> Iterable[str]:
-        """About five lines: what it is, its main numbers with units, and the verdict."""
+        """About five lines."""
         lines: Iterable[str] = getattr(self._deferred, self._summary)(self)
         return lines
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from ringbalance.results.numbers import Width, shown
+from ringbalance.results.numbers import Width, given, shown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +60,9 @@ class Quantity:
     @property
     def text(self) -> str:
         """Value and interval in the unit that suits them, such as (72.043 ± 0.032) mm."""
-        return shown(self.value, self.unit, self.width, digits=self.digits)
+        if self.width is not None:
+            return shown(self.value, self.unit, self.width)
+        return given(self.value, self.unit, digits=self.digits)
 
     def document(self) -> dict[str, Any]:
         """For JSON."""

@@ -9,6 +9,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from ringbalance.scene.registry import register
+
 if TYPE_CHECKING:
     from ringbalance.calibration import calibrate as calibrate
     from ringbalance.calibration import paper_law as paper_law
@@ -18,9 +20,10 @@ if TYPE_CHECKING:
     from ringbalance.controller.algorithms.algorithm import ValveCommand as ValveCommand
     from ringbalance.controller.compare import Comparison as Comparison
     from ringbalance.controller.eccentric_mass.run_record import EccentricRun as EccentricRun
+    from ringbalance.controller.eccentric_mass.scene_records import EccentricScene as EccentricScene
+    from ringbalance.controller.eccentric_mass.tuning import EccentricTuning as EccentricTuning
     from ringbalance.controller.rotor import Sensor as Sensor
     from ringbalance.controller.simulation import Simulation as Simulation
-    from ringbalance.controller.tuning.eccentric import EccentricTuning as EccentricTuning
     from ringbalance.controller.tuning.tune import Tuning as Tuning
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
@@ -32,7 +35,6 @@ if TYPE_CHECKING:
     from ringbalance.reduced_model.law.loading import load_law as load_law
     from ringbalance.reduced_model.law.model import CompleteLaw as CompleteLaw
     from ringbalance.reduced_model.law.model import MomentCurve as MomentCurve
-    from ringbalance.scene import EccentricScene as EccentricScene
     from ringbalance.scene import Scene as Scene
     from ringbalance.scene import SceneError as SceneError
     from ringbalance.scene import bundled_scene as bundled_scene
@@ -49,6 +51,18 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
+# The balancers, each one line; a third is one more.
+register(
+    "liquid_ring",
+    scene="ringbalance.scene.liquid_ring:KIND",
+    balancer="ringbalance.controller.liquid_ring.balancer:LiquidRingBalancer",
+)
+register(
+    "eccentric_mass",
+    scene="ringbalance.controller.eccentric_mass.scene_rules:KIND",
+    balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
+)
+
 _HOME = {
     "Calibration": "ringbalance.reduced_model.calibration",
     "Command": "ringbalance.controller.algorithms.algorithm",
@@ -56,8 +70,8 @@ _HOME = {
     "CompleteLaw": "ringbalance.reduced_model.law.model",
     "Controller": "ringbalance.controller.algorithms.algorithm",
     "EccentricRun": "ringbalance.controller.eccentric_mass.run_record",
-    "EccentricScene": "ringbalance.scene",
-    "EccentricTuning": "ringbalance.controller.tuning.eccentric",
+    "EccentricScene": "ringbalance.controller.eccentric_mass.scene_records",
+    "EccentricTuning": "ringbalance.controller.eccentric_mass.tuning",
     "Extremes": "ringbalance.verification.extremes.study",
     "Fit": "ringbalance.studies",
     "Flow": "ringbalance.reduced_model.law.flow_law",

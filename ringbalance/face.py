@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import replace
-from typing import Any, Protocol, overload
+from typing import Any, Protocol, cast, overload
 
 from ringbalance.controller.algorithms.algorithm import Controller
+from ringbalance.controller.balancer import AS_GIVEN, balancer_of
 from ringbalance.controller.compare import Comparison
 from ringbalance.controller.compare import compare as run_comparison
-from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.tuning import EccentricTuning
 from ringbalance.controller.loop import Progress
-from ringbalance.controller.loop import simulate as run_closed_loop
 from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Simulation
-from ringbalance.controller.terms import can_carry
-from ringbalance.controller.tuning.eccentric import EccentricTuning, tune_eccentric
 from ringbalance.controller.tuning.tune import Tuning
-from ringbalance.controller.tuning.tune import tune as tune_scene
-from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
-from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.completing import completed_model, lacking
 from ringbalance.reduced_model.law.flow_law import Flow
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED
-from ringbalance.scene import AnyScene, EccentricScene, Scene
+from ringbalance.scene import AnyScene, Scene
 from ringbalance.scene.changes import checked_scene
 
 
@@ -100,47 +90,11 @@ def simulate(
     Raises: ValueError: a law, an algorithm, a sensor or terms for eccentric masses; terms that the scene or
         the law gives no numbers for.
     """
-    scene = checked_scene(scene)
-    if isinstance(scene, EccentricScene):
-        given = {"flow_law": flow_law, "controller": controller, "sensor": sensor, "modelled": modelled}
-        if names := [name for name, value in given.items() if value is not None]:
-            raise ValueError(f"eccentric masses have their own strategy: leave {', '.join(names)} out")
-        return simulate_eccentric(scene, progress=progress)
-    if controller is not None and not (hasattr(controller, "start") and hasattr(controller, "step")):
-        raise TypeError(
-            f"an algorithm has start() and step(state, measurement), which {controller!r} has not"
-        )
-    run = run_closed_loop(
-        scene,
-        _model_of(scene, flow_law),
-        controller=controller,
-        sensor=sensor,
-        progress=progress,
-        modelled=modelled,
+    balancer = balancer_of(
+        checked_scene(scene), flow_law=flow_law, controller=controller, sensor=sensor, modelled=modelled
     )
-    remark = _of_own_law(scene, flow_law, run)
-    return replace(run, status=f"{run.status}; {remark}") if remark else run
-
-
-def _model_of(scene: Scene, law: Any) -> BalancerModel:
-    if law is None:
-        return BalancerModel.of(calibrate_scene(scene).flow_law)
-    if isinstance(law, CalibratedLaw | PaperLaw):
-        return BalancerModel.of(law)
-    return completed_model(law, by=calibrate_scene(scene).flow_law)
-
-
-def _of_own_law(scene: Scene, law: object, run: Simulation) -> str:
-    """What a run takes from elsewhere, or leaves out, because a law of the caller's own does not give it."""
-    if law is None or isinstance(law, CalibratedLaw | PaperLaw):
-        return ""
-    rows = [row.term for row in run.models_used if row.term in IN_INJECTIONS and row.model == NOT_MODELLED]
-    parts = []
-    if names := lacking(law):
-        parts.append(f"the law gives no {', '.join(names)}: those of the calibrated law are used")
-    if rows and not can_carry(scene, run.model):
-        parts.append(f"it gives velocities and no forces, so the run leaves out {', '.join(rows)}")
-    return "; ".join(parts)
+    run = balancer.run({}, AS_GIVEN, trace=True, progress=progress).runs[0][0]
+    return cast("Simulation | EccentricRun", run)
 
 
 def compare(first: AnyScene, second: AnyScene) -> Comparison:
@@ -150,8 +104,7 @@ def compare(first: AnyScene, second: AnyScene) -> Comparison:
         liquid rings run under their calibrated laws.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
-    scenes = checked_scene(first), checked_scene(second)
-    return run_comparison(*scenes, model_of=lambda scene: calibrated_model(scene))
+    return run_comparison(*(balancer_of(checked_scene(scene)) for scene in (first, second)))
 
 
 @overload
@@ -182,10 +135,5 @@ def tune(
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a flow law for eccentric masses.
     """
-    scene = checked_scene(scene)
-    if not isinstance(scene, EccentricScene):
-        model = calibrated_model(scene) if flow_law is None else _model_of(scene, flow_law)
-        return tune_scene(scene, model, progress=progress)
-    if flow_law is not None:
-        raise ValueError("eccentric masses have no flow law: leave flow_law out")
-    return tune_eccentric(scene, told=progress)
+    tuning = balancer_of(checked_scene(scene), flow_law=flow_law).recommend(progress=progress)
+    return cast("Tuning | EccentricTuning", tuning)

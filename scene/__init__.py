@@ -1,49 +1,49 @@
-"""Scene files: from TOML with units to frozen, validated, SI-only records, or every error at once."""
+"""Scene files: from TOML with units to frozen, validated, SI-only records, or every error at once.
+
+The names below are loaded when they are first used, so that registering a kind of balancer loads no reader.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 if not __name__.startswith("ringbalance."):
     raise ImportError(
         f"import ringbalance.{__name__}, not {__name__}: under two names each class exists twice"
     )
 
-from typing import TYPE_CHECKING
-
-from ringbalance.scene import deferred
-from ringbalance.scene.describe import Row, scene_fault, scene_table
-from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.liquids import KnownLiquid, known_liquids, liquid_at
-from ringbalance.scene.loader import bundled_scene, load_scene, read_scene, scene_from
-from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene, eccentric_scene, liquid_ring_scene
-from ringbalance.scene.platform.files import write_whole
-
 if TYPE_CHECKING:
-    from ringbalance.scene.eccentric_models import EccentricScene
+    from ringbalance.scene.describe import Row as Row
+    from ringbalance.scene.describe import scene_fault as scene_fault
+    from ringbalance.scene.describe import scene_table as scene_table
+    from ringbalance.scene.faults import Fault as Fault
+    from ringbalance.scene.faults import SceneError as SceneError
+    from ringbalance.scene.liquids import KnownLiquid as KnownLiquid
+    from ringbalance.scene.liquids import known_liquids as known_liquids
+    from ringbalance.scene.liquids import liquid_at as liquid_at
+    from ringbalance.scene.loader import bundled_scene as bundled_scene
+    from ringbalance.scene.loader import load_scene as load_scene
+    from ringbalance.scene.loader import read_scene as read_scene
+    from ringbalance.scene.loader import scene_from as scene_from
+    from ringbalance.scene.models import Scene as Scene
+    from ringbalance.scene.narrowing import AnyScene as AnyScene
+    from ringbalance.scene.narrowing import liquid_ring_scene as liquid_ring_scene
+    from ringbalance.scene.platform.files import write_whole as write_whole
 
-__all__ = [
-    "AnyScene",
-    "EccentricScene",
-    "Fault",
-    "KnownLiquid",
-    "Row",
-    "Scene",
-    "SceneError",
-    "bundled_scene",
-    "eccentric_scene",
-    "known_liquids",
-    "liquid_at",
-    "liquid_ring_scene",
-    "load_scene",
-    "read_scene",
-    "scene_fault",
-    "scene_from",
-    "scene_table",
-    "write_whole",
-]
+_NAMES = {
+    "describe": ("Row", "scene_fault", "scene_table"),
+    "faults": ("Fault", "SceneError"),
+    "liquids": ("KnownLiquid", "known_liquids", "liquid_at"),
+    "loader": ("bundled_scene", "load_scene", "read_scene", "scene_from"),
+    "models": ("Scene",),
+    "narrowing": ("AnyScene", "liquid_ring_scene"),
+    "platform.files": ("write_whole",),
+}
+_HOME = {name: module for module, names in _NAMES.items() for name in names}
+__all__ = sorted(_HOME)
 
+if not TYPE_CHECKING:
 
-def __getattr__(name: str) -> object:
-    """Records of the other balancer are loaded when they are first used."""
-    if name != "EccentricScene":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found: object = deferred.EccentricScene
-    return found
+    def __getattr__(name: str) -> object:
+        if name not in _HOME:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -10,16 +10,15 @@ import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import fields, is_dataclass
-from typing import Any, Final, cast
+from typing import Any, Final
 
-from ringbalance.scene import deferred
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.faults import Fault, SceneError, toml_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.fields import Reader
-from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.keys.schema import ORIGIN, Schema
+from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.loader import CHANGED, scene_of
-from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile
 from ringbalance.scene.toml_writing import toml_bytes
@@ -43,14 +42,14 @@ def with_values(scene: SceneFile, values: Mapping[str, object], *, origin: Origi
 def _changed(
     scene: SceneFile, known: CheckedValues, values: Mapping[str, object], origin: Origin
 ) -> AnyScene:
-    schema = LIQUID_RING if isinstance(scene, Scene) else deferred.ECCENTRIC_MASS
+    schema = scene_kind(scene.balancer).schema
     document = deepcopy(dict(known.document))
     for path, value in values.items():
         if not isinstance(path, str):
             raise TypeError(f'a value is named by its path, such as "tube.bore", and not by {path!r}')
         _place(document, path, value, schema=schema, origin=origin)
     if document == known.document:
-        return cast("AnyScene", scene)
+        return scene
     changed = scene_of(
         document,
         file=scene.file,
@@ -59,7 +58,7 @@ def _changed(
         sha256=lambda: hashlib.sha256(toml_bytes(document)).hexdigest(),
         derived={} if _concerned(_OF_CHECKS, values) else known.derived,
     )
-    if not _concerned(_OF_MESH, values) and _mesh_of(changed) != _mesh_of(scene):
+    if not _concerned(_OF_MESH, values) and changed.mesh_digest != scene.mesh_digest:
         fault = Fault(
             file=scene.file,
             table="disc",
@@ -74,12 +73,6 @@ def _changed(
 
 def _concerned(concern: Iterable[str], values: Iterable[str]) -> bool:
     return any(path == each or path.startswith(f"{each}.") for path in values for each in concern)
-
-
-def _mesh_of(scene: SceneFile) -> str:
-    """SHA-256 of the mesh of a chamber; empty without one."""
-    geometry = scene.disc.geometry if isinstance(scene, Scene) else None
-    return "" if geometry is None else geometry.digest
 
 
 def rechecked(scene: AnyScene) -> AnyScene:
@@ -104,7 +97,7 @@ def checked_scene(scene: SceneFile) -> AnyScene:
     faults = [_unchecked(scene, path, value) for path, value in _changed_values(scene)]
     if faults:
         raise SceneError(faults)
-    return cast("AnyScene", scene)
+    return scene
 
 
 def document_of(scene: SceneFile) -> Mapping[str, Any]:

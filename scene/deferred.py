@@ -1,8 +1,6 @@
-"""What only scenes with eccentric masses, with the mesh of a chamber or with changes need, loaded then.
+"""What only scenes with the mesh of a chamber or with changes need, loaded then: others start faster without.
 
-Others start faster without.
-
-`from ringbalance.scene import deferred`, then `deferred.ECCENTRIC_MASS`.
+`from ringbalance.scene import deferred`, then `deferred.with_chamber(...)`.
 """
 
 from __future__ import annotations
@@ -13,9 +11,6 @@ from typing import Any, Final
 
 _HOME: Final = MappingProxyType(
     {
-        "CHECKS": "ringbalance.scene.rules.eccentric",
-        "ECCENTRIC_MASS": "ringbalance.scene.eccentric_models",
-        "EccentricScene": "ringbalance.scene.eccentric_models",
         "scene_lines": "ringbalance.scene.describe",
         "with_chamber": "ringbalance.scene.chamber_file.loading",
         "with_values": "ringbalance.scene.changes",

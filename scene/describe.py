@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any
 
-from ringbalance.scene import deferred
 from ringbalance.scene.faults import Fault, toml_text
 from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import LIQUID_RING
+from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.models import Bend, Scene
 from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.registry import balancers
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 from ringbalance.scene.units import DIMENSIONS, format_quantity
 
@@ -97,28 +98,24 @@ def _lines_of(parts: tuple[str, ...]) -> Iterator[_Line]:
     return (_LINES[path] for path in dict.fromkeys(paths))
 
 
-_ECCENTRIC_UNITS: Final = {"angle": "deg", "length": "mm"}
-
-
 def usual_unit(path: str) -> str:
-    """Unit in which a value of a scene is described; empty without one.
-
-    Of eccentric masses it is the SI unit, but mm and degrees.
-    """
+    """Unit in which a value of a scene is described; empty without one."""
     line = _LINES.get(path)
     if line is not None:
         return line.shown.unit
-    dimension = _eccentric_dimension(path)
-    if dimension is None:
-        return ""
-    return _ECCENTRIC_UNITS.get(dimension, next(iter(DIMENSIONS[dimension].units)))
+    dimension, units = _declared_elsewhere(path)
+    return units.get(dimension, next(iter(DIMENSIONS[dimension].units))) if dimension else ""
 
 
-def _eccentric_dimension(path: str) -> str | None:
+def _declared_elsewhere(path: str) -> tuple[str, Mapping[str, str]]:
+    """Dimension of a value of another kind of scene, and that kind's usual units; empty without."""
     table, _, key = path.split("[")[0].partition(".")
-    keys = deferred.ECCENTRIC_MASS.tables[table].keys if table in deferred.ECCENTRIC_MASS.tables else {}
-    takes = keys[key].takes if key in keys else None
-    return takes.dimension if isinstance(takes, Reader) else None
+    for kind in map(scene_kind, balancers()):
+        keys = kind.schema.tables[table].keys if table in kind.schema.tables else {}
+        takes = keys[key].takes if key in keys else None
+        if isinstance(takes, Reader) and takes.dimension:
+            return takes.dimension, kind.usual_units
+    return "", {}
 
 
 def usual_name(path: str) -> str:
@@ -130,7 +127,7 @@ def usual_name(path: str) -> str:
 def in_usual_unit(path: str, value: float) -> float:
     """A value of a scene, SI, in its usual unit."""
     line = _LINES.get(path)
-    dimension = _eccentric_dimension(path) if line is None else line.dimension
+    dimension = _declared_elsewhere(path)[0] if line is None else line.dimension
     if not dimension:
         return value
     return float(format_quantity(value, dimension, usual_unit(path), digits=_EXACT).split(" ")[0])
@@ -144,22 +141,9 @@ def scene_fault(scene: Scene, path: str, *, problem: str, allowed: str) -> Fault
     return Fault(file=scene.file, table=table, key=key, value=written, problem=problem, allowed=allowed)
 
 
-_MAIN: Final = (
-    ("disc.chambers", "disc.inner_radius", "disc.outer_radius", "disc.axial_width"),
-    ("liquid.name", "liquid.density", "tube.bore", "tube.length"),
-    ("gas.pressure", "rotor.speed", "rotor.influence_coefficient"),
-    ("controller.kind", "controller.limit", "run.seed"),
-)
-_ECCENTRIC_MAIN: Final = (
-    ("rotor.mass", "rotor.stiffness", "rotor.damping"),
-    ("imbalance.mass", "imbalance.radius", "masses.mass", "masses.guide_radius"),
-    ("supervisor.limit", "run.seed"),
-)
-
-
 def scene_lines(scene: AnyScene) -> Iterator[str]:
     """Main values of a scene with their keys, for its text in a terminal."""
-    for paths in _MAIN if isinstance(scene, Scene) else _ECCENTRIC_MAIN:
+    for paths in scene_kind(scene.balancer).main:
         yield ", ".join(f"{path} {_short(scene, path)}" for path in paths)
 
 

@@ -10,18 +10,13 @@ from os import PathLike
 from pathlib import Path, PurePath
 from typing import Any, Final
 
-from ringbalance.scene import deferred
-from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
-from ringbalance.scene.keys.declaration import keys_of
-from ringbalance.scene.keys.reading import Reading, read_document
-from ringbalance.scene.keys.schema import BALANCERS, LIQUID_RING, ORIGIN, Schema
-from ringbalance.scene.liquids import with_liquid
-from ringbalance.scene.models import InputUncertainty
+from ringbalance.scene.keys.reading import Reading
+from ringbalance.scene.keys.schema import ORIGIN, Schema
+from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.origins import CheckedValues, ShownOrigin
-from ringbalance.scene.rules import shape, validity, working
-from ringbalance.scene.rules.check import failed_checks
+from ringbalance.scene.origins import CheckedValues, InputUncertainty, ShownOrigin
+from ringbalance.scene.registry import balancers
 from ringbalance.scene.rules.fitted import fitted_faults
 from ringbalance.scene.toml_reading import read_toml
 
@@ -83,8 +78,8 @@ def scene_of(
         `derived`: values by path that this mesh gives, where they are known; empty: it is read.
     Raises: SceneError: anything in it is wrong; all of it is said at once.
     """
-    read = _read_liquid_ring if _kind(document) == "liquid_ring" else _read_eccentric_mass
-    reading, found = read(document, file=file, folder=folder, derived=derived)
+    kind = scene_kind(_kind(document))
+    reading, found = kind.read(document, file=file, folder=folder, derived=derived)
     found = (*found, *_origin_faults(reading, found), *fitted_faults(reading))
     if found:
         raise SceneError(_sorted(found, reading.schema))
@@ -189,33 +184,10 @@ def _origin_faults(reading: Reading, found: Iterable[Fault]) -> Iterator[Fault]:
                 )
 
 
-def _read_liquid_ring(
-    document: Mapping[str, Any], *, file: str, folder: Path, derived: Mapping[str, Any]
-) -> tuple[Reading, tuple[Fault, ...]]:
-    reading, faults = read_document(document, file=file, schema=LIQUID_RING)
-    if derived:
-        reading = reading.following(derived)
-    elif any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
-        reading, mesh_faults = deferred.with_chamber(reading, folder=folder)
-        faults = (*faults, *mesh_faults)
-    reading, liquid_faults = with_liquid(reading.completed())
-    failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS, *validity.CHECKS))
-    uncertain = working.uncertainty_faults(reading)
-    return reading, (*faults, *reading.missing_faults(), *liquid_faults, *failed, *uncertain)
-
-
-def _read_eccentric_mass(
-    document: Mapping[str, Any], *, file: str, **_: object
-) -> tuple[Reading, tuple[Fault, ...]]:
-    reading, faults = read_document(document, file=file, schema=deferred.ECCENTRIC_MASS)
-    reading = reading.completed()
-    return reading, (*faults, *reading.missing_faults(), *failed_checks(reading, deferred.CHECKS))
-
-
 def _kind(document: Mapping[str, Any]) -> str:
     """The kind of balancer that the file names, or was meant to name."""
     word = document.get("balancer")
-    return (closest(word, BALANCERS) if isinstance(word, str) else "") or BALANCERS[0]
+    return (closest(word, balancers()) if isinstance(word, str) else "") or balancers()[0]
 
 
 def bundled_scene(name: str) -> Path:

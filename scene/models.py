@@ -7,7 +7,7 @@ absolute.  What a field's key takes and means, and its default, stand in its ann
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.fitted import GaugeCorrection
@@ -357,21 +357,6 @@ class Gas:
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-class InputUncertainty:
-    """Expanded uncertainty (95 %) of one scene quantity."""
-
-    quantity: str
-    """Key, such as "bore" or "lag_angle"; of eccentric masses its path, such as "rotor.mass"."""
-    half_width: float
-    """Relative when `relative`, else SI."""
-    relative: bool
-
-    def absolute(self, value: float) -> float:
-        """Half-width in the unit of the quantity, whose value is given in SI."""
-        return self.half_width * (abs(value) if self.relative else 1.0)
-
-
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Scene(SceneFile):
     """All that a run needs, in SI units."""
@@ -384,10 +369,11 @@ class Scene(SceneFile):
     rotor: Rotor
     sensor: Sensor
     controller: ControllerSettings
-    uncertainty: tuple[InputUncertainty, ...]
     requirement: Requirement = field(default_factory=Requirement)
 
+    balancer: ClassVar[str] = "liquid_ring"
+
     @property
-    def balancer(self) -> Literal["liquid_ring"]:
-        """Kind of balancer, as the scene file names it."""
-        return "liquid_ring"
+    def mesh_digest(self) -> str:
+        """SHA-256 of the mesh of a chamber; empty without one."""
+        return "" if self.disc.geometry is None else self.disc.geometry.digest

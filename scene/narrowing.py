@@ -1,57 +1,38 @@
-"""A scene of either kind, the way to the kind that a function needs, and options in place of what it has."""
+"""A scene of any kind, the way to the kind that a function needs, and options in place of what it has."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, TypeAlias
+from dataclasses import replace
+from typing import Final, Literal, TypeAlias, TypeVar
 
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
-
-if TYPE_CHECKING:
-    from ringbalance.scene.eccentric_models import EccentricScene
-from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, TypeVar
-
+from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.units import FieldError, parse_quantity
 
-if TYPE_CHECKING:
-    from ringbalance.scene.eccentric_models import EccentricScene
-
-AnyScene: TypeAlias = "Scene | EccentricScene"
+AnyScene: TypeAlias = SceneFile
 CALIBRATED: Final = "calibrated"
 """The law of a liquid ring where no other is asked for."""
+Kind = TypeVar("Kind", bound=SceneFile)
 
 
-def liquid_ring_scene(scene: AnyScene) -> Scene:
+def scene_as(kind: type[Kind], scene: SceneFile) -> Kind:
+    """The same scene, when it is of that kind. Raises: SceneError: it has another balancer."""
+    if isinstance(scene, kind):
+        return scene
+    fault = Fault(
+        file=scene.file,
+        key="balancer",
+        value=f'"{scene.balancer}"',
+        problem=f"this needs a scene of the balancer {kind.balancer}",
+        allowed=f'balancer = "{kind.balancer}"; report, simulate, tune, compare and fit take any',
+    )
+    raise SceneError([fault])
+
+
+def liquid_ring_scene(scene: SceneFile) -> Scene:
     """The same scene, when its balancer is a liquid ring. Raises: SceneError: it has another."""
-    if isinstance(scene, Scene):
-        return scene
-    problem = "this needs the disc, liquid, tube and gas of a liquid-ring balancer"
-    raise _wrong_kind(scene, problem, "liquid_ring")
-
-
-def eccentric_scene(scene: AnyScene) -> EccentricScene:
-    """The same scene, when its balancer is two eccentric masses. Raises: SceneError: it has another."""
-    if not isinstance(scene, Scene):
-        return scene
-    problem = "this needs the rotor, masses and motor of driven eccentric masses"
-    raise _wrong_kind(scene, problem, "eccentric_mass")
-
-
-def checked_law(scene: AnyScene, law: str) -> None:
-    """Raises: SceneError: the option `--law` of a scene whose balancer has no flow law."""
-    if not isinstance(scene, Scene) and law != CALIBRATED:
-        problem = f"the balancer of {scene.source} has no flow law"
-        raise SceneError.of_option(
-            option="--law", value=law, problem=problem, allowed="this option with a liquid ring alone"
-        )
-
-
-def _wrong_kind(scene: AnyScene, problem: str, kind: str) -> SceneError:
-    value = f'"{scene.balancer}"'
-    allowed = f'a scene with balancer = "{kind}"; report, simulate, tune, compare and fit take both'
-    fault = Fault(file=scene.file, key="balancer", value=value, problem=problem, allowed=allowed)
-    return SceneError([fault])
+    return scene_as(Scene, scene)
 
 
 Models = Literal["finest"]
@@ -59,12 +40,8 @@ FINEST: Final = 0.0
 """Tolerance at which all that is expensive is the finest."""
 ALLOWED: Final = 'a fraction above 0 and below 1, such as 0.005 or "0.5 %"'
 
-SomeScene = TypeVar("SomeScene", Scene, "EccentricScene", "Scene | EccentricScene")
 
-
-def with_tolerance(
-    scene: SomeScene, *, tolerance: str | None = None, models: Models | None = None
-) -> SomeScene:
+def with_tolerance(scene: Kind, *, tolerance: str | None = None, models: Models | None = None) -> Kind:
     """The scene with another tolerance; the same scene where neither option is given.
 
     Args: `tolerance`: such as "0.5 %" or "0.005". `models`: "finest" for a tolerance of zero.

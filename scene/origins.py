@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 from ringbalance.scene import deferred
 from ringbalance.scene.fitted import Fitted
@@ -95,6 +95,21 @@ KEY_OF_FIELD = {
 """Path of the key from which a field of another name is read."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class InputUncertainty:
+    """Expanded uncertainty (95 %) of one scene quantity."""
+
+    quantity: str
+    """Key, such as "bore" or "lag_angle"; where tables share keys its path, such as "rotor.mass"."""
+    half_width: float
+    """Relative when `relative`, else SI."""
+    relative: bool
+
+    def absolute(self, value: float) -> float:
+        """Half-width in the unit of the quantity, whose value is given in SI."""
+        return self.half_width * (abs(value) if self.relative else 1.0)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class CheckedValues:
     """What was read and checked: a record that differs was changed without a check."""
@@ -134,6 +149,15 @@ class SceneFile:
     """Origin of each key by path; empty for a scene that was not read from a file."""
     checked: CheckedValues | None = field(default=None, compare=False, repr=False)
     """None for a scene that was not read from a file."""
+    uncertainty: tuple[InputUncertainty, ...] = ()
+    """Of its inputs, as the file states them."""
+    balancer: ClassVar[str]
+    """Kind of balancer, as the scene file names it."""
+
+    @property
+    def mesh_digest(self) -> str:
+        """SHA-256 of the mesh of a chamber; empty without one."""
+        return ""
 
     def __repr__(self) -> str:
         """Name, file and hash; the values are its fields."""

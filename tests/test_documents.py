@@ -15,10 +15,11 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.cli import main
-from ringbalance.controller.tuning.eccentric import eccentric_tuning_document, tune_eccentric
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
+from ringbalance.controller.eccentric_mass.tuning import eccentric_tuning_document, tune_eccentric
 from ringbalance.reports.extremes_cli import base_of
 from ringbalance.scene.changes import document_of
-from ringbalance.scene.narrowing import eccentric_scene, liquid_ring_scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.verification.extremes.study import Size, find_extremes
 
@@ -32,6 +33,7 @@ BY_NAME: Final = {
     *("held", "pulls", "times"),
     *(f"quantities.{MODELS}.{each}" for each in ("models", "work", "fixed_work")),
     f"times.{MODELS}",
+    *("findings.values", "findings.change"),
     *("numbers", "tables.columns", "tables.units", "endings", "loop_endings", "violations.point"),
 }
 """Whose keys are names of what the scene, the fit or the case has."""

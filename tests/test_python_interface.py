@@ -20,8 +20,9 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import eccentric_scene, liquid_ring_scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 
 MEASUREMENTS = rb.bundled_scene("liquid_ring_paper").parent / "measurements"
 LONGEST_TEXT = 12

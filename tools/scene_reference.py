@@ -11,8 +11,8 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS
 from ringbalance.scene import known_liquids, write_whole
-from ringbalance.scene.eccentric_models import ECCENTRIC_MASS
 from ringbalance.scene.faults import toml_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema

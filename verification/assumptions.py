@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import RestsOn
 from ringbalance.verification.eccentric_scenes import changed

@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.eccentric_models import EccentricScene, SpeedPoint
 from ringbalance.scene.keys.declaration import Entries, Key, keys_of
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.units import DIMENSIONS, FieldError

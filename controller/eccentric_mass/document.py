@@ -14,8 +14,8 @@ from rich.text import Text
 from ringbalance.controller.document import amplitude_line
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.run_status import length_text
+from ringbalance.results.render import two_columns
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.platform.terminal import two_columns
 from ringbalance.scene.uncertain import NORMAL_95
 
 _MOST_ROWS: Final = 2500

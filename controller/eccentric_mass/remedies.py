@@ -20,6 +20,7 @@ from ringbalance.controller.eccentric_mass.plant.parameters import PlantParamete
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
 from ringbalance.controller.eccentric_mass.run_status import RunFacts
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import (
     FRICTION_ERROR,
@@ -27,7 +28,6 @@ from ringbalance.controller.eccentric_mass.strategy.settings import (
     believed_whirl,
     track_model,
 )
-from ringbalance.scene.eccentric_models import EccentricScene
 
 _LONGEST_STEPS: Final = 2_000
 """Steps in which a covariance is worked out; with fewer than the filter takes, each carries less noise."""

@@ -14,11 +14,11 @@ from ringbalance.controller.eccentric_mass.remedies import expected_deviation, f
 from ringbalance.controller.eccentric_mass.run_loop import Record, recorded
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, StageSpan
 from ringbalance.controller.eccentric_mass.run_status import RunFacts
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings, believed_whirl
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.eccentric_models import EccentricScene
 
 
 def simulate_eccentric(

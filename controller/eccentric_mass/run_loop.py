@@ -17,6 +17,7 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     rest_state,
     stuck_flags,
 )
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import (
     RELEASED,
     Cause,
@@ -27,7 +28,6 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.eccentric_models import EccentricScene
 
 NOISES = 8
 """Random numbers that one sample takes: four of vibration, two angles, two rates."""

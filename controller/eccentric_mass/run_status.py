@@ -9,10 +9,10 @@ from functools import cached_property
 from typing import Final
 
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import HELD, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.supervisor import STALLED_SHARE
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
 
 _MICROMETRE: Final = 1e-6
 _RPM: Final = 2 * math.pi / 60

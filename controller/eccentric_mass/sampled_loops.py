@@ -16,9 +16,9 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain, track_model
 from ringbalance.scene.arrays import ComplexArray
-from ringbalance.scene.eccentric_models import EccentricScene
 
 GAIN_MARGIN: Final = 2.0
 """Factor by which the recommended gains could be higher before a pole leaves the unit circle."""

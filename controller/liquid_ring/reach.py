@@ -8,10 +8,8 @@ import numpy as np
 
 from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator
 from ringbalance.reduced_model.law.flow_law import FlowLaw
-from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.reduced_model.short_injection import least_pressure
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.models import Scene
 
 FILL_ERROR: Final = 1e-9
 """Error in fill ratio at which a valve-open time is good enough."""
@@ -105,13 +103,6 @@ BEYOND_CAPACITY: Final = (
 """What to do about an unbalance that the disc cannot cancel."""
 RUNS_BACK: Final = "raise rotor.speed or lower tube.hump_radius so that the column breaks, or vent the tube"
 """What to do about a full tube that lets liquid run back while the gas is off."""
-
-
-def runs_back_text(scene: Scene, *, residual_fill: float) -> str:
-    """Why a full tube lets liquid run back while the gas is off, and what to do about it."""
-    total = 2 * scene.disc.initial_fill
-    known = Holding.of(scene, fill_ratio=total - min(residual_fill, total / 2)).warning
-    return known or f"the full tube lets liquid run back while the gas is off: {RUNS_BACK}"
 
 
 def starting_pressure(

@@ -23,6 +23,7 @@ from ringbalance.reduced_model.gas_line import line_ends, standing_amplitude
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.short_injection import Fills, short_injections
 from ringbalance.reduced_model.terms import FILLING, HELD
+from ringbalance.results.findings import Finding
 from ringbalance.scene.models import Scene
 
 _TAIL: Final = 0.5
@@ -110,15 +111,13 @@ def offset_text(offsets: Sequence[float]) -> str:
     return f"controller.gas_time_offset = {each[0] if alike else '[' + ', '.join(each) + ']'}"
 
 
-def standing_remedy(scene: Scene, model: BalancerModel) -> str:
-    """What to change where the dead time leaves an amplitude above the limit where it is; else empty."""
+def standing_finding(scene: Scene, model: BalancerModel) -> Finding | None:
+    """The offsets that mend a dead time which leaves an amplitude above the limit where it is; else None."""
     mended = compensated(scene, model, dead_times(scene, model)).controller.gas_time_offset
     if not mended or mended == scene.controller.gas_time_offset:
-        return ""
-    still = dead_zone(scene, model, mended)
-    by = "law" if scene.controller.kind == "law_based" else "gain alone"
-    return (
-        f"a command by the {by} transfers no liquid up to {1e6 * still:.3g} um, it only fills gas or lifts "
-        "liquid to the crest: set "
-        f"{offset_text(mended)}"
+        return None
+    return Finding(
+        code="dead_time",
+        values={"standing_amplitude": dead_zone(scene, model, mended), "setting": offset_text(mended)},
+        change={"controller.gas_time_offset": offset_text(mended).partition(" = ")[2]},
     )

@@ -20,6 +20,7 @@ from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.reduced_model.operating.residual import Drawing, stalled_fill_ratio
+from ringbalance.results.findings import Finding
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
@@ -58,7 +59,7 @@ class SettlingTimes:
     beyond_pressure: float = 0.0
     """The same with the fills to which the scene's gas drives the liquid."""
 
-    let_go: str = ""
+    let_go: Finding | None = None
     """Why the tube lets the corrections go that these runs make; empty where it holds them."""
 
     def explained_by(self, fraction: float) -> bool:
@@ -93,7 +94,7 @@ def settling_times(
         return found
     beyond, driven = _beyond_capacity(scene, model, widths, runs=found.runs)
     largest = 2 * scene.disc.initial_fill - usable_fill(scene, model)
-    let_go = Holding.of(scene, fill_ratio=largest).warning if found.explained_by(found.drifted) else ""
+    let_go = Holding.of(scene, fill_ratio=largest).finding if found.explained_by(found.drifted) else None
     return replace(found, beyond_capacity=beyond, beyond_pressure=driven, let_go=let_go)
 
 
@@ -130,7 +131,10 @@ def _runs(
 ) -> SettlingTimes:
     if scene.controller.kind == "target_vector":
         return _of_ensemble(scene, model, widths, members=number, told=told)
-    found = [_one_run(scene, model, widths, number=i, told=told) for i in range(number)]
+    found = []
+    for i in range(number):
+        told(f"run {i + 1}")
+        found.append(drawn_run(scene, model, widths, number=i))
     times = [math.inf if run.settling_time is None else run.settling_time for run in found]
     drifted = sum(run.outcome is Outcome.DRIFTING for run in found)
     return replace(summary(times), drifted=drifted / number)
@@ -196,11 +200,9 @@ def _rotor(scene: Scene, drawn: Members, number: int) -> Rotor:
     )
 
 
-def _one_run(
-    scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, number: int, told: Progress
-) -> Simulation:
-    """One drawn run; velocity, moment and influence coefficient act through their product."""
-    told(f"run {number + 1}")
+def drawn_run(scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, number: int) -> Simulation:
+    """The run of a device by its number; velocity, moment and influence coefficient act through their
+    product."""
     drawn = Members.drawn(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
     rotor = _rotor(scene, drawn, number)
     faster = rotor.influence_coefficient * float(drawn.velocity_factor[number])

@@ -315,7 +315,7 @@ def _status_of(
         f"{scene.run.time_limit:.4g} s{also}: 95 % is not reached"
     )
     if settling.let_go:
-        return f"{share}; {settling.let_go}"
+        return f"{share}; {settling.let_go.text}"
     if not _valves_reach(scene, zone=zone, smallest=smallest) and not settling.out_of_capacity:
         return (
             f"the valve is too slow for the limit of {limit * um:.4g} um: the shortest valve-open time moves "

@@ -11,6 +11,8 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.inputs import eccentric_with
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.criticism.explained import Explained, shares_explained
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.patterns import Criticism, LinearFit
@@ -24,9 +26,7 @@ from ringbalance.identification.result import FitResult
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
 from ringbalance.scene.arrays import FloatArray, StringArray
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import eccentric_with
 
 _BY_LAW: Final = ("injection", "transfer", "flow")
 """Kinds that the law of the tube's flow decides on."""

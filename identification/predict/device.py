@@ -77,8 +77,8 @@ def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
 
 def runs_back(scene: Scene, _: Observations) -> str:
     """Why no injection leaves a change behind; empty where the tube holds at equal fills."""
-    warning = Holding.of(scene, fill_ratio=scene.disc.initial_fill).warning
-    return f"by this scene no injection leaves a change behind: {warning}" if warning else ""
+    found = Holding.of(scene, fill_ratio=scene.disc.initial_fill).finding
+    return "" if found is None else f"by this scene no injection leaves a change behind: {found.text}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.device import Device, Models, runs_back
 from ringbalance.identification.predict.injections import INJECTION
@@ -22,7 +23,6 @@ from ringbalance.identification.predict.predicted import PredictedKind, always, 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.uncertainty import corrected_state
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.models import Scene
 
 _ROUNDS: Final = 12

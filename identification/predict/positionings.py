@@ -14,10 +14,10 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import LOCKED, STUCK, rest_state
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.predicted import PredictedKind
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.eccentric_models import EccentricScene
 
 MOST_STEPS: Final = 300_000
 """Of all motions of a file, some 0.2 s a prediction: a fit takes a minute or two."""

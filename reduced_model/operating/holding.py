@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.law.building import column_pressure, tube_path
+from ringbalance.results.findings import Finding
 from ringbalance.scene.models import Scene
 
 
@@ -38,23 +39,16 @@ class Holding:
         )
 
     @property
-    def warning(self) -> str:
-        """What a tube that does not hold means, and what to do; empty for one that does."""
+    def finding(self) -> Finding | None:
+        """That a correction does not last, and the crest that would hold it; None where the tube holds."""
         if self.holds:
-            return ""
-        if self.hump_radius is None:
-            tube = "without a siphon crest the tube stays full and"
-        else:
-            tube = f"over a siphon crest at {_mm(self.hump_radius)} mm a full tube does not part: it"
-        cure = "raise rotor.speed: at this one no siphon crest holds it"
-        if self.largest_hump_radius is not None:
-            cure = f"give the tube a crest inside {_mm(self.largest_hump_radius)} mm (tube.hump_radius)"
-        return (
-            f"{tube} lets liquid of the fullest chamber run back while the gas is off, so no such correction "
-            f"lasts: {cure}"
+            return None
+        if self.largest_hump_radius is None:
+            return Finding(code="no_crest_holds")
+        # Rounded down to a tenth of a millimetre: a crest there holds.
+        crest = math.floor(1e4 * self.largest_hump_radius * (1 + 1e-12)) / 1e4
+        return Finding(
+            code="no_crest" if self.hump_radius is None else "crest_too_low",
+            values={"crest_radius": self.hump_radius, "largest_crest_radius": crest},
+            change={"tube.hump_radius": crest},
         )
-
-
-def _mm(radius: float) -> str:
-    """Rounded down to a tenth of a millimetre."""
-    return f"{math.floor(1e4 * radius * (1 + 1e-12)) / 10:g}"

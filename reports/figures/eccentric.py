@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.section import Record
 from ringbalance.results.numbers import shown
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
 
 _RPM: Final = 30 / math.pi
 DEVIATIONS: Final = 2.0

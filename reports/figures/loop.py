@@ -202,14 +202,15 @@ def _fill_ratios(run: Record, until: float) -> Drawing:
 def run_figures(run: Record) -> list[Drawing]:
     """Amplitude with its limit, valve-open times, fills, and the path of the residual vector."""
     times = [_valve_open_times(run)] if run["injections"] else []
-    return [_run_amplitude(run), *times, _fill_ratios(run, _early_time({"run": run})), residual_polar(run)]
+    return [run_amplitude(run), *times, _fill_ratios(run, _early_time({"run": run})), residual_polar(run)]
 
 
-def _run_amplitude(run: Record) -> Drawing:
+def run_amplitude(run: Record) -> Drawing:
     """True and measured vibration amplitude over time, m, with the limit."""
+    samples = run.get("samples", {"time_s": [], "amplitude_m": []})
     seen = [
         (time, value)
-        for time, value in zip(run["samples"]["time_s"], run["samples"]["amplitude_m"], strict=True)
+        for time, value in zip(samples["time_s"], samples["amplitude_m"], strict=True)
         if value is not None
     ]
     time, measured = np.array(seen, dtype=np.float64).reshape(-1, 2).T

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import PurePath
 from typing import Any, Final
 
+from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
 from ringbalance.reports import summary
 from ringbalance.reports.pages.cases import case_view
@@ -32,7 +33,8 @@ def _collect(work: Work) -> Record | None:
         return None
     rival = _shortened(load_scene(bundled_scene(RIVAL)))
     try:
-        found = compare(_shortened(work.scene), rival, model_of=lambda _: work.calibration.model, runs=_RUNS)
+        ring = balancer_of(_shortened(work.scene), flow_law=work.calibration.flow_law)
+        found = compare(ring, balancer_of(rival), runs=_RUNS)
     except SceneError as error:
         # Without folders: the evidence is the same wherever the files stand.
         faults = (replace(fault, file=PurePath(fault.file).name) for fault in error.faults)

@@ -23,7 +23,8 @@ from ringbalance.reduced_model.tube.path import crest_span, head_behind_crest
 from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.joint import without_fitted
-from ringbalance.scene.models import InputUncertainty, Scene, Tube
+from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.origins import InputUncertainty
 
 _STEP: Final = 1e-5
 """Of ln u, for slopes."""

@@ -226,17 +226,24 @@ def _one_or_each(reader: Reader, *, example: str) -> Reader:
 
 def choice(words: Any) -> Reader:
     """Reader of one of a few words, which a `Literal` lists."""
-    options: tuple[str, ...] = get_args(words)
-    allowed = " or ".join(f'"{option}"' for option in options)
+    return one_of(lambda: get_args(words))
+
+
+def one_of(words: Callable[[], tuple[str, ...]]) -> Reader:
+    """Reader of one of the words that are there when it reads."""
+
+    def quoted() -> str:
+        return " or ".join(f'"{option}"' for option in words())
 
     def read(value: object) -> str:
+        options, allowed = words(), quoted()
         if not isinstance(value, str):
             raise FieldError("it is not text", allowed)
         if value not in options:
             raise FieldError(f"it is not one of the known words{did_you_mean(value, options)}", allowed)
         return value
 
-    return Reader(read=read, allowed=allowed, summary=allowed)
+    return Reader(read=read, allowed=quoted(), summary=quoted())
 
 
 def text() -> Reader:

@@ -1,21 +1,20 @@
-"""The tables of a scene file as the records declare its keys; `scene.eccentric_models` has the others."""
+"""The tables of a scene file as the records declare its keys."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Literal, get_args
+from typing import Any
 
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
-from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, share, text
+from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, one_of, share, text
 from ringbalance.scene.origins import Measured, Origin
+from ringbalance.scene.registry import balancers
 
-Balancer = Literal["liquid_ring", "eccentric_mass"]
-BALANCERS: tuple[str, ...] = get_args(Balancer)
 Place = tuple[int | str, ...]
 ORIGIN = "origin"
 """Key of every table that says where its values come from."""
@@ -83,7 +82,7 @@ class Schema:
             top=MappingProxyType(
                 {
                     "name": Key(takes=text(), presence=derived("the file's name", "title of the scene")),
-                    "balancer": Key(takes=choice(Balancer), presence=balancer),
+                    "balancer": Key(takes=one_of(balancers), presence=balancer),
                 }
             ),
             tables=MappingProxyType(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
@@ -19,7 +19,6 @@ from typing import Any, Final
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn
-from rich.table import Table
 from rich.text import Text
 
 FIRST_LINE: Final = 10.0
@@ -115,16 +114,6 @@ def _write_lines(command: str, shown: Activity, ended: Event) -> None:
         except (AttributeError, OSError, ValueError):  # closed, or none at all: nobody reads it
             return
         wait = NEXT_LINE
-
-
-def two_columns(rows: Iterable[tuple[str, str]]) -> Table:
-    """A table of names and values, without head or frame."""
-    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-    table.add_column(style="dim")
-    table.add_column()
-    for row in rows:
-        table.add_row(*row)
-    return table
 
 
 def since_start() -> float:

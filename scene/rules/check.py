@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ringbalance.scene.faults import Fault
-from ringbalance.scene.keys.reading import Reading
+from ringbalance.scene.keys.reading import Reading, read_document
+from ringbalance.scene.keys.schema import Schema
 from ringbalance.scene.units import format_quantity
 
 _DIMENSIONS = {"mm": "length", "um": "length", "deg": "angle", "kPa": "pressure", "s": "time", "kg": "mass"}
@@ -53,6 +55,17 @@ def failed_checks(reading: Reading, checks: tuple[Check, ...]) -> Iterator[Fault
         if finding is not None:
             failed.add(each.rule)
             yield reading.fault(each.needs[0], problem=finding.problem, allowed=finding.allowed)
+
+
+def reader_of(schema: Schema, checks: tuple[Check, ...]) -> Callable[..., tuple[Reading, tuple[Fault, ...]]]:
+    """How a kind of scene is read that consists of its keys and rules alone; see `SceneKind.read`."""
+
+    def read(document: Mapping[str, Any], *, file: str, **_: object) -> tuple[Reading, tuple[Fault, ...]]:
+        reading, faults = read_document(document, file=file, schema=schema)
+        reading = reading.completed()
+        return reading, (*faults, *reading.missing_faults(), *failed_checks(reading, checks))
+
+    return read
 
 
 def written(value: float, unit: str) -> str:

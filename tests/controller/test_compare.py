@@ -10,24 +10,28 @@ from dataclasses import replace
 import pytest
 
 from ringbalance.cli import main
+from ringbalance.controller.balancer import Balancer, CommonRotor, balancer_of, takes
 from ringbalance.controller.compare import compare
 from ringbalance.controller.compare_cli import _tuned_text
-from ringbalance.controller.compare_rotor import OneRotor, own_scene
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.scene import (
-    EccentricScene,
-    Scene,
-    SceneError,
-    bundled_scene,
-    eccentric_scene,
-    liquid_ring_scene,
-    load_scene,
-)
-from ringbalance.scene.eccentric_models import SpeedPoint
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
+from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.scene.origins import SceneFile
 
 RPM = math.pi / 30
+
+
+def under_paper_law(scene: SceneFile) -> Balancer:
+    return balancer_of(scene, flow_law="paper" if takes(scene, "flow_law") else None)
+
+
+def rotor_of(scene: SceneFile) -> CommonRotor:
+    return balancer_of(scene).rotor()
+
+
+def moved(scene: SceneFile, to: SceneFile) -> SceneFile:
+    return balancer_of(scene).on_rotor(rotor_of(to)).scene
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +46,7 @@ def small() -> EccentricScene:
 
 def test_eccentric_masses_on_the_liquid_rings_rotor(paper_scene: Scene, driven: EccentricScene) -> None:
     """Speed, influence coefficient and lag, first vibration, noise and limit are those of the other scene."""
-    told = eccentric_scene(OneRotor.of(paper_scene).scene(driven))
+    told = eccentric_scene(moved(driven, paper_scene))
     speed = told.rotor.speed_profile[0].speed
     assert speed == paper_scene.rotor.speed
     found = PlantParameters.of(told).influence(speed)
@@ -63,7 +67,7 @@ def test_eccentric_masses_on_the_liquid_rings_rotor(paper_scene: Scene, driven: 
 
 def test_the_scene_made_for_that_rotor_has_it_already(paper_scene: Scene, small: EccentricScene) -> None:
     """What the comments of the small scene say its numbers come from."""
-    told = eccentric_scene(OneRotor.of(paper_scene).scene(small))
+    told = eccentric_scene(moved(small, paper_scene))
     assert told.rotor.stiffness == pytest.approx(small.rotor.stiffness, rel=1e-5)
     assert told.rotor.damping == pytest.approx(small.rotor.damping, rel=1e-5)
     assert told.imbalance.mass == pytest.approx(small.imbalance.mass, rel=1e-4)
@@ -81,7 +85,7 @@ def test_a_liquid_ring_on_the_eccentric_masses_rotor(paper_scene: Scene, small: 
         ),
     )
     other = replace(small, rotor=replace(small.rotor, stiffness=2 * small.rotor.stiffness))
-    told = liquid_ring_scene(OneRotor.of(other).scene(wrong))
+    told = liquid_ring_scene(moved(wrong, other))
     parameters = PlantParameters.of(other)
     alpha = parameters.influence(small.rotor.speed_profile[0].speed)
     assert told.rotor.influence_coefficient == pytest.approx(abs(alpha))
@@ -97,11 +101,11 @@ def test_a_liquid_ring_on_the_eccentric_masses_rotor(paper_scene: Scene, small: 
 
 
 def test_a_liquid_ring_on_its_own_rotor_is_left_alone(paper_scene: Scene) -> None:
-    assert own_scene(paper_scene) is paper_scene
+    assert balancer_of(paper_scene).on_rotor(None).scene is paper_scene
 
 
 def test_eccentric_masses_start_in_steady_whirl_at_constant_speed(driven: EccentricScene) -> None:
-    told = eccentric_scene(own_scene(driven))
+    told = eccentric_scene(balancer_of(driven).on_rotor(None).scene)
     assert [corner.speed for corner in told.rotor.speed_profile] == pytest.approx([100 * RPM])
     decay = told.rotor.damping / (2 * PlantParameters.of(told).mass)
     assert math.exp(-decay * told.supervisor.start) < 1e-5
@@ -111,7 +115,7 @@ def test_eccentric_masses_start_in_steady_whirl_at_constant_speed(driven: Eccent
 def test_no_ring_at_the_speed_of_the_eccentric_masses(driven: EccentricScene, paper_scene: Scene) -> None:
     pattern = "on the rotor of eccentric_mass_paper.toml: so slow that gravity"
     with pytest.raises(SceneError, match=pattern) as caught:
-        compare(driven, paper_scene, model_of=paper_model)
+        compare(under_paper_law(driven), under_paper_law(paper_scene))
     assert caught.value.faults[0].file == str(bundled_scene("liquid_ring_paper"))
 
 
@@ -122,20 +126,20 @@ def _at(driven: EccentricScene, speed: float) -> EccentricScene:
 
 def test_what_cannot_be_compared(driven: EccentricScene, paper_scene: Scene) -> None:
     with pytest.raises(SceneError, match="does not turn forwards"):
-        OneRotor.of(_at(driven, 0.0))
+        rotor_of(_at(driven, 0.0))
     with pytest.raises(SceneError, match="does not turn forwards"):
-        OneRotor.of(_at(driven, -10.0))
+        rotor_of(_at(driven, -10.0))
     with pytest.raises(SceneError, match="never becomes steady"):
-        OneRotor.of(replace(driven, rotor=replace(driven.rotor, damping=0.0)))
+        rotor_of(replace(driven, rotor=replace(driven.rotor, damping=0.0)))
     with pytest.raises(SceneError, match="does not vibrate"):
-        OneRotor.of(replace(driven, imbalance=replace(driven.imbalance, mass=0.0)))
+        rotor_of(replace(driven, imbalance=replace(driven.imbalance, mass=0.0)))
     ahead = replace(paper_scene, rotor=replace(paper_scene.rotor, lag_angle=-0.3))
     with pytest.raises(SceneError, match=r"no bearing of this kind gives a lag of -17\.19 deg"):
-        OneRotor.of(ahead).scene(driven)
-    light = OneRotor.of(replace(driven, rotor=replace(driven.rotor, mass=0.2)))
+        moved(driven, ahead)
+    light = balancer_of(replace(driven, rotor=replace(driven.rotor, mass=0.2))).rotor()
     heavy = replace(driven, masses=replace(driven.masses, mass=3.0))
     with pytest.raises(SceneError, match="heavier than the rotor itself"):
-        light.scene(heavy)
+        balancer_of(heavy).on_rotor(light)
 
 
 def test_two_liquid_rings(paper_scene: Scene) -> None:
@@ -145,7 +149,7 @@ def test_two_liquid_rings(paper_scene: Scene) -> None:
         sensor=replace(paper_scene.sensor, amplitude_noise=0.0, phase_noise=0.0),
         run=replace(paper_scene.run, time_limit=20.0),
     )
-    found = compare(quiet, quiet, model_of=paper_model, runs=1).document()
+    found = compare(under_paper_law(quiet), under_paper_law(quiet), runs=1).document()
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert {"scenes", "time_s", "residual_ratio", "energy_J", "worst_amplitude_m"} <= set(found)
     for key in ("time_s", "residual_ratio", "energy_J", "worst_amplitude_m", "settled"):
@@ -166,7 +170,7 @@ def test_a_comparison_has_both_tuned_over_one_span_and_several_seeds(
         friction_filter=replace(small.friction_filter, speed_gain=2.0, drive_speed=5 * RPM),
         run=replace(small.run, time_limit=6.0),
     )
-    found = compare(noisy, brief, model_of=paper_model, runs=2)
+    found = compare(under_paper_law(noisy), under_paper_law(brief), runs=2)
     ring, masses = found.sides
     assert found.span == pytest.approx(12.0) == ring.scene.run.time_limit
     told = eccentric_scene(masses.scene)
@@ -193,7 +197,7 @@ def test_the_small_masses_balance_the_liquid_rings_rotor_with_every_seed(
     paper_scene: Scene, small: EccentricScene
 ) -> None:
     """With seed 3 a friction arm is estimated 1.3 % too small: 2.5 of its standard deviations."""
-    told = eccentric_scene(OneRotor.of(paper_scene).scene(small))
+    told = eccentric_scene(moved(small, paper_scene))
     brief = replace(told, run=replace(told.run, time_limit=12.0))
     for seed in range(5):
         run = simulate_eccentric(brief, seed=seed)
@@ -206,7 +210,7 @@ def test_the_masses_do_as_well_on_their_own_rotor_as_on_the_same_one_of_a_ring(
     paper_scene: Scene, small: EccentricScene
 ) -> None:
     """Both rotors are one to the digits of the scene file: the order of a comparison makes no difference."""
-    scenes = own_scene(small), OneRotor.of(paper_scene).scene(small)
+    scenes = balancer_of(small).on_rotor(None).scene, moved(small, paper_scene)
     one, other = (
         eccentric_scene(replace(scene, run=replace(scene.run, time_limit=10.0))) for scene in scenes
     )
@@ -219,7 +223,7 @@ def test_two_pairs_of_eccentric_masses(driven: EccentricScene) -> None:
     """A second pair of half the mass cannot undo the imbalance of the first one's rotor."""
     strong = replace(driven, run=replace(driven.run, time_limit=40.0))
     weak = replace(strong, masses=replace(driven.masses, mass=0.06), source="weak.toml")
-    found = compare(strong, weak, model_of=paper_model, runs=1)
+    found = compare(under_paper_law(strong), under_paper_law(weak), runs=1)
     good, poor = found.sides
     assert good.settled
     assert good.time is not None

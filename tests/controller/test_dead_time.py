@@ -20,7 +20,7 @@ from ringbalance.controller.tuning.dead_time import (
     dead_times,
     dead_zone,
     offset_text,
-    standing_remedy,
+    standing_finding,
 )
 from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
@@ -97,7 +97,7 @@ def test_only_what_runs_model_has_a_dead_time(
     dead = dead_times(scene, calibrated)
     assert 0 < min(dead) < max(dead) < lift / float(slowest.velocity)
     assert compensated(scene, calibrated, ()) is scene
-    assert standing_remedy(scene, calibrated) == ""
+    assert standing_finding(scene, calibrated) is None
 
 
 def test_the_trial_algorithm_keeps_its_steps(slow: Scene, calibrated: BalancerModel) -> None:

@@ -11,7 +11,8 @@ from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 
 AGREEMENT = 1e-6
 """In fill: what `RELATIVE_ERROR` in each step leaves of an injection; the loop corrects what came before."""

@@ -204,15 +204,19 @@ def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene) -> Non
     grams = 0.0404 * math.pi / 4 * 1.5e-3**2 * 801325.0 / math.sqrt(293.15)
     assert found.passed_through == pytest.approx(grams * operation.run_dry / 1.2929, rel=2e-3)
     assert found.below_residual == found.run_dry == 1
-    assert "1 of them ran it dry" in found.warning
+    warning = found.finding
+    assert warning is not None
+    assert (warning.code, warning.values["run_dry"]) == ("gas_passed_through", 1)
     (brief,) = ring.advance(
         DiscState.initial(disc=scene.disc), gas_times={0: 0.1}, duration=0.1, points=1
     ).operations
-    assert GasUse.of(scene=scene, model=model, operations=[brief]).warning == ""
+    assert GasUse.of(scene=scene, model=model, operations=[brief]).finding is None
     residual = found.residual_fill_ratio
     assert 0 < residual < 0.2
     low = replace(brief, fill_after=0.9 * residual)
-    assert "below a fill ratio of" in GasUse.of(scene=scene, model=model, operations=[low]).warning
+    drawn = GasUse.of(scene=scene, model=model, operations=[low]).finding
+    assert drawn is not None
+    assert drawn.code == "gas_entered_port"
     # The supply adds its gauge pressure to the ambient gas that was there.
     content = 0.7e6 * model.chamber_volume / AMBIENT * 273.15 / scene.gas.temperature
     assert found.normal_volume == pytest.approx(content + found.passed_through)

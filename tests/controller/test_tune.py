@@ -14,22 +14,25 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.cli import main
+from ringbalance.controller.eccentric_mass import balancer
+from ringbalance.controller.eccentric_mass.inputs import eccentric_drawn
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.tuning import FIRST_RUNS, _eccentric_settling, tune_eccentric
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.tuning import cli
-from ringbalance.controller.tuning.cli import _show
-from ringbalance.controller.tuning.eccentric import FIRST_RUNS, _eccentric_settling, tune_eccentric
 from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.tune import Tuning, tune, tuning_document
+from ringbalance.controller.tuning.view import show_tuning
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.platform.terminal import results_console
-from ringbalance.scene.uncertain import eccentric_drawn, half_widths, shifted
+from ringbalance.scene.uncertain import half_widths, shifted
 
 MEMBERS = 300
 
@@ -233,7 +236,7 @@ def test_a_line_whose_runs_settle_is_not_warned_of(
     scene: Scene, reachable: bool | None, warned: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = replace(tune(scene, paper_model(scene), members=8), reachable=reachable)
-    _show(found, results_console())
+    show_tuning(found, results_console())
     assert ("no run is sure to reach the limit" in " ".join(capsys.readouterr().out.split())) is warned
 
 
@@ -278,7 +281,7 @@ def test_eccentric_masses_get_their_sampled_loops_and_settling_times(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As a document and as text: of the same runs."""
-    monkeypatch.setattr(cli, "tune_eccentric", once(tune_eccentric))
+    monkeypatch.setattr(balancer, "tune_eccentric", once(tune_eccentric))
     scene = str(bundled_scene("washing_machine"))
     assert main(["tune", scene, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)

@@ -20,7 +20,8 @@ from ringbalance.controller.tuning.tune import Tuning, _status_of, tune
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.loop_models import ControllerSettings
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 
 MEMBERS = 200
 

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from ringbalance.cli import main
+from ringbalance.controller.eccentric_mass.inputs import eccentric_value, eccentric_with
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.identification.balancers import _fitted_names
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.measurements import Observations
@@ -23,9 +25,6 @@ from ringbalance.identification.parameters import FitError
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.narrowing import eccentric_scene
-from ringbalance.scene.uncertain import eccentric_value, eccentric_with
 
 NOISE = 20e-6
 SPEEDS = np.linspace(8.0, 24.0, 24)

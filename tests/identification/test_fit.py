@@ -21,7 +21,8 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.joint import with_model_error
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import with_value
 
 UNBALANCE = 1e-4 * np.array([0, 1, 1, 2, 2, 1, 0, 2])

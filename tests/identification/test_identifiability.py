@@ -17,7 +17,8 @@ from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import with_value
 
 RADII = np.array([0.040, 0.042, 0.0445, 0.0445])

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.intervals import Profile
 from ringbalance.identification.result import FittedParameter
@@ -17,7 +18,7 @@ from ringbalance.identification.saving import _fitted_scene, _found_from, _save_
 from ringbalance.scene import SceneError, bundled_scene, load_scene
 from ringbalance.scene.describe import scene_table
 from ringbalance.scene.loader import scene_from
-from ringbalance.scene.narrowing import eccentric_scene, liquid_ring_scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import MeasuredFile, MeasuredFinding
 
 FILE = MeasuredFile(file="run.csv", kind="injection", rows=40, sha256="ab" * 32)

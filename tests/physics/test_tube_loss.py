@@ -18,7 +18,8 @@ import ringbalance
 from ringbalance.physics.tube.bends import bend_loss
 from ringbalance.physics.tube.friction import reynolds_number, rotation_reynolds_number
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
-from ringbalance.scene.models import Bend, InputUncertainty, Liquid, Scene, Tube
+from ringbalance.scene.models import Bend, Liquid, Scene, Tube
+from ringbalance.scene.origins import InputUncertainty
 
 SCENE = cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper")))
 WATER = Liquid(

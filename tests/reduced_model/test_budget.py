@@ -21,7 +21,8 @@ from ringbalance.reduced_model.device import device_of
 from ringbalance.reduced_model.tube.heads import log_heads
 from ringbalance.reduced_model.tube.regime import CLEARING, RELEASED
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths, nominal_value, with_value
 
 STATED: Final = {

@@ -15,7 +15,8 @@ from scipy.optimize import brentq
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.scene import SceneError
-from ringbalance.scene.models import Disc, InputUncertainty, Scene
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.origins import InputUncertainty
 
 discs = st.builds(
     lambda outer, inner, width, n, share, plate, fill: Disc(

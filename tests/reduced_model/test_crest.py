@@ -21,8 +21,9 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.path import crest_span, path_radius, share_at_radius
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import with_tolerance
+from ringbalance.scene.origins import InputUncertainty
 
 AMBIENT, VAPOUR, DENSITY = 101325.0, 2339.0, 1000.0
 PORT, CREST, BORE, LENGTH = 44.5e-3, 31.5e-3, 1.5e-3, 120e-3

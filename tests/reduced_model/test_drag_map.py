@@ -13,7 +13,8 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reports.studies.drag_map import DragMap, LiquidVerdicts
 from ringbalance.scene.liquids import liquid_at
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 
 POINTS = [(0.3e-3, 1e-6), (0.9e-3, 3e-7), (1.5e-3, 5e-5), (2.4e-3, 6e-6), (4.1e-3, 2.2e-4)]
 

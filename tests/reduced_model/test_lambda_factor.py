@@ -9,8 +9,9 @@ import pytest
 
 from ringbalance.reduced_model.calibration import Calibration, calibrate
 from ringbalance.reduced_model.estimates import injection_time
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import half_widths
 
 FACTOR = 0.93

@@ -19,7 +19,8 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reports.studies.drag_map import ApparentDrag
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 
 AMBIENT, VAPOUR, DENSITY = 101325.0, 2339.0, 1000.0
 

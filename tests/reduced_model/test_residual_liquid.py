@@ -16,7 +16,8 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.operating.residual import reach_share, residual_fill_ratio
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,14 @@ import pytest
 from check_traces import traces, untrue
 
 from ringbalance.controller.eccentric_mass import study
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.reports import eccentric_evidence
 from ringbalance.reports.eccentric_evidence import parameters
 from ringbalance.reports.figures.eccentric import sampled_poles
 from ringbalance.reports.pages.eccentric_scene import SECTIONS
 from ringbalance.reports.render import render
 from ringbalance.reports.report import write_report
-from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
-from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.scene import bundled_scene, load_scene
 
 Record = dict[str, Any]
 UNCERTAIN = ("rotor.stiffness", "imbalance.mass", "masses.friction_arm")

@@ -21,6 +21,7 @@ PLACES = re.compile(r"\{(\w+)(?::([^};]*))?(?:;(\d))?\}")
 def test_a_sentence_fills_its_numbers_in_units_that_exist(code: str) -> None:
     sentence = sentences()[code]
     assert sentence.severity in ("info", "warning", "error")
+    assert all(name.isidentifier() for name in sentence.values)
     for _, unit, _ in PLACES.findall(sentence.text):
         assert unit in ("", "%") or unit in SCALES
     text = Finding(code=code, values=dict.fromkeys(sentence.values, 0.25)).text

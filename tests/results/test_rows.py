@@ -12,8 +12,8 @@ from rich.console import Console
 
 from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import plain
-from ringbalance.results.render import csv_text, html_table, terminal
-from ringbalance.results.result import Result
+from ringbalance.results.render import csv_text, html_table
+from ringbalance.results.result import Result, Rows
 from ringbalance.results.rows import Parts, Quantity, Verdict, around, judged
 from ringbalance.results.table import Table
 
@@ -30,22 +30,23 @@ STALL = Quantity(
 )
 
 
+LAW = Table(caption="law", heads=("state", "u\nm/s"), rows=[("blocked", "–"), ("siphon", "−1.5")])
+
+
 class Answer(Result):
     """As short as a result may be."""
 
-    title = "Calibration of a <disc>"
-    quantities = (STALL,)
-    findings = (Finding(code="off_axis", values={"distance_m": 0.5e-3}),)
+    def rows(self) -> Rows:
+        found = Finding(code="off_axis", values={"distance_m": 0.5e-3})
+        return Rows(title="A <disc>", quantities=(STALL,), findings=(found,), tables=(LAW,))
 
     def to_dict(self) -> dict[str, object]:
-        return {"status": 1, **self.rows()}
+        return {"status": 1, **self.rows().document()}
 
 
 def printed(width: int = 80) -> str:
     console = Console(width=width, file=io.StringIO(), record=True)
-    table = Table(caption="law", heads=("state", "u\nm/s"), rows=[("blocked", "–"), ("siphon", "−1.5")])
-    answer = Answer()
-    console.print(terminal(findings=answer.findings, quantities=answer.quantities, tables=[table]))
+    console.print(Answer().rows().view())
     return console.export_text()
 
 
@@ -69,16 +70,16 @@ def test_the_terminal_shows_a_lopsided_interval_and_the_status() -> None:
 
 def test_a_notebook_shows_the_same_rows() -> None:
     page = Answer()._repr_html_()
-    assert "Calibration of a &lt;disc&gt;" in page
+    assert "A &lt;disc&gt;" in page
     assert STALL.text in page
     assert "beside the shaft" in page
 
 
 def test_a_short_text_has_title_quantity_and_finding() -> None:
     title, quantity, finding = repr(Answer()).splitlines()
-    assert title == Answer.title
+    assert title == "A <disc>"
     assert quantity.strip() == f"{STALL.name} {plain(STALL.text)}"
-    assert finding.strip() == Answer.findings[0].text
+    assert finding.strip() == Answer().rows().findings[0].text
 
 
 def test_csv_and_html_hold_every_cell() -> None:

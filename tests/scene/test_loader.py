@@ -16,12 +16,12 @@ from typing import Any
 
 import pytest
 
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.scene import (
     Fault,
     Scene,
     SceneError,
     bundled_scene,
-    eccentric_scene,
     load_scene,
     read_scene,
     scene_fault,

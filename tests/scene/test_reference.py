@@ -11,13 +11,14 @@ from typing import Any
 import pytest
 import scene_reference
 
+from ringbalance.controller.eccentric_mass import scene_rules
+from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS
 from ringbalance.scene import Scene, loop_models, models
 from ringbalance.scene.chamber_file.keys import MeshKeys
-from ringbalance.scene.eccentric_models import ECCENTRIC_MASS
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
 from ringbalance.scene.origins import Measured
-from ringbalance.scene.rules import eccentric, shape, working
+from ringbalance.scene.rules import shape, working
 from ringbalance.scene.rules.check import Check
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
@@ -91,7 +92,7 @@ def test_uncertain_quantities() -> None:
 
 @pytest.mark.parametrize(
     ("schema", "checks"),
-    [(LIQUID_RING, (*shape.CHECKS, *working.CHECKS)), (ECCENTRIC_MASS, eccentric.CHECKS)],
+    [(LIQUID_RING, (*shape.CHECKS, *working.CHECKS)), (ECCENTRIC_MASS, scene_rules.CHECKS)],
 )
 def test_checks_need_keys_that_exist(schema: Schema, checks: tuple[Check, ...]) -> None:
     for check in checks:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.scene.models import InputUncertainty, Scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.assumptions import assumptions_of
 from ringbalance.verification.case import CaseDefinition, RestsOn
 from ringbalance.verification.catalogue import case_code, load_case

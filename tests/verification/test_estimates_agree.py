@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 import pytest
 
 from ringbalance.controller import outcome
+from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
@@ -45,7 +46,8 @@ def check(scene: Scene, calibration: Calibration) -> None:
 
 def check_comparison(scene: Scene, calibration: Calibration) -> None:
     """`compare` reports for the scene whose rotor it takes what holds for it as tuned."""
-    comparison = compare(scene, scene, model_of=lambda _: calibration.model, runs=1)
+    ring = balancer_of(scene, flow_law=calibration.flow_law)
+    comparison = compare(ring, ring, runs=1)
     tuned = comparison.sides[0].scene
     assert isinstance(tuned, Scene)
     assert comparison.document()["models_used"][0] == [asdict(used) for used in models_used(tuned)]

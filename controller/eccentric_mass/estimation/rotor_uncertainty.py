@@ -24,9 +24,10 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
     filter_matrices,
     whirl_transition,
 )
+from ringbalance.controller.eccentric_mass.inputs import eccentric_value, eccentric_with
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.uncertain import NORMAL_95, eccentric_value, eccentric_with
+from ringbalance.scene.uncertain import NORMAL_95
 
 _LONGEST_STEPS = 2_000
 """Steps in which an estimation is repeated; with fewer than the filter takes, each carries less noise."""

@@ -16,8 +16,8 @@ from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.plant.integrate import LONGEST, fastest_rate, plant_step
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.plant.plant import LOCKED, SIZE, STUCK, rest_state, stuck_flags
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.units import format_quantity
 

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, Motor
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene, Motor
 
 
 class PlantParameters(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from ringbalance.controller.eccentric_mass.control_records import Supervisor
 from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     FrictionEstimate,
     FrictionNoise,
@@ -12,9 +13,8 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
 )
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise, WhirlModel
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import Gates
-from ringbalance.scene.eccentric_control_models import Supervisor
-from ringbalance.scene.eccentric_models import EccentricScene
 
 _SMOOTHING_TIME = 0.05
 """Of the angles and rates that arrival is judged by, s."""

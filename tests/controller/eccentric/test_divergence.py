@@ -13,7 +13,8 @@ from rich.console import Console
 from ringbalance.controller.eccentric_mass.document import eccentric_document, show_eccentric
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
-from ringbalance.scene import EccentricScene, SceneError, bundled_scene, load_scene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.scene import SceneError, bundled_scene, load_scene
 from ringbalance.verification.eccentric_scenes import changed
 
 

@@ -12,8 +12,9 @@ from ringbalance.controller.eccentric_mass.estimation.friction_filter import Tra
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.remedies import found_beforehand
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain
-from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.verification.eccentric_scenes import changed
 

@@ -23,9 +23,9 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     rest_state,
     stuck_flags,
 )
-from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
+from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.scene.eccentric_models import SpeedPoint
 
 RPM = math.pi / 30
 ANGLES = (0.3, 2.6)

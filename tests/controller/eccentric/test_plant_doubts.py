@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass.plant.open_loop import _PlantRun, run_plant
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
+from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray
-from ringbalance.scene.eccentric_models import SpeedPoint
 
 RPM = math.pi / 30
 SPEED = 100 * RPM

@@ -32,7 +32,8 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     stuck_flags,
     write_derivative,
 )
-from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
+from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 RPM = math.pi / 30

@@ -23,9 +23,9 @@ from ringbalance.controller.eccentric_mass.remedies import (
 )
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, Remedy
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.controller.eccentric_mass.strategy.plan import Stage
-from ringbalance.scene import EccentricScene, SceneError, bundled_scene, eccentric_scene, load_scene
-from ringbalance.scene.eccentric_models import SpeedPoint
+from ringbalance.scene import SceneError, bundled_scene, load_scene
 from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 
 SEEDS = range(3)

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from ringbalance.controller.compare_rotor import OneRotor, own_scene
+from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.eccentric_mass.document import eccentric_document
+from ringbalance.controller.eccentric_mass.inputs import eccentric_drawn
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
-from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
+from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.uncertain import eccentric_drawn
 from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 
 
@@ -113,8 +114,10 @@ def test_a_comparison_gives_a_machine_the_same_filter_in_either_place() -> None:
     """The liquid ring's rotor and the masses' own are the same one, to the digits of the scene file."""
     masses = bundled("driven_masses_small")
     first, second = (
-        own_scene(masses),
-        OneRotor.of(load_scene(bundled_scene("liquid_ring_paper"))).scene(masses),
+        balancer_of(masses).on_rotor(None).scene,
+        balancer_of(masses)
+        .on_rotor(balancer_of(load_scene(bundled_scene("liquid_ring_paper"))).rotor())
+        .scene,
     )
     one, other = eccentric_scene(first), eccentric_scene(second)
     for table in ("imbalance_filter", "sensor"):

@@ -19,12 +19,12 @@ from ringbalance.controller.eccentric_mass.plant.parameters import PlantParamete
 from ringbalance.controller.eccentric_mass.remedies import expected_deviation
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, EccentricRun
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.controller.eccentric_mass.strategy.plan import EccentricMeasurement
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
 from ringbalance.reports.simulate_cli import simulate as command
-from ringbalance.scene import EccentricScene, bundled_scene, eccentric_scene, load_scene
-from ringbalance.scene.eccentric_models import SpeedPoint
+from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.eccentric_mass import study as study_module
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.controller.eccentric_mass.study import (
     DRAWS,
     Requirement,
@@ -17,9 +18,8 @@ from ringbalance.controller.eccentric_mass.study import (
     eccentric_study,
     interval,
 )
-from ringbalance.scene import bundled_scene, eccentric_scene, load_scene
-from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.models import InputUncertainty
+from ringbalance.scene import bundled_scene, load_scene
+from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.eccentric_scenes import changed
 
 

@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.verification.cases.driven_fig7_positioning.case import BalancingFigure
 from ringbalance.verification.evidence import Evidence, Found, Level
 

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.evidence import Evidence, Level, as_found
 
 _CASES: Final = 20_000

@@ -19,9 +19,9 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
 )
 from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.eccentric_scenes import at_constant_speed, changed, convergence_time, thinned
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_models import EccentricScene
 from ringbalance.verification.cases.driven_fig6_effort.case import STEP, efforts
 from ringbalance.verification.evidence import Evidence, Level, as_found
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.verification.cases.driven_fig9_run_up.case import _amplitude_figure
 from ringbalance.verification.eccentric_scenes import at_constant_speed, changed, thinned
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure

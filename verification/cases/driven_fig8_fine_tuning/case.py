@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.verification.cases.driven_fig7_positioning.case import BalancingFigure
 from ringbalance.verification.evidence import Evidence, Level, as_found
 

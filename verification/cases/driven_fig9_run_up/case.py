@@ -14,7 +14,7 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.scene.eccentric_models import EccentricScene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.verification.eccentric_scenes import changed, envelope, thinned
 from ringbalance.verification.evidence import (
     Curve,

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from typing import Final
 
-from ringbalance.scene.eccentric_models import ECCENTRIC_MASS, SpeedPoint
+from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS, SpeedPoint
 from ringbalance.scene.keys.declaration import Entries
 from ringbalance.scene.keys.schema import ORIGIN
-from ringbalance.scene.rules.check import Check, Finding, Rule, check, written
+from ringbalance.scene.kinds import SceneKind
+from ringbalance.scene.rules.check import Check, Finding, Rule, check, reader_of, written
 
 _ROUNDING = 1e-9
 
@@ -133,3 +135,15 @@ CHECKS: tuple[Check, ...] = (
     check(_limit_above_position_noise, "supervisor.limit", "sensor.position_noise"),
     *_width_checks(),
 )
+
+KIND: Final = SceneKind(
+    schema=ECCENTRIC_MASS,
+    read=reader_of(ECCENTRIC_MASS, CHECKS),
+    main=(
+        ("rotor.mass", "rotor.stiffness", "rotor.damping"),
+        ("imbalance.mass", "imbalance.radius", "masses.mass", "masses.guide_radius"),
+        ("supervisor.limit", "run.seed"),
+    ),
+    usual_units={"angle": "deg", "length": "mm"},
+)
+"""Scenes whose balancer is two eccentric masses."""

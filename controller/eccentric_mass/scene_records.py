@@ -8,18 +8,18 @@ the tables of such a file; all is loaded for such a file only.
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.eccentric_control_models import (
+from ringbalance.controller.eccentric_mass.control_records import (
     FineTuning,
     FrictionFilter,
     ImbalanceFilter,
     Lqr,
     Supervisor,
 )
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, needed, standard, unused
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
@@ -42,7 +42,7 @@ from ringbalance.scene.keys.fields import (
     quantity,
 )
 from ringbalance.scene.keys.schema import Schema, Table
-from ringbalance.scene.models import InputUncertainty
+from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.origins import SceneFile
 
 Frame = Literal["rotor", "laboratory"]
@@ -163,12 +163,8 @@ class EccentricScene(SceneFile):
     lqr: Lqr
     fine_tuning: FineTuning
     supervisor: Supervisor
-    uncertainty: tuple[InputUncertainty, ...] = ()
 
-    @property
-    def balancer(self) -> Literal["eccentric_mass"]:
-        """Kind of balancer, as the scene file names it."""
-        return "eccentric_mass"
+    balancer: ClassVar[str] = "eccentric_mass"
 
     @property
     def samples(self) -> int:
@@ -181,6 +177,11 @@ class EccentricScene(SceneFile):
         corners = pairwise(self.rotor.speed_profile)
         changes = [here.time for here, after in corners if here.speed != after.speed]
         return changes[0] if changes and 0 < changes[0] < self.run.time_limit else None
+
+
+def eccentric_scene(scene: SceneFile) -> EccentricScene:
+    """The same scene, when its balancer is two eccentric masses. Raises: SceneError: it has another."""
+    return scene_as(EccentricScene, scene)
 
 
 _TABLES = {

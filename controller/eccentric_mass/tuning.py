@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
@@ -15,15 +15,15 @@ from rich.table import Table
 from rich.text import Text
 
 from ringbalance.controller import deferred
+from ringbalance.controller.eccentric_mass.inputs import eccentric_drawn
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
 from ringbalance.results.result import CommandResult
-from ringbalance.scene.eccentric_models import EccentricScene
-from ringbalance.scene.uncertain import eccentric_drawn
 
 RUNS: Final = 40
 FIRST_RUNS: Final = 16
@@ -105,7 +105,7 @@ def _eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> 
     short = span
     for number in range(runs):
         told(f"run {number + 1}")
-        done.append(_one_run(scene, number, spans=(short, span)))
+        done.append(drawn_run(scene, number, spans=(short, span)))
         short = min(_until_rest(done), span)
         if number + 1 == min(FIRST_RUNS, runs) and _times(done).settled.high < QUANTILES["p95"]:
             break
@@ -117,11 +117,15 @@ def _eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> 
     )
 
 
-def _one_run(scene: EccentricScene, number: int, *, spans: tuple[float, float]) -> EccentricRun:
+def drawn_run(scene: EccentricScene, number: int, *, spans: Sequence[float] = ()) -> EccentricRun:
+    """The run of a device by its number: plant and noise are drawn, the strategy keeps the scene's values.
+
+    Args: `spans`: s, tried in turn until the run settles; default the scene's time limit.
+    """
     seed = scene.run.seed + number
     random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(0,)))
     settings, plant = StrategySettings.of(scene), eccentric_drawn(scene, random)
-    for span in dict.fromkeys(spans):
+    for span in dict.fromkeys(spans or (scene.run.time_limit,)):
         limited = replace(plant, run=replace(plant.run, time_limit=span))
         run = simulate_eccentric(limited, seed=seed, settings=settings)
         if run.settled:

@@ -1,4 +1,4 @@
-"""Records of filters, regulator and stages of two eccentric masses; `eccentric_models` has the machine."""
+"""Records of filters, regulator and stages of two eccentric masses; `scene_records` has the machine."""
 
 import math
 from collections.abc import Sequence

@@ -1,0 +1,307 @@
+"""What every command knows of a balancer: one interface, and how a scene comes to its own.
+
+`simulate`, `tune`, `compare` and the first half of `fit` are written against `Balancer` alone.  A further one
+is a sub-package with its scene's keys and a class of this shape, and one line that registers it
+(`ringbalance.scene.registry`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Protocol, Self, TypeVar
+
+import numpy as np
+
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.kinds import scene_kind
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.registry import balancer_class
+from ringbalance.scene.units import DIMENSIONS
+
+Progress = Callable[[float, float], None]
+"""Called with the simulated time and the time limit, s."""
+SomeScene = TypeVar("SomeScene", bound=SceneFile)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Input:
+    """A quantity of a balancer that is not known exactly."""
+
+    path: str
+    """In a scene file, such as "tube.bore"."""
+    value: float
+    """SI."""
+    half_width: float
+    """Expanded uncertainty (95 %), SI; zero: the scene states none."""
+    unit: str
+    """In which it is written, "1" for a number without unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """What a controller or a designer may change without building another machine."""
+
+    path: str
+    value: float
+    """SI, of the scene."""
+    lowest: float
+    highest: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draws:
+    """Which devices a balancer is run as; a number is the same device and noise in every block."""
+
+    numbers: tuple[int, ...]
+    devices: bool = True
+    """Whether the inputs are drawn; False: each is as the scene says, and the noise alone differs."""
+
+    @classmethod
+    def first(cls, count: int, *, devices: bool = True) -> Draws:
+        """The first `count` of them."""
+        return cls(numbers=tuple(range(count)), devices=devices)
+
+
+AS_GIVEN: Final = Draws.first(1, devices=False)
+"""The scene as it says, with its own seed."""
+
+
+class Run(Protocol):
+    """One traced run: what `simulate` answers with."""
+
+    @property
+    def status(self) -> str:
+        """How it ended and what to do next."""
+        ...
+
+    @property
+    def settled(self) -> bool:
+        """Whether the vibration came below the limit and stayed."""
+        ...
+
+    def to_dict(self) -> dict[str, Any]:
+        """As a JSON document in SI."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcomes:
+    """Of runs, in the order of the draws; arrays of shape (n,)."""
+
+    settled: BoolArray
+    settling_time: FloatArray
+    """s, from the start of balancing; infinite where not settled."""
+    final_amplitude: FloatArray
+    """m zero-to-peak."""
+    runs: tuple[tuple[Run, float, float], ...] = ()
+    """Traced: each with the energy that it took, J, and its largest amplitude while balancing, m."""
+
+
+class Recommendation(Protocol):
+    """What `tune` answers with."""
+
+    @property
+    def status(self) -> str:
+        """What was recommended, and whether the runs under it settle."""
+        ...
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether 95 % of the runs settle."""
+        ...
+
+    @property
+    def recommended_scene(self) -> SceneFile:
+        """The scene with the recommended settings, checked."""
+        ...
+
+    def to_dict(self) -> dict[str, Any]:
+        """As a JSON document in SI."""
+        ...
+
+
+class Balancer(Protocol):
+    """A balancer on its rotor, as a scene describes both.
+
+    Made by `balancer_of`; immutable, so that the same balancer gives the same rows in every process.
+    """
+
+    options: frozenset[str]
+    """Arguments besides the scene that it can be made with, such as "flow_law"."""
+
+    @property
+    def scene(self) -> SceneFile:
+        """The scene that it was made of."""
+        ...
+
+    @property
+    def models_used(self) -> tuple[Any, ...]:
+        """Every physical term, with its model and its estimated contribution; empty: one model has all."""
+        ...
+
+    def inputs(self) -> tuple[Input, ...]:
+        """Every quantity that may be uncertain."""
+        ...
+
+    def settings(self) -> tuple[Setting, ...]:
+        """What `run` takes, each at the scene's value and within its bounds."""
+        ...
+
+    def run(
+        self,
+        settings: Mapping[str, float],
+        draws: Draws,
+        *,
+        trace: bool = False,
+        progress: Progress | None = None,
+    ) -> Outcomes:
+        """Closed-loop runs, one a draw. Args: `settings`: by path, SI; the scene's where none is given.
+
+        `trace`: whether the runs themselves are kept; what they come to is the same.
+        """
+        ...
+
+    def rotor(self) -> CommonRotor:
+        """The rotor alone, for another balancer. Raises: SceneError: it stands still or does not vibrate."""
+        ...
+
+    def on_rotor(self, rotor: CommonRotor | None) -> Self:
+        """This balancer on a rotor at constant speed in its steady vibration; None: on its own.
+
+        Raises: SceneError: the rotor cannot be this balancer's.
+        """
+        ...
+
+    def span(self) -> float:
+        """Time from the start of balancing to the end of a run, s."""
+        ...
+
+    def lasting(self, span: float) -> Self:
+        """The same with runs that balance for so long, s, and go on when they have settled."""
+        ...
+
+    def advised(self) -> tuple[Self, Mapping[str, float]]:
+        """With the settings that its formulas recommend, and those that this changed, SI; no run is made."""
+        ...
+
+    def recommend(self, *, progress: Callable[[str], None] | None = None) -> Recommendation:
+        """Settings, judged by runs over the draws."""
+        ...
+
+    def show(self, run: Any, console: Any) -> None:
+        """Print one of its traced runs for a person on a `rich.console.Console`."""
+        ...
+
+    def show_recommendation(self, recommendation: Any, console: Any) -> None:
+        """The same of what `recommend` answers with."""
+        ...
+
+    def history(self, run: Any) -> Mapping[str, Sequence[Any]]:
+        """Every instant of one of its traced runs by name of its column, with the unit in the name."""
+        ...
+
+
+def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
+    """The balancer of a scene.
+
+    Args: `options`: of its class, such as `flow_law` of a liquid ring; None counts as not given.
+    Raises: ValueError: an option that this balancer does not have.
+    """
+    made = balancer_class(scene.balancer)
+    given = {name: value for name, value in options.items() if value is not None}
+    if foreign := sorted(set(given) - made.options):
+        raise ValueError(f"the balancer {scene.balancer} has no {', '.join(foreign)}: leave that out")
+    balancer: Balancer = made(scene, **given)
+    return balancer
+
+
+def takes(scene: SceneFile, option: str) -> bool:
+    """Whether the balancer of a scene has an option, such as "flow_law"."""
+    return option in balancer_class(scene.balancer).options
+
+
+def inputs_of(scene: SceneFile, half_widths: Mapping[str, float]) -> tuple[Input, ...]:
+    """Every value of a scene that its schema lets be uncertain. Args: `half_widths`: by path, SI."""
+    found = []
+    for table, content in scene_kind(scene.balancer).schema.tables.items():
+        for key, declared in content.keys.items():
+            takes = declared.takes
+            value = getattr(getattr(scene, table), key) if declared.uncertain else None
+            dimension = takes.dimension if isinstance(takes, Reader) else None
+            unit = next(iter(DIMENSIONS[dimension].units)) if dimension else "1"
+            several = enumerate(value) if isinstance(value, tuple) else ((None, value),)
+            for entry, each in several:
+                path = f"{table}.{key}" if entry is None else f"{table}.{key}[{entry}]"
+                if each is not None:
+                    width = half_widths.get(path, half_widths.get(f"{table}.{key}", 0.0))
+                    found.append(Input(path=path, value=float(each), half_width=width, unit=unit))
+    return tuple(found)
+
+
+def with_settings(scene: SomeScene, settings: Mapping[str, float]) -> SomeScene:
+    """A scene with values in place of its own, by path, SI; nothing is checked again."""
+    for path, value in settings.items():
+        table, _, key = path.partition(".")
+        changed: dict[str, Any] = {table: replace(getattr(scene, table), **{key: value})}
+        scene = replace(scene, **changed)
+    return scene
+
+
+def outcomes_of(rows: Sequence[tuple[Run, float | None, float, float, float]]) -> Outcomes:
+    """Of traced runs: each with its settling time from the start of balancing, its amplitude at the end, its
+    energy and its largest amplitude."""
+    times = [math.inf if time is None else time for _, time, *_ in rows]
+    return Outcomes(
+        settled=np.isfinite(times),
+        settling_time=np.array(times),
+        final_amplitude=np.array([final for _, _, final, _, _ in rows]),
+        runs=tuple((run, energy, worst) for run, _, _, energy, worst in rows),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommonRotor:
+    """What balancers on one rotor have in common.
+
+    What a balancer knows of a rotor at constant speed is its vibration before balancing and its vibration per
+    unbalance, V = alpha (U_0 + U_balancer).  One rotor therefore means: the same speed, the same complex
+    alpha, the same U_0, the same sensor and the same amplitude to come below.
+    """
+
+    source: str
+    """File of the scene that it is taken from."""
+    speed: float
+    """W, rad/s, above zero."""
+    influence: complex
+    """alpha, m/(kg m)."""
+    unbalance: complex
+    """U_0, kg m."""
+    mass: float | None
+    """M with the balancer, kg; None when the scene does not give it."""
+    noise: float
+    """Standard deviation of the measured vibration, m."""
+    limit: float
+    """Amplitude to come below, m."""
+
+    @property
+    def amplitude(self) -> float:
+        """Vibration before balancing, m zero-to-peak."""
+        return abs(self.influence * self.unbalance)
+
+
+def rotor_fault(scene: SceneFile, path: str, problem: str, allowed: str) -> SceneError:
+    """The error about a rotor, or about a balancer that cannot work on it; `path`: of the value to change."""
+    table, _, key = path.partition(".")
+    return SceneError([Fault(file=scene.file, table=table, key=key, problem=problem, allowed=allowed)])
+
+
+def vibrating(scene: SceneFile, rotor: CommonRotor) -> CommonRotor:
+    """The same rotor. Raises: SceneError: it does not vibrate."""
+    if rotor.amplitude == 0:
+        problem = "it does not vibrate: there is nothing to compare"
+        raise rotor_fault(scene, "rotor", problem, "an unbalance")
+    return rotor

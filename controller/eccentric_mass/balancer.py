@@ -1,0 +1,244 @@
+"""Two driven eccentric masses as every command knows them."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from rich.console import Console
+
+from ringbalance.controller.balancer import (
+    CommonRotor,
+    Draws,
+    Input,
+    Outcomes,
+    Progress,
+    Run,
+    Setting,
+    inputs_of,
+    outcomes_of,
+    rotor_fault,
+    vibrating,
+    with_settings,
+)
+from ringbalance.controller.eccentric_mass.document import eccentric_history, show_eccentric
+from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.sampled_loops import advised
+from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.tuning import (
+    EccentricTuning,
+    drawn_run,
+    show_eccentric_tuning,
+    tune_eccentric,
+)
+
+_FINEST_SHARE: Final = 0.01
+"""Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
+_SETTLED_WHIRL: Final = 12.0
+"""Time constants of the free whirl after which a run with eccentric masses starts to balance."""
+_REACH: Final = 10.0
+"""Factor up to which a gain is tried."""
+
+
+class EccentricMassBalancer:
+    """Two masses that motors drive along one track.
+
+    A scene gives the rotor by mass, stiffness and damping, alpha = W^2/(K_B - M W^2 + j C_B W), and takes a
+    common one back as K_B = M W^2 + Re(W^2/alpha) and C_B = Im(W^2/alpha)/W, with the mass M of rotor and
+    balancer together, which alpha at one speed leaves open.
+    """
+
+    options = frozenset[str]()
+    models_used: tuple[Any, ...] = ()
+
+    def __init__(self, scene: EccentricScene) -> None:
+        self.scene = scene
+
+    def inputs(self) -> tuple[Input, ...]:
+        """Those of the scene."""
+        scene = self.scene
+        values = {each.path: each.value for each in inputs_of(scene, {})}
+        stated = {each.quantity: each for each in scene.uncertainty}
+        widths = {
+            path: stated[path.split("[")[0]].absolute(value)
+            for path, value in values.items()
+            if path.split("[")[0] in stated
+        }
+        return inputs_of(scene, widths)
+
+    def settings(self) -> tuple[Setting, ...]:
+        """Gains of the drives."""
+        lqr, friction = self.scene.lqr, self.scene.friction_filter
+        values = {
+            "lqr.state_weight": lqr.state_weight,
+            "friction_filter.speed_gain": friction.speed_gain,
+            "friction_filter.pair_gain": friction.pair_gain,
+        }
+        return tuple(
+            Setting(path=path, value=value, lowest=value / _REACH, highest=value * _REACH)
+            for path, value in values.items()
+            if value > 0
+        )
+
+    def run(
+        self,
+        settings: Mapping[str, float],
+        draws: Draws,
+        *,
+        trace: bool = False,
+        progress: Progress | None = None,
+    ) -> Outcomes:
+        """See `Balancer`."""
+        scene = with_settings(self.scene, settings)
+        rows: list[tuple[Run, float | None, float, float, float]] = []
+        start = scene.supervisor.start
+        for number in draws.numbers:
+            if draws.devices:
+                run = drawn_run(scene, number)
+            else:
+                seeded = replace(scene, run=replace(scene.run, seed=scene.run.seed + number))
+                run = simulate_eccentric(seeded, progress=progress)
+            time = None if run.settling_time is None else max(0.0, run.settling_time - start)
+            balancing = run.amplitude[run.time >= start]
+            worst = float(np.max(balancing)) if balancing.size else run.worst_amplitude
+            rows.append((run, time, run.final_amplitude, run.electrical_energy, worst))
+        found = outcomes_of(rows)
+        return found if trace else replace(found, runs=())
+
+    def rotor(self) -> CommonRotor:
+        """At the speed at which the strategy starts; see `Balancer`."""
+        scene = self.scene
+        speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
+        if speed <= 0:
+            problem = "the rotor does not turn forwards when balancing starts"
+            raise rotor_fault(scene, "rotor.speed_profile", problem, "a speed above 0 rpm at that time")
+        parameters = PlantParameters.of(scene)
+        if parameters.damping == 0:
+            problem = "without damping the vibration before balancing never becomes steady"
+            raise rotor_fault(scene, "rotor.damping", problem, "a damping coefficient above 0 N*s/m")
+        imbalance = scene.imbalance
+        return vibrating(
+            scene,
+            CommonRotor(
+                source=scene.source,
+                speed=speed,
+                influence=parameters.influence(speed),
+                unbalance=cmath.rect(imbalance.mass * imbalance.radius, imbalance.phase),
+                mass=parameters.mass,
+                noise=scene.sensor.position_noise,
+                limit=scene.supervisor.limit,
+            ),
+        )
+
+    def on_rotor(self, rotor: CommonRotor | None) -> EccentricMassBalancer:
+        """Opposite each other until the rotor's vibration is steady, with the noise that both balancers have.
+
+        A wrong assumption stays as wrong as it was. Raises: SceneError: no such rotor has these masses.
+        """
+        rotor = self.rotor() if rotor is None else rotor
+        scene = self.scene
+        before, masses = scene.rotor, scene.masses
+        whole = before.mass + 2 * masses.mass if rotor.mass is None else rotor.mass
+        dynamic = rotor.speed**2 / rotor.influence
+        found = replace(
+            before,
+            mass=whole - 2 * masses.mass,
+            stiffness=whole * rotor.speed**2 + dynamic.real,
+            damping=dynamic.imag / rotor.speed,
+        )
+        _check_rotor(rotor, scene, found)
+        radius, limit = scene.imbalance.radius, rotor.limit
+        moved = replace(
+            scene,
+            rotor=found,
+            imbalance=replace(
+                scene.imbalance, mass=abs(rotor.unbalance) / radius, phase=cmath.phase(rotor.unbalance)
+            ),
+            sensor=replace(
+                scene.sensor, position_noise=rotor.noise, velocity_noise=rotor.noise * rotor.speed
+            ),
+            imbalance_filter=_believed(scene, found, rotor, heavier=whole / (before.mass + 2 * masses.mass)),
+            supervisor=replace(scene.supervisor, limit=limit),
+        )
+        return EccentricMassBalancer(_steady_start(moved, rotor.speed))
+
+    def span(self) -> float:
+        """See `Balancer`."""
+        return self.scene.run.time_limit - self.scene.supervisor.start
+
+    def lasting(self, span: float) -> EccentricMassBalancer:
+        """See `Balancer`."""
+        limit = span + self.scene.supervisor.start
+        return EccentricMassBalancer(replace(self.scene, run=replace(self.scene.run, time_limit=limit)))
+
+    def advised(self) -> tuple[EccentricMassBalancer, Mapping[str, float]]:
+        """Gains lowered to the recommended ones; see `Balancer`."""
+        scene, changes = advised(self.scene)
+        return EccentricMassBalancer(scene), changes
+
+    def recommend(self, *, progress: Callable[[str], None] | None = None) -> EccentricTuning:
+        """See `Balancer`."""
+        return tune_eccentric(self.scene, told=progress)
+
+    def show(self, run: EccentricRun, console: Console) -> None:
+        """See `Balancer`."""
+        show_eccentric(run, console=console)
+
+    def show_recommendation(self, recommendation: EccentricTuning, console: Console) -> None:
+        """See `Balancer`."""
+        show_eccentric_tuning(recommendation, console)
+
+    def history(self, run: EccentricRun) -> Mapping[str, Sequence[Any]]:
+        """See `Balancer`."""
+        return eccentric_history(run)
+
+
+def _believed(scene: EccentricScene, found: EccentricRotor, rotor: CommonRotor, *, heavier: float) -> Any:
+    """The imbalance filter's assumptions; `heavier`: mass of rotor and masses over that before."""
+    before, believed = scene.rotor, scene.imbalance_filter
+    assumed = max(rotor.noise, _FINEST_SHARE * rotor.limit)
+    louder, stiffer = assumed / believed.position_noise, found.stiffness / before.stiffness
+    damping = believed.assumed_damping
+    return replace(
+        believed,
+        position_noise=assumed,
+        velocity_noise=assumed * rotor.speed,
+        velocity_walk=believed.velocity_walk * louder * stiffer / heavier,
+        unbalance_walk=believed.unbalance_walk * louder * heavier,
+        assumed_mass=believed.assumed_mass * (found.mass / before.mass),
+        assumed_stiffness=believed.assumed_stiffness * stiffer,
+        assumed_damping=found.damping if before.damping == 0 else damping * (found.damping / before.damping),
+    )
+
+
+def _steady_start(scene: EccentricScene, speed: float) -> EccentricScene:
+    """At constant speed; the strategy waits until the vibration from the rotor's start has died away."""
+    whole = scene.rotor.mass + 2 * scene.masses.mass
+    start = _SETTLED_WHIRL * 2 * whole / scene.rotor.damping
+    start = math.ceil(start / scene.sensor.step) * scene.sensor.step
+    first = scene.masses.initial_angle[0]
+    return replace(
+        scene,
+        rotor=replace(scene.rotor, speed_profile=(SpeedPoint(time=0.0, speed=speed),)),
+        masses=replace(scene.masses, initial_angle=(first, first + math.pi)),
+        supervisor=replace(scene.supervisor, start=start),
+        run=replace(scene.run, time_limit=scene.run.time_limit + start),
+    )
+
+
+def _check_rotor(rotor: CommonRotor, scene: EccentricScene, found: EccentricRotor) -> None:
+    """Faults of what the common rotor asks of this scene's."""
+    if found.mass <= 0 or abs(rotor.unbalance) > found.mass * scene.imbalance.radius:
+        problem = "these masses, or the imbalance, are heavier than the rotor itself"
+        raise rotor_fault(scene, "masses.mass", problem, "lighter masses")
+    if found.stiffness <= 0 or found.damping <= 0:
+        lag = math.degrees(-cmath.phase(rotor.influence))
+        problem = f"no bearing of this kind gives a lag of {lag:.4g} deg with this influence coefficient"
+        allowed = "a lag_angle above 0 deg and below 180 deg, the greater the lighter the rotor"
+        raise rotor_fault(scene, "rotor.stiffness", problem, allowed)

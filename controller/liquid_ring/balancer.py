@@ -1,0 +1,301 @@
+"""The liquid ring as every command knows it."""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from rich.console import Console
+
+from ringbalance.controller.algorithms.algorithm import Controller
+from ringbalance.controller.balancer import (
+    CommonRotor,
+    Draws,
+    Input,
+    Outcomes,
+    Progress,
+    Run,
+    Setting,
+    inputs_of,
+    outcomes_of,
+    vibrating,
+    with_settings,
+)
+from ringbalance.controller.document import show, simulation_history
+from ringbalance.controller.ensemble.monte_carlo import simulate_members
+from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
+from ringbalance.controller.line_runs import line_runs, line_runs_text
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
+from ringbalance.controller.simulation import Simulation
+from ringbalance.controller.terms import can_carry, run_models
+from ringbalance.controller.tuning.recommendation import factor_uncertainty
+from ringbalance.controller.tuning.search import recommended
+from ringbalance.controller.tuning.settling import drawn_run
+from ringbalance.controller.tuning.tune import Tuning, tune
+from ringbalance.controller.tuning.view import show_tuning
+from ringbalance.reduced_model.calibration import calibrated_model, chamber_and_law, law_by_name
+from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.completing import completed_model, lacking
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
+from ringbalance.results.findings import Finding
+from ringbalance.scene.loop_models import ControllerSettings
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
+
+_GAIN: Final = 30.0
+"""Factor up to which a gain or a time is tried."""
+_PRESSURE: Final = 3.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options:
+    flow_law: Any = None
+    controller: Controller[Any] | None = None
+    sensor: Sensor | None = None
+    modelled: Collection[str] | None = None
+    to_time_limit: bool = False
+
+
+class LiquidRingBalancer:
+    """A disc with chambers that a gas drives liquid between."""
+
+    options = frozenset({"flow_law", "controller", "sensor", "modelled"})
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        flow_law: Any = None,
+        controller: Controller[Any] | None = None,
+        sensor: Sensor | None = None,
+        modelled: Collection[str] | None = None,
+        to_time_limit: bool = False,
+    ) -> None:
+        """Arguments as in `ringbalance.simulate`; `flow_law` may be a name that `law_by_name` knows, too."""
+        if controller is not None and not (hasattr(controller, "start") and hasattr(controller, "step")):
+            raise TypeError(
+                f"an algorithm has start() and step(state, measurement), which {controller!r} has not"
+            )
+        self.scene = scene
+        self._given = _Options(
+            flow_law=flow_law,
+            controller=controller,
+            sensor=sensor,
+            modelled=modelled,
+            to_time_limit=to_time_limit,
+        )
+
+    @cached_property
+    def model(self) -> BalancerModel:
+        """The disc under its law."""
+        law = self._given.flow_law
+        if law is None:
+            return calibrated_model(self.scene)
+        if isinstance(law, str):
+            return law_by_name(self.scene, law)
+        if isinstance(law, CalibratedLaw | PaperLaw):
+            return BalancerModel.of(law)
+        return completed_model(law, by=chamber_and_law(self.scene)[1])
+
+    @property
+    def models_used(self) -> tuple[ModelUsed, ...]:
+        """Every physical term, with its model and its estimated contribution."""
+        return run_models(scene=self.scene, model=self.model)
+
+    def _as(self, scene: Scene, **changed: Any) -> LiquidRingBalancer:
+        return LiquidRingBalancer(scene, **vars(replace(self._given, **changed)))
+
+    def inputs(self) -> tuple[Input, ...]:
+        """Those of the scene, with what it assumes where it states no uncertainty."""
+        widths = half_widths(self.scene).items()
+        return inputs_of(self.scene, {f"{UNCERTAIN_QUANTITIES[name]}.{name}": each for name, each in widths})
+
+    def settings(self) -> tuple[Setting, ...]:
+        """Gas pressure, gain and integral time."""
+        gas, settings = self.scene.gas, self.scene.controller
+        found = [
+            Setting(
+                path="gas.pressure",
+                value=gas.pressure,
+                lowest=gas.pressure / _PRESSURE,
+                highest=gas.pressure * _PRESSURE,
+            )
+        ]
+        for path, value in (
+            ("controller.proportional", settings.proportional),
+            ("controller.integral_time", settings.integral_time),
+        ):
+            if value is not None:
+                found.append(Setting(path=path, value=value, lowest=value / _GAIN, highest=value * _GAIN))
+        return tuple(found)
+
+    def run(
+        self,
+        settings: Mapping[str, float],
+        draws: Draws,
+        *,
+        trace: bool = False,
+        progress: Progress | None = None,
+    ) -> Outcomes:
+        """See `Balancer`; without traces, many devices of the target-vector algorithm run compiled."""
+        scene = with_settings(self.scene, settings)
+        compiled = scene.controller.kind == "target_vector" and self._given == _Options(
+            flow_law=self._given.flow_law
+        )
+        if draws.devices and compiled and not trace:
+            return self._compiled(scene, draws)
+        rows: list[tuple[Run, float | None, float, float, float]] = []
+        for number in draws.numbers:
+            run = self._traced(scene, number, devices=draws.devices, progress=progress)
+            final, worst = float(run.amplitude[-1]), float(np.max(run.amplitude))
+            rows.append((run, run.settling_time, final, run.gas.energy, worst))
+        return outcomes_of(rows)
+
+    def _compiled(self, scene: Scene, draws: Draws) -> Outcomes:
+        number, last = np.array(draws.numbers), max(draws.numbers)
+        members = Members.drawn(scene, uncertainty_95=self._widths, seed=scene.run.seed, block=0)
+        runs = simulate_members(scene, self.model, members=members.first(last + 1), seed=scene.run.seed)
+        return Outcomes(
+            settled=runs.settled[number],
+            settling_time=runs.settling_time[number],
+            final_amplitude=runs.final_amplitude[number],
+        )
+
+    @cached_property
+    def _widths(self) -> MemberUncertainty:
+        return MemberUncertainty.of(self.scene, self.model)
+
+    def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> Simulation:
+        if devices:
+            return drawn_run(scene, self.model, self._widths, number=number)
+        given = self._given
+        run = simulate(
+            replace(scene, run=replace(scene.run, seed=scene.run.seed + number)),
+            self.model,
+            controller=given.controller,
+            sensor=given.sensor,
+            progress=progress,
+            modelled=given.modelled,
+            to_time_limit=given.to_time_limit,
+        )
+        return replace(run, findings=(*run.findings, *_of_own_law(scene, given.flow_law, run)))
+
+    def rotor(self) -> CommonRotor:
+        """See `Balancer`."""
+        rotor = self.scene.rotor
+        return vibrating(
+            self.scene,
+            CommonRotor(
+                source=self.scene.source,
+                speed=rotor.speed,
+                influence=rotor.influence,
+                unbalance=rotor.initial_unbalance,
+                mass=None,
+                noise=self.scene.sensor.amplitude_noise,
+                limit=self.scene.controller.limit,
+            ),
+        )
+
+    def on_rotor(self, rotor: CommonRotor | None) -> LiquidRingBalancer:
+        """Valve-open times are rescaled to the same valve-open time per unbalance; a wrong assumption stays
+        as wrong as it was. Raises: SceneError: the rotor is too slow to form a ring."""
+        if rotor is None:
+            return self
+        own, control = self.scene.rotor, self.scene.controller
+        coefficient, lag = abs(rotor.influence), -cmath.phase(rotor.influence)
+        share = coefficient / own.influence_coefficient
+        vibration = rotor.influence * rotor.unbalance
+        scene = replace(
+            self.scene,
+            rotor=replace(
+                own,
+                speed=rotor.speed,
+                influence_coefficient=coefficient,
+                lag_angle=lag,
+                initial_amplitude=abs(vibration),
+                initial_phase=cmath.phase(vibration),
+            ),
+            sensor=replace(
+                self.scene.sensor,
+                amplitude_noise=rotor.noise,
+                phase_noise=min(rotor.noise / abs(vibration), 1.0),
+            ),
+            controller=replace(
+                control,
+                limit=rotor.limit,
+                proportional=control.proportional / share,
+                fine_below=control.fine_below * share,
+                assumed_influence_coefficient=control.assumed_influence_coefficient * share,
+                assumed_lag_angle=wrapped(control.assumed_lag_angle - own.lag_angle + lag),
+            ),
+        )
+        check_ring(scene)
+        return self._as(scene)
+
+    def span(self) -> float:
+        """The scene's time limit, s."""
+        return self.scene.run.time_limit
+
+    def lasting(self, span: float) -> LiquidRingBalancer:
+        """See `Balancer`."""
+        run = replace(self.scene.run, time_limit=span)
+        return self._as(replace(self.scene, run=run), to_time_limit=True)
+
+    def advised(self) -> tuple[LiquidRingBalancer, Mapping[str, float]]:
+        """The gain that `tune` recommends for the target-vector algorithm, and its valve offsets."""
+        # Valve-open times of the trial algorithm are the scene's.
+        if self.scene.controller.kind == "trial":
+            return self, {}
+        best = recommended(self.scene, self.model, factor_uncertainty(self.scene, self.model))
+        if best is None:
+            return self, {}
+        changes = _changes(self.scene.controller, best.scene.controller, chambers=self.scene.disc.chambers)
+        return self._as(best.scene), changes
+
+    def recommend(self, *, progress: Callable[[str], None] | None = None) -> Tuning:
+        """See `Balancer`."""
+        return tune(self.scene, self.model, progress=progress)
+
+    def show(self, run: Simulation, console: Console) -> None:
+        """See `Balancer`."""
+        show(run, console=console)
+        if at_ends := line_runs(self.scene, self.model):
+            console.print(line_runs_text(at_ends), highlight=False, markup=False)
+
+    def show_recommendation(self, recommendation: Tuning, console: Console) -> None:
+        """See `Balancer`."""
+        show_tuning(recommendation, console)
+
+    def history(self, run: Simulation) -> Mapping[str, Sequence[Any]]:
+        """See `Balancer`."""
+        return simulation_history(run)
+
+
+def _of_own_law(scene: Scene, law: object, run: Simulation) -> Iterator[Finding]:
+    """What a run takes from elsewhere, or leaves out, because a law of the caller's own does not give it."""
+    if law is None or isinstance(law, CalibratedLaw | PaperLaw | str):
+        return
+    rows = [row.term for row in run.models_used if row.term in IN_INJECTIONS and row.model == NOT_MODELLED]
+    if names := lacking(law):
+        yield Finding(code="own_law_lacks", values={"names": names})
+    if rows and not can_carry(scene, run.model):
+        yield Finding(code="own_law_without_forces", values={"terms": rows})
+
+
+def _changes(before: ControllerSettings, after: ControllerSettings, *, chambers: int) -> dict[str, float]:
+    """Scene keys that tuning has changed, with their values, SI."""
+    changes = {}
+    if after.proportional != before.proportional:
+        changes["controller.proportional"] = after.proportional
+    if after.gas_time_offset != before.gas_time_offset:
+        offsets = zip(chamber_letters(chambers), after.offsets(chambers), strict=True)
+        changes |= {f"controller.gas_time_offset.{letter}": offset for letter, offset in offsets}
+    return changes

@@ -33,25 +33,22 @@ from ringbalance.reduced_model.operating.residual import ResidualLiquid
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
 from ringbalance.reduced_model.terms import ModelUsed, models_used
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.results.result import CommandResult
+from ringbalance.results.findings import Finding
+from ringbalance.results.result import DeferredResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 
 VELOCITY_POINTS: Final = 47
-IDENTIFIABILITY: Final = (
-    "Measured end rates of the balancing moment alone identify only lambda^2/(k + 1): to tell lambda and k "
-    "apart, measure an amount moved and a time."
-)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Calibration(CommandResult):
+class Calibration(DeferredResult):
     """Everything that `calibrate` finds out about a scene's balancer."""
 
     _deferred: ClassVar[Any] = deferred
     _document: ClassVar[str] = "calibration_document"
-    _summary: ClassVar[str] = "calibration_lines"
+    _rows: ClassVar[str] = "calibration_rows"
 
     scene: Scene
     chamber: ChamberCalibration
@@ -74,8 +71,6 @@ class Calibration(CommandResult):
     """Whirl that surface waves lock to; None where there is no such wave."""
     models_used: tuple[ModelUsed, ...]
     """Every physical term, with its model and its estimated contribution."""
-    identifiability: str
-    """What measurements can and cannot identify."""
     statistics: Mapping[str, float]
     """Counted work and measured interpolation errors; no wall times, so they reproduce."""
 
@@ -145,7 +140,6 @@ def calibrate(scene: AnyScene) -> Calibration:
         gas_line=line_answers(scene, BalancerModel.of(law)),
         instability=AsynchronousInstability.of(scene),
         models_used=models_used(scene),
-        identifiability=IDENTIFIABILITY,
         statistics={
             "closed_form_fills": float(np.count_nonzero(chamber.fill_ratio)),
             "finite_element_solves": float(chamber.check.solves),
@@ -238,15 +232,12 @@ class AsynchronousInstability:
         )
 
     @property
-    def warning(self) -> str:
-        """One sentence where the growth exceeds what rotors damp; empty elsewhere."""
+    def finding(self) -> Finding | None:
+        """Where the growth exceeds what rotors damp; None elsewhere."""
         if self.growth <= DAMPING:
-            return ""
-        return (
-            f"a rotor that runs above a critical speed near {self.critical_speed * 30 / math.pi:.0f} rpm may "
-            f"whirl with waves in its rings (fill ratio {self.fill_ratio:.2g}): by order of magnitude it "
-            f"needs a damping ratio of {self.growth:.1g} there"
-        )
+            return None
+        numbers = {"critical_speed": self.critical_speed, "fill_ratio": self.fill_ratio}
+        return Finding(code="asynchronous_instability", values={**numbers, "damping_ratio": self.growth})
 
 
 def _overlap(k: float, disc: Disc) -> float:

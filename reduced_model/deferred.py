@@ -12,7 +12,7 @@ from typing import Any, Final
 _HOME: Final = MappingProxyType(
     {
         "calibration_document": "ringbalance.reduced_model.documents",
-        "calibration_lines": "ringbalance.reduced_model.summary",
+        "calibration_rows": "ringbalance.reduced_model.calibration_rows",
     }
 )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -18,11 +17,11 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
 from ringbalance.reduced_model.chamber.gravity import closed_ring
-from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
 from ringbalance.reduced_model.chamber.range import compression
 from ringbalance.reduced_model.chamber.values import paper_closed_forms, share_across
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.results.findings import Finding
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.rules.validity import LARGEST_COMPRESSION
@@ -57,14 +56,14 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "residual_liquid": _residual(calibration),
         "tube_liquid": _tube_liquid(calibration),
         "asynchronous_instability": _instability(calibration),
-        "identifiability": calibration.identifiability,
+        "identifiability": Finding(code="identifiability").text,
         "tolerance": scene.tolerance,
         "holding": _holding(calibration),
         "gas_line": line_document(calibration.gas_line),
         "models_used": [asdict(term) for term in calibration.models_used],
-        "findings": [each.document() for each in mesh_findings(scene)],
         "status": {"code": str(calibration.chamber.status.code), "text": calibration.chamber.status.text},
         "statistics": dict(calibration.statistics),
+        **calibration.rows().document(),
     }
 
 
@@ -301,12 +300,12 @@ def _instability(calibration: Calibration) -> dict[str, Any] | None:
         "fill_ratio": found.fill_ratio,
         "critical_speed_rad_s": found.critical_speed,
         "growth_over_critical_speed": found.growth,
-        "warning": found.warning,
+        "warning": "" if found.finding is None else found.finding.text,
     }
 
 
 class RowStatus(StrEnum):
-    """What limits a row at its fill ratio; the first that applies."""
+    """What limits a row at its fill ratio; the first that applies. Each is the code of a finding."""
 
     OK = "ok"
     NO_RING = "no_ring"
@@ -314,21 +313,6 @@ class RowStatus(StrEnum):
     OVER_CREST = "over_crest"
     GAS_DRAWN = "gas_drawn"
     LIQUID_COMPRESSED = "liquid_compressed"
-
-
-REMEDIES: Final[Mapping[RowStatus, str]] = MappingProxyType(
-    {
-        RowStatus.NO_RING: "gravity leaves no closed ring at this speed: raise rotor.speed",
-        RowStatus.PORT_UNCOVERED: "the liquid does not reach the port, so gas passes through and the chamber "
-        "cannot be emptied further: move tube.port_radius towards disc.outer_radius",
-        RowStatus.OVER_CREST: "the level lies inside the siphon crest, or there is none, so liquid runs back "
-        "while the gas is off: lower disc.max_fill_ratio or tube.hump_radius",
-        RowStatus.GAS_DRAWN: "less than the residual liquid, so gas is drawn into the port and the velocity "
-        "is not that of liquid alone: empty a chamber down to its residual fill ratio only",
-        RowStatus.LIQUID_COMPRESSED: "the pressure makes the liquid denser by more than any model here holds "
-        "for: lower rotor.speed, gas.pressure or disc.max_fill_ratio",
-    }
-)
 
 
 def _row_status(

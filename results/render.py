@@ -23,12 +23,13 @@ Facts = Sequence[tuple[str, str]]
 """Names and texts."""
 
 
-def findings_text(findings: Iterable[Finding]) -> Group:
-    """One sentence a finding, the first as a headline."""
-    texts = (
-        Text(each.text, style=f"{'bold ' if place == 0 else ''}{_STYLES[each.severity]}")
-        for place, each in enumerate(findings)
-    )
+def findings_text(findings: Iterable[Finding], *, headline: bool = True) -> Group:
+    """One sentence a finding; the first may be a headline."""
+    texts = []
+    for place, each in enumerate(findings):
+        first = headline and place == 0
+        colour = "" if each.severity == "info" and not first else _STYLES[each.severity]
+        texts.append(Text(each.text, style=f"{'bold ' if first else ''}{colour}"))
     return Group(*texts)
 
 
@@ -59,7 +60,7 @@ def terminal_table(table: Table) -> RichTable:
         title_style="bold",
         header_style="bold",
         box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
+        padding=0,
         pad_edge=False,
     )
     for head, numeric in zip(table.heads, table.numeric, strict=True):

@@ -9,6 +9,7 @@ from html import escape
 from typing import Any, ClassVar, Final
 
 from rich.console import Group, RenderableType
+from rich.text import Text
 
 from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import plain
@@ -52,14 +53,17 @@ class Rows:
             "findings": [each.document() for each in self.findings],
         }
 
-    def view(self, *more: RenderableType) -> RenderableType:
-        """What a command prints: findings as sentences, quantities, then `more`, then the tables."""
-        return Group(
-            findings_text(self.findings),
-            two_columns([*self.facts, *quantity_rows(self.quantities)]),
-            *more,
-            *(terminal_table(table) for table in self.tables if table.rows),
-        )
+    def view(self, *more: RenderableType, headline: bool = True) -> RenderableType:
+        """What a command prints: findings as sentences, quantities, then `more`, then the tables.
+
+        Args: `headline`: whether the first finding is one; otherwise the title is, and findings come later.
+        """
+        numbers = two_columns([*self.facts, *quantity_rows(self.quantities)])
+        tables = (terminal_table(table) for table in self.tables if table.rows)
+        if headline:
+            return Group(findings_text(self.findings), numbers, *more, *tables)
+        sentences = findings_text(self.findings, headline=False)
+        return Group(Text(self.title, style="bold"), numbers, *more, sentences, *tables)
 
     def lines(self) -> Iterator[str]:
         """About five lines: what it is, its main numbers with units, and the verdict."""

@@ -30,6 +30,7 @@ _FEW, _MANY = 3, 500
 """Panels of four Gauss points; many where the surface may leave the outer wall."""
 _STEP: Final = 0.05
 """Of the surface's radius, mm, for the derivative dU/dV: a relative error of (step/radius)^2."""
+MESH_FINDINGS = ("off_axis", "outer_wall_faces_inward", "coarse_curves")
 _CLOSE: Final = 1e-4
 """What chambers of second-order cells of a few millimetres are asked for."""
 
@@ -181,6 +182,11 @@ def calibrated(folder: Path, geometry: ChamberGeometry) -> tuple[Scene, dict[str
     return scene, calibration_document(rb.calibrate(scene))
 
 
+def mesh_findings(document: dict[str, Any]) -> list[dict[str, Any]]:
+    """Findings on the mesh."""
+    return [each for each in document["findings"] if each["code"] in MESH_FINDINGS]
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_foreign_chamber_meets_its_own_quadrature(name: str, tmp_path: Path) -> None:
     """Volume, moment, lambda, head and stall, within what is printed with each and within 1e-4."""
@@ -210,7 +216,7 @@ def test_a_foreign_chamber_meets_its_own_quadrature(name: str, tmp_path: Path) -
     assert np.all(off <= _CLOSE * heads)
     assert found["check"]["agrees"]
     assert found["status"]["code"] == found["lambda"]["status"] == "ok"
-    assert found["findings"] == []
+    assert mesh_findings(found) == []
 
 
 @pytest.mark.parametrize("name", ["cone", "neck"])
@@ -266,8 +272,8 @@ def test_a_chamber_beside_the_shaft_is_named(
     straight = mesh(SHAPES["taper"])
     moved = replace(straight, points=straight.points + np.array([*shift, 0.0]))
     _, found = calibrated(tmp_path, moved)
-    assert [each["code"] for each in found["findings"]] == codes
-    for each in found["findings"]:
+    assert [each["code"] for each in mesh_findings(found)] == codes
+    for each in mesh_findings(found):
         assert each["values"]["distance_m"] == pytest.approx(1e-3 * np.hypot(*shift), rel=1e-3)
     assert found["status"]["code"] == "ok"
     assert found["lambda"]["uncertainty_m"] < 2e-3 * found["lambda"]["per_transferred_mass_m"]
@@ -278,7 +284,7 @@ def test_an_outer_wall_that_faces_inward_is_named(tmp_path: Path) -> None:
     named = chamber.boundaries
     both = {"outer_wall": np.concatenate([named["outer_wall"], named["inner_wall"]])}
     _, found = calibrated(tmp_path, replace(chamber, boundaries=both))
-    (finding,) = found["findings"]
+    (finding,) = mesh_findings(found)
     assert finding["code"] == "outer_wall_faces_inward"
     # Arcs of the same angle and width.
     assert finding["values"]["area_share"] == pytest.approx(INNER / (INNER + OUTER), rel=1e-4)
@@ -304,4 +310,4 @@ def test_cells_coarser_than_a_pillar_are_named_and_counted(edges: int, tmp_path:
         ("moment", scene.liquid.density * shape.totals(full)[1] * 1e-12),
     ):
         assert abs(budgets[quantity]["value"] - value) <= budgets[quantity]["total"]
-    assert [each["code"] for each in found["findings"]] == (["coarse_curves"] if edges <= 12 else [])
+    assert [each["code"] for each in mesh_findings(found)] == (["coarse_curves"] if edges <= 12 else [])

@@ -15,7 +15,6 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import share_across
-from ringbalance.reduced_model.cli import _summary_rows
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.loading import load_law
@@ -107,8 +106,8 @@ def test_the_angle_of_the_moment_is_reported(scene: Scene) -> None:
     calibration = calibrate(aside(scene, np.radians(2.0)))
     told = calibration_document(calibration)["chamber"]["moment_angle_rad"]
     np.testing.assert_allclose(told, np.radians(2.0), rtol=1e-5)
-    rows = dict(_summary_rows(calibration))
-    assert rows["direction"].startswith("a pair acts 2 deg from the middle")
+    (aside_by,) = (each for each in calibration.rows().findings if each.code == "moment_aside")
+    assert aside_by.values["angle_equal"] == pytest.approx(np.radians(2.0), rel=1e-5)
 
 
 def test_a_gas_pressure_at_which_nothing_flows(scene: Scene) -> None:

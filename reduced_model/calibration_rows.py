@@ -1,0 +1,253 @@
+"""A calibration as rows: its quantities with intervals, its findings, and the tables that a person reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from ringbalance.reduced_model.budget import Budget
+from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
+from ringbalance.reduced_model.documents import (
+    PRESSURE_FACTORS,
+    RowStatus,
+    chamber_status,
+    paper_columns,
+    velocity_status,
+)
+from ringbalance.reduced_model.gas_line import line_text, line_warning
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.results.findings import Finding, sentences
+from ringbalance.results.numbers import believed, given, rounded
+from ringbalance.results.result import Rows
+from ringbalance.results.rows import Parts, Quantity, around
+from ringbalance.results.table import Table, models_table
+
+_NAMES: Final = MappingProxyType(
+    {
+        "lambda": ("lambda per transferred mass", "λ"),
+        "usable_moment": ("usable moment of a pair", "U"),
+        "velocity": ("velocity at the operating point", "u"),
+        "drag_coefficient": ("k there", "k"),
+        "chamber_volume": ("volume of a chamber", "V"),
+        "wall_pressure": ("wall pressure, largest fill", "p"),
+        "moment": ("moment of a chamber, largest fill", "U"),
+        "least_fill_ratio": ("smallest usable fill ratio", "x"),
+        "stall_pressure": ("full siphon stalls, chamber empty", "p"),
+        "priming_pressure_vented": ("priming pressure, vented", "p"),
+        "priming_pressure_trapped": ("priming pressure, trapped", "p"),
+        "crest_pressure": ("gauge pressure over the crest", "p"),
+        "cavitation_margin": ("cavitation margin over the crest", "Δp"),
+    }
+)
+"""Of the budgets' quantities: name and symbol, in the order in which they are shown."""
+_ASIDE: Final = 0.01
+"""Angle below which a chamber counts as symmetric, deg."""
+_MARKS: Final = MappingProxyType(
+    {Regime.SIPHON: "", Regime.SEPARATED: "*", Regime.REVERSE: "r", Regime.UNDECIDED: "?"}
+)
+
+
+def calibration_rows(calibration: Calibration) -> Rows:
+    """Quantities with their expanded uncertainties (95 %), findings, and tables over fill and velocity."""
+    scene, point = calibration.scene, calibration.operating_point
+    where = f"{given(point.gas_pressure, 'Pa')}, equal fills of {point.fill_ratio:g}: {point.regime.label}"
+    return Rows(
+        title=f"Calibration of {scene.name} ({scene.source})",
+        quantities=tuple(_quantities(calibration)),
+        findings=tuple(_findings(calibration)),
+        facts=(("operating point", where), ("gas line", line_text(calibration.gas_line))),
+        tables=(
+            _chamber_table(calibration),
+            _tube_table(calibration),
+            _law_table(calibration),
+            models_table(calibration.models_used),
+        ),
+    )
+
+
+def _known(calibration: Calibration, value: float, total: float | None) -> float | None:
+    """An uncertainty, as far as the scene's inputs can be believed."""
+    return believed(value, total, stated=bool(calibration.scene.uncertainty))
+
+
+def _quantities(calibration: Calibration) -> Iterator[Quantity]:
+    budgets, rest, tube = calibration.budgets, calibration.residual, calibration.tube_liquid
+    moment, fill = budgets["usable_moment"].total, budgets["least_fill_ratio"].total
+    yield from (_of_budget(calibration, name, budgets[name]) for name in _NAMES if name in budgets)
+    volume = 2 * fill * calibration.chamber.volume
+    rows = (
+        ("reach", "usable moment in any direction", "kg m", rest.reach, rest.reach_share * moment),
+        ("usable_volume", "usable volume of a pair", "m^3", rest.usable_volume, volume),
+        ("residual_depth", "liquid over the port as gas enters", "m", rest.depth, rest.depth_uncertainty),
+        ("largest_fill_ratio", "largest usable fill ratio", "1", rest.largest_fill_ratio, fill),
+        ("lambda_variation", "variation of lambda over fills", "1", calibration.lambda_variation, None),
+        (
+            "stall_pressure_paper",
+            "stall pressure by Eq. 19",
+            "Pa",
+            calibration.operating_point.stall_paper,
+            None,
+        ),
+        ("flowing_vibration", "vibration by tube liquid, flowing", "m", tube.flowing_vibration, None),
+        ("lasting_vibration", "vibration by tube liquid, lasting", "m", tube.lasting_vibration, None),
+        ("returned_volume", "liquid that falls back", "m^3", tube.returned_volume, None),
+    )
+    for key, name, unit, value, total in rows:
+        low, high = around(value, _known(calibration, value, total) or 0.0)
+        yield Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, digits=3)
+
+
+def _of_budget(calibration: Calibration, key: str, budget: Budget) -> Quantity:
+    name, symbol = _NAMES[key]
+    low, high = around(budget.value, _known(calibration, budget.value, budget.total) or 0.0)
+    return Quantity(
+        key=key,
+        name=name,
+        symbol=symbol,
+        unit=budget.unit,
+        value=budget.value,
+        lower=low,
+        upper=high,
+        parts=Parts(numerical=budget.numerical, input=budget.input, model=budget.model),
+    )
+
+
+def _findings(calibration: Calibration) -> Iterator[Finding]:
+    scene, status, line = calibration.scene, calibration.chamber.status, line_warning(calibration.gas_line)
+    if not status.ok:
+        yield Finding(code="out_of_range", values={"text": status.text})
+    yield from mesh_findings(scene)
+    yield from _flow_findings(calibration)
+    if calibration.holding.finding is not None:
+        yield calibration.holding.finding
+    if calibration.instability is not None and calibration.instability.finding is not None:
+        yield calibration.instability.finding
+    if line:
+        yield Finding(code="gas_line", values={"text": line})
+    yield from _direction(calibration)
+    if not scene.uncertainty:
+        yield Finding(code="uncertainty_unstated")
+    yield Finding(code="identifiability")
+
+
+def _flow_findings(calibration: Calibration) -> Iterator[Finding]:
+    point, rest, budgets = calibration.operating_point, calibration.residual, calibration.budgets
+    if point.regime is Regime.BLOCKED:
+        names = ("priming_pressure_vented", "stall_pressure")
+        needed = max(budgets[name].value for name in names if name in budgets)
+        yield Finding(code="blocked", values={"gas_pressure": point.gas_pressure, "pressure": needed})
+    if rest.least_fill_ratio > 0:
+        code = "draw_down" if rest.limited_by == "draw_down" else "gas_stalls"
+        yield Finding(code=code, values={"fill_ratio": rest.least_fill_ratio, "depth": rest.depth})
+    if point.cavitation_margin is not None:
+        margin, known = point.cavitation_margin, budgets.get("cavitation_margin")
+        width = (point.cavitation_margin_uncertainty or 0.0) if known is None else known.total
+        held = "crest_column_holds" if margin > 0 else "crest_column_separates"
+        yield Finding(
+            code="crest_column_undecided" if abs(margin) < width else held,
+            values={"margin": abs(margin), "cavity_pressure": point.cavity_pressure},
+        )
+
+
+def _direction(calibration: Calibration) -> Iterator[Finding]:
+    """Where an imported chamber is not symmetric, the angle from its middle in which its pair acts."""
+    total, moment = calibration.scene.disc.max_fill_ratio, calibration.flow_law.moment
+    fill = total * np.linspace(0.525, 1.0, 20)
+    angles = np.angle(moment.pair_vector(fill_ratio=fill, opposite_fill_ratio=total - fill))
+    if np.degrees(np.max(np.abs(angles))) >= _ASIDE:
+        numbers = {"angle_equal": float(angles[0]), "angle_full": float(angles[-1])}
+        yield Finding(code="moment_aside", values=numbers)
+
+
+def _legend(states: tuple[RowStatus, ...]) -> str:
+    """What limits some rows."""
+    return "; ".join(f"{s}: {sentences()[s].text}" for s in RowStatus if s in states and s != RowStatus.OK)
+
+
+def _chamber_table(calibration: Calibration) -> Table:
+    chamber, at = calibration.chamber, list(calibration.chamber.reported)
+    states, columns = chamber_status(calibration), paper_columns(calibration, chamber.fill_ratio[at])
+    legend = _legend(states)
+    pressure, moment = (
+        np.maximum(np.hypot(curve.uncertainty, curve.inputs), 1e-9 * np.max(curve.value))
+        for curve in (chamber.wall_pressure, chamber.moment)
+    )
+
+    def cell(value: float, total: float, factor: float) -> str:
+        known = _known(calibration, value, total)
+        return rounded(factor * value, None if known is None else factor * known)
+
+    rows = []
+    for row, i in enumerate(at):
+        p, u = float(chamber.wall_pressure.value[i]), float(chamber.moment.value[i])
+        by_paper = [float(columns[name][row]) for name in ("wall_pressure_paper_Pa", "moment_paper_kg_m")]
+        rows.append(
+            (
+                f"{chamber.fill_ratio[i]:g}",
+                f"{1e3 * chamber.ring.surface_radius[i]:.2f}",
+                cell(p, pressure[i], 1e-6),
+                cell(by_paper[0], pressure[i], 1e-6),
+                _off(by_paper[0], p),
+                cell(u, moment[i], 1e6),
+                cell(by_paper[1], moment[i], 1e6),
+                _off(by_paper[1], u),
+                *([str(states[row])] if legend else []),
+            )
+        )
+    heads = ("fill", "R1' mm", "p MPa", "Eq. 12", "off %", "U g mm", "Eq. 7", "off %")
+    return Table(caption="Chamber", heads=(*heads, *(["state"] if legend else [])), rows=rows, note=legend)
+
+
+def _off(value: float, reference: float) -> str:
+    """Percent, a zero without sign."""
+    shown = f"{100 * (value / reference - 1):+.1f}" if reference else ""
+    return "0.0" if shown in ("+0.0", "-0.0") else shown
+
+
+def _tube_table(calibration: Calibration) -> Table:
+    tube = calibration.tube
+    terms = {name: term for name, term in tube.terms.items() if np.any(term)}
+    rows = [
+        (
+            f"{tube.velocity[i]:.3g}",
+            f"{tube.reynolds[i]:.0f}",
+            *(rounded(float(v[i]), float(tube.k.uncertainty[i])) for v in (tube.k.value, tube.k.uncertainty)),
+            f"{tube.flow_state[i]}{'' if tube.in_range[i] else '*'}",
+            *(f"{term[i]:.3g}" for term in terms.values()),
+        )
+        for i in dict.fromkeys(np.linspace(0, tube.velocity.size - 1, 9).astype(int).tolist())
+    ]
+    note = "* outside the range of a source: " + "; ".join(tube.range_notes) if tube.range_notes else ""
+    return Table(caption="Tube", heads=("u m/s", "Re", "k", "±", "state", *terms), rows=rows, note=note)
+
+
+def _law_table(calibration: Calibration) -> Table:
+    x = np.linspace(0, calibration.flow_law.max_fill_ratio, 5)
+    states, rows = velocity_status(calibration, x), []
+    for pressure in np.multiply(PRESSURE_FACTORS, calibration.scene.gas.pressure):
+        flow = calibration.flow_law.evaluate(fill_ratio=x, gas_pressure=pressure)
+        by_paper = calibration.paper_law.evaluate(fill_ratio=x, gas_pressure=pressure).velocity
+        cells = zip(flow.regime, flow.velocity, flow.uncertainty, by_paper, strict=True)
+        shown = (_velocity(calibration, Regime(int(r)), *values) for r, *values in cells)
+        rows.append((f"{pressure / 1e6:.3g}", *shown))
+    note = (
+        "* separated at the siphon crest, ? siphon or separated is undecided, r reverse, - blocked; "
+        "x is the driven chamber's fill ratio"
+    )
+    if legend := _legend(states):
+        rows.append(("state", *(str(state) for state in states)))
+    heads = ("MPa", *(f"x = {v:.3g}" for v in x))
+    caption = "Velocity from an empty tube, m/s (Eq. 19)"
+    return Table(caption=caption, heads=heads, rows=rows, note="; ".join(filter(None, (note, legend))))
+
+
+def _velocity(
+    calibration: Calibration, regime: Regime, velocity: float, total: float, by_paper: float
+) -> str:
+    text = rounded(velocity, _known(calibration, velocity, total))
+    shown = "-" if regime is Regime.BLOCKED else f"{text}{_MARKS[regime]}"
+    return f"{shown} ({by_paper:.1f})"

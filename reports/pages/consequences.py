@@ -1,15 +1,10 @@
-"""What a wrong k costs the machine, as tables of text and one figure, from the evidence's `consequences`."""
+"""What a wrong k costs the machine, as tables of text, from the evidence's `consequences`."""
 
 from __future__ import annotations
 
 from types import MappingProxyType
 from typing import Final
 
-import numpy as np
-from matplotlib.axes import Axes
-
-from ringbalance.reports.figures import style
-from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.section import Record, Section, Table, Work
 from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.results.numbers import MISSING, number, percent, short, shown
@@ -39,7 +34,6 @@ def _view(found: Record, _evidence: Record) -> Record:
         "gains": _gain_table(found["gain"]),
         "runs": _run_table(found["runs"]),
         "chances": _chance_table(found["ensembles"]),
-        "figure": _gain_margin(found["gain"][-1]) if found["gain"] else None,
     }
 
 
@@ -119,49 +113,6 @@ def _times(quantiles: Record | None) -> str:
         for key in ("0.05", "0.5", "0.95")
     )
     return f"{middle} ({low}; {high})"
-
-
-def _gain_margin(gain: Record) -> Drawing:
-    """Gains at which the loop starts to overshoot and to be unstable, over the tube's drag coefficient.
-
-    Args: `gain`: one law's entry of `gain`, SI.
-    """
-    curve = gain["over_drag_coefficient"]
-    k, seen = np.asarray(curve["values"]), np.asarray(curve["simulated_values"])
-    lines = (
-        ("overshoot_gain", "simulated_overshoot_gain", style.FOUND, "overshoot from"),
-        ("instability_gain", "simulated_instability_gain", style.PAPER, "unstable from"),
-    )
-    scene = gain["proportional_s_per_m"] * 1e-6
-
-    def paint(axes: Axes) -> None:
-        for analytic, simulated, colour, label in lines:
-            axes.plot(k, np.asarray(curve[analytic]) * 1e-6, color=colour, label=label)
-            axes.plot(seen, np.asarray(curve[simulated], dtype=float) * 1e-6, "o", color=colour, markersize=4)
-        axes.axhline(scene, color=style.MUTED, linewidth=1, linestyle=":", label="Kc in the scene")
-        axes.plot(
-            [gain["drag_coefficient"]], [scene], "D", color=style.INK, markersize=5, label="this machine"
-        )
-        values = np.concatenate([np.asarray(curve[name]) * 1e-6 for name, *_ in lines] + [[scene]])
-        low, high = values.min() * 0.8, values.max() * 1.25
-        style.logarithmic(axes, "x", within=(k[0], k[-1]))
-        style.logarithmic(axes, "y", within=(low, high))
-        axes.set_ylim(low, high)
-
-    return draw(
-        columns=4,
-        x="drag coefficient k at equal fills",
-        y="Kc in s/µm",
-        name="gain-margin",
-        paint=paint,
-        wide=True,
-        height=3.4,
-        alt="Gains at which the loop overshoots and at which it is unstable, both growing with k; the "
-        f"scene’s gain is {_gain(gain['proportional_s_per_m'])} at k = "
-        f"{number(gain['drag_coefficient'], digits=3)}.",
-        caption="How much gain the loop bears, over the drag coefficient the tube really has. Lines: one "
-        "operation takes away once and twice the residual. Dots: by simulation.",
-    )
 
 
 SECTION: Final = Section(

@@ -116,7 +116,6 @@ def test_the_page_comes_from_the_evidence_file_alone(first: Report) -> None:
 def test_the_consequences_of_a_wrong_k_are_reported(first: Report) -> None:
     page, found = (first.page.parent / "annex.html").read_text(), first.evidence["consequences"]
     assert 'href="#consequences"' in page
-    assert (first.page.parent / "figures" / "gain-margin.svg").exists()
     start = page.index("One run each", page.index('id="consequences"'))
     assert len(found["runs"]) == page.count("<tr>", start, page.index("Probabilities over")) - 1
 

@@ -8,9 +8,10 @@ alike.  Mid-nodes of diagonals lie where the cell's own map puts them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from skfem import MeshTet1, MeshTet2
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.elements import (
@@ -184,3 +185,20 @@ def compacted(body: Tetrahedra) -> Tetrahedra:
     used, numbers = np.unique(body.cells, return_inverse=True)
     cells = numbers.reshape(body.cells.shape)
     return Tetrahedra(nodes=body.nodes[used], cells=cells, faces=body.faces, names=body.names)
+
+
+def scikit_fem_mesh(body: Tetrahedra) -> Any:
+    """`skfem.MeshTet2` of a body, m, with its boundaries by name."""
+    corners, cells = np.unique(body.cells[:, :4], return_inverse=True)
+    straight = MeshTet1(
+        *(np.ascontiguousarray(each.T) for each in (body.nodes[corners], cells.reshape(-1, 4)))
+    )
+    places = MeshTet2.from_mesh(straight).doflocs
+    # Its nodes are the corners, then the edges; both number a cell's edges alike, faces the other way round.
+    places[:, corners.size + straight.t2e] = body.nodes[body.cells[:, 4:]].T
+    named = {
+        name: np.concatenate([straight.t2f[3 - k][body.faces[:, k] == number] for k in range(4)])
+        for number, name in enumerate(body.names)
+        if (body.faces == number).any()
+    }
+    return MeshTet2(places, straight.t, named)

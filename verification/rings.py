@@ -9,11 +9,14 @@ from contextlib import contextmanager
 from functools import lru_cache
 from unittest.mock import patch
 
+import numpy as np
+
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.convergence import Verdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
-from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid
+from ringbalance.physics.pressure.solve import RotatingLiquid
 from ringbalance.physics.results import Estimate
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Convergence, Found, from_half_width
 from ringbalance.verification.paper_numbers import RING_RADIUS, with_plate
@@ -84,17 +87,14 @@ def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> 
 
 
 @contextmanager
-def mutated_pressure(*, source: float = 1.0, wall: float = 1.0) -> Iterator[None]:
-    """Multiply the source term and the walls' condition of every rotating liquid solved inside."""
-    true = RotatingLiquid.problem
+def mutated_force(*, along: float = 1.0, across: float = 1.0) -> Iterator[None]:
+    """Multiply the body force of every liquid solved inside, along the chamber's middle and across it."""
+    true = RotatingLiquid.body_force
 
-    def problem(liquid: RotatingLiquid) -> PressureProblem:
-        exact = true(liquid)
-        return PressureProblem(
-            source=lambda places: source * exact.source(places),
-            wall_flux=lambda places, normals: wall * exact.wall_flux(places, normals),
-            surface_pressure=exact.surface_pressure,
-        )
+    def body_force(liquid: RotatingLiquid, places: FloatArray) -> FloatArray:
+        force = true(liquid, places)
+        force[:2] *= np.array([along, across]).reshape(2, *[1] * (force.ndim - 1))
+        return force
 
-    with patch.object(RotatingLiquid, "problem", problem):
+    with patch.object(RotatingLiquid, "body_force", body_force):
         yield

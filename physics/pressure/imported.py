@@ -13,15 +13,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from skfem.quadrature import get_quadrature
 
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.cut.faceting import SAFETY, faceting
 from ringbalance.mesh.liquid_body import Level, liquid_body
-from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, tetrahedra
-from ringbalance.physics.pressure.linear import LinearSolution, solve_linear
-from ringbalance.physics.pressure.solve import PressureProblem, RotatingLiquid
-from ringbalance.physics.pressure.tetrahedra import Facets, TetrahedronSpace
+from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, scikit_fem_mesh, tetrahedra
+from ringbalance.physics.pressure.elements import Side, quadratic_basis, side
+from ringbalance.physics.pressure.solve import RotatingLiquid, solve_on
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
@@ -85,23 +84,23 @@ def solved_ring(
     no_ring = float(np.hypot(*tilt[:2])) >= surface_radius
     start = Level(constant=level.constant) if no_ring else level
     body, status = _held_volume(tetrahedra(geometry), start, surface_radius)
-    space = TetrahedronSpace(body=body.liquid)
+    mesh = scikit_fem_mesh(body.liquid)
+    basis = quadratic_basis(mesh)
     liquid = RotatingLiquid(
         density=density, angular_velocity=angular_velocity, gravity=gravity, gas_pressure=gas_pressure
     )
-    linear = solve_on(space, liquid.problem())
-    exact = density * angular_velocity**2 * body.level.value(space.body.nodes) + gas_pressure
+    linear = solve_on(basis, liquid.problem())
+    exact = density * angular_velocity**2 * body.level.value(mesh.doflocs.T) + gas_pressure
     status = _NO_RING if no_ring else (status if linear.status.ok else linear.status)
-    walls = {name: space.facets(name) for name in space.boundaries if name != FREE_SURFACE}
+    walls = {name: side(mesh, name) for name in mesh.boundaries if name != FREE_SURFACE}
     # What the facets of the outer wall leave of r^2 there stands for the other walls, too.
     doubt = density * angular_velocity**2 / 2 * SAFETY * faceting(geometry).wall
     mean, still = (_mean(walls[OUTER_WALL], values) for values in (linear.values, exact))
-    weights = space.weights
     return ImportedRing(
         wall_pressure=Estimate(value=np.array(mean), uncertainty=np.array(abs(mean - still) + doubt)),
-        loads={name: _load(facets, linear.values, exact, doubt) for name, facets in walls.items()},
-        volume=float(weights.sum()),
-        first_moment=density * weights @ space.points,
+        loads={name: _load(wall, linear.values, exact, doubt) for name, wall in walls.items()},
+        volume=float(basis.dx.sum()),
+        first_moment=density * np.sum(basis.dx * np.asarray(basis.global_coordinates()), axis=(1, 2)),
         status=status,
         statistics=linear.statistics,
     )
@@ -121,7 +120,9 @@ class _Held:
 
 def _body_volume(body: Tetrahedra) -> float:
     """m^3."""
-    return float(TetrahedronSpace(body=body).weights.sum())
+    mesh = scikit_fem_mesh(body)
+    points, weights = get_quadrature(mesh.refdom, 2)
+    return float(np.sum(np.abs(mesh.mapping().detDF(points)) @ weights))
 
 
 def _held_volume(chamber: Tetrahedra, level: Level, radius: float) -> tuple[_Held, Status]:
@@ -131,57 +132,29 @@ def _held_volume(chamber: Tetrahedra, level: Level, radius: float) -> tuple[_Hel
         return _Held(liquid=liquid, level=level), Status()
     target = _body_volume(liquid_body(chamber, Level(constant=radius**2 / 2)))
     for _ in range(_MOST_STEPS):
-        surface = TetrahedronSpace(body=liquid).facets(FREE_SURFACE)
+        surface = side(scikit_fem_mesh(liquid), FREE_SURFACE)
         shortage = target - _body_volume(liquid)
         if abs(shortage) <= _VOLUME_TOLERANCE * target:
             return _Held(liquid=liquid, level=level), Status()
         # A level lower by d moves the surface out of the liquid by d / |gradient|.
-        growth = np.sum(surface.weights / np.linalg.norm(level.gradient(surface.points), axis=-1))
+        growth = np.sum(
+            surface.weights / np.linalg.norm(level.gradient(np.moveaxis(surface.points, 0, -1)), axis=-1)
+        )
         level = Level(constant=level.constant - shortage / float(growth), tilt=level.tilt)
         liquid = liquid_body(chamber, level)
     text = "no free surface under gravity holds this volume: use a finer mesh"
     return _Held(liquid=liquid, level=level), Status(code=StatusCode.NOT_CONVERGED, text=text)
 
 
-def solve_on(space: TetrahedronSpace, problem: PressureProblem) -> LinearSolution:
-    """Nodal pressure, Pa, of a problem on the liquid's body: values given on the free surface alone.
-
-    Source: quadratic elements, order three in the pressure and four in its integrals.
-    """
-    load = -space.load(problem.source(space.points.T))
-    for name in space.boundaries:
-        if name != FREE_SURFACE:
-            facets = space.facets(name)
-            load += facets.load(_flux(problem, facets), unknowns=space.unknowns)
-    surface = np.unique(space.facets(FREE_SURFACE).nodes)
-    values = np.zeros(space.unknowns)
-    values[surface] = problem.surface_pressure(space.body.nodes[surface].T)
-    free = np.setdiff1d(np.arange(space.unknowns), surface)
-    rows = space.stiffness[free]
-    linear = solve_linear(
-        csr_matrix(rows[:, free]), load[free] - rows @ values, prolongation=lambda: space.prolongation(free)
-    )
-    values[free] = linear.values
-    return LinearSolution(values=values, status=linear.status, statistics=linear.statistics)
+def _mean(wall: Side, nodal: FloatArray) -> float:
+    return float(np.sum(wall.weights * wall.at_points(nodal)) / wall.weights.sum())
 
 
-def _flux(problem: PressureProblem, facets: Facets) -> FloatArray:
-    weights = facets.weights
-    normals = facets.area / weights[..., None]
-    flux = problem.wall_flux(np.moveaxis(facets.points, -1, 0), np.moveaxis(normals, -1, 0))
-    return np.asarray(flux * weights)
-
-
-def _mean(facets: Facets, nodal: FloatArray) -> float:
-    weights = facets.weights
-    return float(np.sum(weights * facets.at_points(nodal)) / weights.sum())
-
-
-def _load(facets: Facets, nodal: FloatArray, exact: FloatArray, doubt: float) -> _BoundaryLoad:
+def _load(wall: Side, nodal: FloatArray, exact: FloatArray, doubt: float) -> _BoundaryLoad:
     """With a doubt of the pressure by the walls' facets, Pa."""
-    found, still = (_resultants(facets, values) for values in (nodal, exact))
-    area = float(facets.weights.sum())
-    reach = float(np.linalg.norm(facets.points, axis=-1).max())
+    found, still = (_resultants(wall, values) for values in (nodal, exact))
+    area = float(wall.weights.sum())
+    reach = float(np.linalg.norm(wall.points, axis=0).max())
     facet = doubt * area * np.array([[1.0], [reach]])
     estimates = [
         Estimate(value=value, uncertainty=np.abs(value - other) + extra)
@@ -190,6 +163,6 @@ def _load(facets: Facets, nodal: FloatArray, exact: FloatArray, doubt: float) ->
     return _BoundaryLoad(force=estimates[0], moment=estimates[1], area=area)
 
 
-def _resultants(facets: Facets, nodal: FloatArray) -> tuple[FloatArray, FloatArray]:
-    push = facets.area * facets.at_points(nodal)[..., None]
-    return push.sum(axis=(0, 1)), np.cross(facets.points, push).sum(axis=(0, 1))
+def _resultants(wall: Side, nodal: FloatArray) -> tuple[FloatArray, FloatArray]:
+    push = wall.area * wall.at_points(nodal)
+    return push.sum(axis=(1, 2)), np.cross(wall.points, push, axis=0).sum(axis=(1, 2))

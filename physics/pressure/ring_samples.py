@@ -9,11 +9,11 @@ import numpy as np
 
 from ringbalance.mesh.chamber import FREE_SURFACE, chamber_mesh
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.pressure.assembly import facet_points, volume_points
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
 from ringbalance.physics.pressure.surface import refined_surface, solve_with_gravity
 from ringbalance.physics.results import Status
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.chamber_file.record import OUTER_WALL
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc
 
@@ -173,47 +173,41 @@ def liquid_integrals(*, solution: PressureSolution, density: float, axial_width:
     Source: definitions; the shape derivative is dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p| over the
         free surface, because a raised pressure level moves the surface by dp/|n.grad p|.
     """
-    chamber = solution.chamber
-    unit, volume = chamber.length_scale, volume_points(chamber)
+    chamber, basis, unit = solution.chamber, solution.basis, solution.chamber.length_scale
     depth = axial_width if chamber.dimension == 2 else unit
     forces, torques = _wall_loads(solution, depth)
     if chamber.dimension == 2:
-        pressure = float(unit**2 * np.sum(volume.weights * volume.at_points(solution.pressure)))
+        pressure = float(unit**2 * np.sum(basis.dx * basis.interpolate(solution.pressure)))
         push = np.array([0.0, 0.0, pressure])
         forces |= {"end_back": -push, "end_front": push}
         torques |= {"end_back": 0.0, "end_front": 0.0}
-    moment = density * unit**3 * depth * np.sum(volume.weights * volume.points, axis=(1, 2))
+    places = np.asarray(basis.global_coordinates())
+    moment = density * unit**3 * depth * np.sum(basis.dx * places, axis=(1, 2))
+    wall = solution.side(OUTER_WALL)
     return _LiquidIntegrals(
-        volume=float(unit**2 * depth * volume.weights.sum()),
+        volume=float(unit**2 * depth * basis.dx.sum()),
         first_moment=np.pad(moment, (0, 3 - len(moment))),
-        wall_pressure=_wall_pressure(solution),
+        wall_pressure=float(np.sum(wall.weights * wall.at_points(solution.pressure)) / wall.weights.sum()),
         moment_per_volume=_moment_per_volume(solution, density),
         force=forces,
         torque=torques,
     )
 
 
-def _wall_pressure(solution: PressureSolution) -> float:
-    wall = facet_points(solution.chamber, "outer_wall")
-    return float(np.sum(wall.weights * wall.at_points(solution.pressure)) / wall.weights.sum())
-
-
 def _moment_per_volume(solution: PressureSolution, density: float) -> float:
-    surface = facet_points(solution.chamber, FREE_SURFACE)
-    gradient = np.zeros(solution.pressure.size)
-    gradient[solution.chamber.grid[0]] = solution.surface_gradient
-    speed = surface.weights / np.abs(surface.at_points(gradient))
+    surface = solution.side(FREE_SURFACE)
+    speed = surface.weights / np.abs(solution.surface_flux(surface))
     return float(density * solution.chamber.length_scale * np.sum(speed * surface.points[0]) / speed.sum())
 
 
 def _wall_loads(solution: PressureSolution, depth: float) -> tuple[dict[str, FloatArray], dict[str, float]]:
     unit = solution.chamber.length_scale
     forces, torques = {}, {}
-    for name in solution.chamber.boundaries:
+    for name in solution.chamber.mesh.boundaries:
         if name == FREE_SURFACE:
             continue
-        wall = facet_points(solution.chamber, name)
-        push = wall.weights * wall.at_points(solution.pressure) * wall.normals
+        wall = solution.side(name)
+        push = wall.at_points(solution.pressure) * wall.area
         turn = wall.points[0] * push[1] - wall.points[1] * push[0]
         total = unit * depth * push.sum(axis=(1, 2))
         forces[name] = np.pad(total, (0, 3 - len(total)))

@@ -1,57 +1,47 @@
 """The pressure of the liquid in a chamber that turns: a Poisson problem with the gas on its free surface.
 
-In the rotating frame liquid at rest obeys grad p = rho (omega^2 r e_r + g).  Its divergence is the equation,
-its normal component the condition on walls:
+In the rotating frame liquid at rest obeys grad p = f, f = rho (omega^2 r e_r + g).  With p = p_gas on the
+free surface the weak form is
 
-    laplace(p) = f                  in the liquid,        f = 2 rho omega^2
-    n . grad p = q                  on walls,             q = rho (omega^2 r e_r + g) . n
-    p = p_gas                       on the free surface
+    int grad p . grad v = int f . grad v      for all v that vanish on the free surface,
 
-and the weak form is int grad p . grad v = - int f v + int_walls q v.  Manufactured solutions put their own
-f, q and p_gas into the same record, so they run through the same lines.
+which holds laplace(p) = div f in the liquid and n . grad p = n . f on all walls at once.  Manufactured
+solutions put their own f and p_gas into the same record, so they run through the same lines.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from skfem import DiscreteField, LinearForm
+from skfem.helpers import dot, grad
 
 from ringbalance.mesh.chamber import FREE_SURFACE, ChamberMesh
-from ringbalance.physics.pressure.assembly import Stiffness, facet_points, gauss_line, volume_points
-from ringbalance.physics.pressure.linear import Form, LinearSolution, solve_form
-from ringbalance.physics.pressure.separable import mass_inverse, stiffness_inverse
+from ringbalance.physics.pressure.elements import (
+    MULTIGRID_FROM,
+    LinearSolution,
+    Side,
+    quadratic_basis,
+    side,
+    solve_linear,
+    stiffness,
+)
 from ringbalance.physics.results import Statistics, Status
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, kw_only=True)
 class PressureProblem:
     """Right-hand sides of the pressure problem, as functions of the place; all lengths in metres."""
 
-    source: Callable[[FloatArray], FloatArray]
-    """f(x), Pa/m^2, from places of shape (dimension, ...)."""
-    wall_flux: Callable[[FloatArray, FloatArray], FloatArray]
-    """q(x, n), Pa/m, from places and outward unit normals."""
+    force: Callable[[FloatArray], FloatArray]
+    """f(x), Pa/m, from places of shape (dimension, ...), in their shape."""
     surface_pressure: Callable[[FloatArray], FloatArray]
     """p_gas(x), Pa, gauge."""
-
-    def discretise(self, *, chamber: ChamberMesh) -> _DiscreteProblem:
-        """Form and load of the weak problem; the free surface is left without a condition."""
-        unit, volume = chamber.length_scale, volume_points(chamber)
-        total = -(unit**2) * volume.load(self.source(unit * volume.points), unknowns=chamber.grid.size)
-        for name in chamber.boundaries:
-            if name != FREE_SURFACE:
-                total += self.wall_load(chamber=chamber, boundary=name)
-        return _DiscreteProblem(stiffness=Stiffness.of(chamber), load=total)
-
-    def wall_load(self, *, chamber: ChamberMesh, boundary: str) -> FloatArray:
-        """Part of the load that one boundary contributes, int q v, in the mesh's unit of length."""
-        unit = chamber.length_scale
-        facets = facet_points(chamber, boundary)
-        flux = self.wall_flux(unit * facets.points, facets.normals)
-        return unit * facets.load(flux, unknowns=chamber.grid.size)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,20 +70,20 @@ class RotatingLiquid:
         return self.density * force
 
     def problem(self) -> PressureProblem:
-        """Its right-hand sides: f = 2 rho omega^2, q = rho (omega^2 r e_r + g) . n and the gas pressure."""
-        source = 2 * self.density * self.angular_velocity**2
+        """Its right-hand sides: the body force and the gas pressure."""
         return PressureProblem(
-            source=lambda places: np.full(places.shape[1:], source),
-            wall_flux=lambda places, normals: np.einsum("i...,i...->...", self.body_force(places), normals),
+            force=self.body_force,
             surface_pressure=lambda places: np.full(places.shape[1:], self.gas_pressure),
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PressureSolution:
-    """Nodal pressure on a mesh, with the flux through its free surface."""
+    """Nodal pressure on a chamber's mesh, with the flux through its free surface."""
 
     chamber: ChamberMesh
+    basis: Any
+    """`skfem.Basis` of the quadratic elements on it, lengths in the mesh's unit."""
     pressure: FloatArray
     """At the nodes of `chamber`, Pa, gauge, shape (nodes,)."""
     surface_gradient: FloatArray
@@ -102,71 +92,103 @@ class PressureSolution:
     status: Status
     statistics: Statistics
 
+    def side(self, boundary: str) -> Side:
+        """Quadrature points of one boundary, in the mesh's unit."""
+        return side(self.chamber.mesh, boundary)
 
-@dataclass(frozen=True, kw_only=True)
-class _DiscreteProblem:
-    """Form and load of the weak problem, before any condition on the free surface; lengths in mesh units."""
+    def surface_flux(self, surface: Side) -> FloatArray:
+        """n . grad p at the points of the free surface, Pa/m."""
+        nodal = np.zeros(self.pressure.size)
+        nodal[self.chamber.grid[0]] = self.surface_gradient
+        return surface.at_points(nodal)
 
-    stiffness: Stiffness
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WeakProblem:
+    """Matrix and load of the weak form on one mesh, before any condition on the free surface."""
+
+    basis: Any
+    stiffness: csr_matrix
     load: FloatArray
-    """- int f v + int_walls q v."""
 
-    def solve(self, *, start: FloatArray, pinned_surface: bool) -> LinearSolution:
-        """Solve for what is to be added to a starting field.
+    @classmethod
+    def of(cls, basis: Any, force: Callable[[FloatArray], FloatArray], *, unit: float = 1.0) -> WeakProblem:
+        """Args: `force`: f, Pa/m, at places in m. `unit`: of the mesh's lengths, m."""
+        field = DiscreteField(unit * force(unit * np.asarray(basis.global_coordinates())))
+        return cls(basis=basis, stiffness=stiffness(basis), load=_work.assemble(basis, force=field))
 
-        Args: `pinned_surface`: whether the nodes of the free surface keep their values; if not, the load must
-            be in balance, and what is added has no constant part.
-        """
-        # The nodes of the free surface are the first.
-        first = self.stiffness.chamber.grid[0].size if pinned_surface else 0
-
-        def among_free(form: Form) -> Form:
-            return lambda free: form(np.concatenate([np.zeros(first), free]))[first:]
-
-        return solve_form(
-            among_free(self.stiffness.apply),
-            (self.load - self.stiffness.apply(start))[first:],
-            inverse=stiffness_inverse(self.stiffness, pinned_surface=pinned_surface),
-            magnitude=among_free(self.stiffness.magnitude),
-        )
+    def solve(self, *, start: FloatArray, fixed: IntArray) -> LinearSolution:
+        """Solve with the values of `start` kept at some nodes; the solution at all nodes."""
+        free = np.setdiff1d(np.arange(start.size), fixed)
+        matrix = csr_matrix(self.stiffness[free][:, free])
+        right = (self.load - self.stiffness @ start)[free]
+        large = self.basis.mesh.dim() == 3 and free.size > MULTIGRID_FROM
+        linear = solve_linear(matrix, right, multigrid=large)
+        values = start.copy()
+        values[free] += linear.values
+        return LinearSolution(values=values, status=linear.status, statistics=linear.statistics)
 
 
-def solve_pressure(*, chamber: ChamberMesh, problem: PressureProblem) -> PressureSolution:
+@LinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
+def _work(v: Any, w: Any) -> Any:
+    return dot(w.force, grad(v))
+
+
+def solve_on(basis: Any, problem: PressureProblem, *, unit: float = 1.0) -> LinearSolution:
+    """Nodal pressure, Pa, on any mesh of the liquid that names its free surface.
+
+    Args: `basis`: of `quadratic_basis`. `unit`: of the mesh's lengths, m.
+    Source: quadratic elements, order three in the pressure and four in its integrals.
+    """
+    return _solved(WeakProblem.of(basis, problem.force, unit=unit), problem, unit)
+
+
+def _solved(weak: WeakProblem, problem: PressureProblem, unit: float) -> LinearSolution:
+    surface = weak.basis.get_dofs(FREE_SURFACE).all()
+    places = unit * weak.basis.mesh.doflocs[:, surface]
+    # From one value everywhere, or a film's small differences would cancel.
+    start = np.full(weak.basis.N, problem.surface_pressure(places).mean())
+    start[surface] = problem.surface_pressure(places)
+    return weak.solve(start=start, fixed=surface)
+
+
+def solve_pressure(
+    *, chamber: ChamberMesh, problem: PressureProblem, basis: Any | None = None
+) -> PressureSolution:
     """Solve the pressure problem on the mesh of a chamber's liquid.
 
-    int grad p . grad v = - int f v + int_walls q v for all v that vanish on the free surface, p = p_gas
-    there.
-    Args: `chamber`: mesh, two- or three-dimensional, with its named boundaries. `problem`: right-hand sides;
-        `RotatingLiquid.problem` gives the physical ones.
+    Args:
+        chamber: mesh, two- or three-dimensional, with its named boundaries.
+        problem: right-hand sides; `RotatingLiquid.problem` gives the physical ones.
+        basis: of `quadratic_basis` on this mesh, if there is one already.
     Returns: The nodal pressure; its status is NOT_CONVERGED when the true residual of the linear system is
         too large.
-    Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem; elements of the mesh's order p,
-    of order p + 1 in the pressure and 2 p in integrals of it, as long as the geometry is curved.
+    Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem; quadratic elements, order three
+    in the pressure and four in integrals of it.
     """
-    discrete = problem.discretise(chamber=chamber)
-    surface = chamber.grid[0].ravel()
-    on_surface = problem.surface_pressure(chamber.places[:, surface])
-    pressure = np.tile(on_surface, chamber.grid.shape[0])
-    linear = discrete.solve(start=pressure, pinned_surface=True)
-    pressure[surface.size :] += linear.values
-    gradient = _surface_gradient(chamber, discrete, pressure)
+    unit = chamber.length_scale
+    weak = WeakProblem.of(basis or quadratic_basis(chamber.mesh), problem.force, unit=unit)
+    linear = _solved(weak, problem, unit)
+    gradient = _surface_gradient(chamber, weak, problem, linear.values)
     return PressureSolution(
         chamber=chamber,
-        pressure=pressure,
-        surface_gradient=gradient.values.reshape(chamber.grid[0].shape) / chamber.length_scale,
+        basis=weak.basis,
+        pressure=linear.values,
+        surface_gradient=gradient.values.reshape(chamber.grid[0].shape),
         status=gradient.status if linear.status.ok else linear.status,
         statistics=linear.statistics,
     )
 
 
 def _surface_gradient(
-    chamber: ChamberMesh, discrete: _DiscreteProblem, pressure: FloatArray
+    chamber: ChamberMesh, weak: WeakProblem, problem: PressureProblem, pressure: FloatArray
 ) -> LinearSolution:
-    """Flux that balances the weak form on the surface, in mesh units: better than the field's gradient."""
-    facets, count = facet_points(chamber, FREE_SURFACE), chamber.grid[0].size
-    return solve_form(
-        lambda flux: facets.load(facets.at_points(flux), unknowns=count),
-        (discrete.stiffness.apply(pressure) - discrete.load)[:count],
-        inverse=mass_inverse(facets, cells=chamber.cells[1:], line=gauss_line(chamber.order)),
-        magnitude=np.abs,
-    )
+    """Flux that balances the weak form on the surface: better than the field's gradient.
+
+    int_surface (n . grad p - n . f) v = int (grad p - f) . grad v.
+    """
+    unit, surface, nodes = chamber.length_scale, side(chamber.mesh, FREE_SURFACE), chamber.grid[0].ravel()
+    force = np.sum(problem.force(unit * surface.points) * surface.normals, axis=0)
+    rest = (weak.stiffness @ pressure - weak.load) / unit + surface.load(force, unknowns=pressure.size)
+    mass = surface.mass(unknowns=pressure.size)
+    return solve_linear(csr_matrix(mass[nodes][:, nodes]), rest[nodes])

@@ -8,15 +8,21 @@ the surface, the surface is in the wrong place; its nodes move along their radii
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ringbalance.mesh.chamber import FREE_SURFACE, ChamberMesh, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
-from ringbalance.physics.pressure.assembly import facet_points, volume_points
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
+from ringbalance.physics.pressure.elements import quadratic_basis, side
+from ringbalance.physics.pressure.solve import (
+    PressureSolution,
+    RotatingLiquid,
+    WeakProblem,
+    solve_pressure,
+)
 from ringbalance.physics.results import Statistics, Status, StatusCode
-from ringbalance.physics.splines import CubicSpline
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
 
@@ -27,6 +33,7 @@ _ROUNDING = 1e-5
 """Below this a move that no longer shrinks is rounding, in mean depths: in a film depths are differences."""
 _SAFE_SHARE = 0.9
 """Share of the way to a wall that a node may go in one step."""
+_VOLUME_ROUNDING = 1e-15
 _NEAREST = 1e-3
 """Gap to a wall, in mean depths, at which the search gives up: the surface wants to cross the wall."""
 
@@ -36,6 +43,7 @@ class _FoundSurface:
     """A mesh whose free surface has constant pressure and holds the given volume."""
 
     chamber: ChamberMesh
+    basis: Any
     status: Status
     steps: int
     last_move: float
@@ -72,7 +80,7 @@ def solve_with_gravity(
     found = find_surface(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=cells, start=start)
     if not found.status.ok:
         return _unsolved(found)
-    solution = solve_pressure(chamber=found.chamber, problem=liquid.problem())
+    solution = solve_pressure(chamber=found.chamber, problem=liquid.problem(), basis=found.basis)
     extra = {
         **solution.statistics.extra,
         "surface_flux_mismatch": surface_flux_mismatch(solution=solution, liquid=liquid),
@@ -88,6 +96,7 @@ def _unsolved(found: _FoundSurface) -> PressureSolution:
     chamber = found.chamber
     return PressureSolution(
         chamber=chamber,
+        basis=found.basis,
         pressure=np.zeros(chamber.grid.size),
         surface_gradient=np.zeros(chamber.grid[0].shape),
         status=found.status,
@@ -120,8 +129,9 @@ def find_surface(
     if no_ring is None:
         return _search(disc, liquid, fill_ratio, cells, concentric if start is None else start)
     chamber = chamber_mesh(disc=disc, surface_radius=concentric, cells=cells)
+    basis = quadratic_basis(chamber.mesh)
     return _FoundSurface(
-        chamber=chamber, status=no_ring, steps=0, last_move=0.0, rounding=0.0, volume_error=0.0
+        chamber=chamber, basis=basis, status=no_ring, steps=0, last_move=0.0, rounding=0.0, volume_error=0.0
     )
 
 
@@ -134,25 +144,27 @@ def _search(
 ) -> _FoundSurface:
     target = _target(disc, fill_ratio, len(cells))
     first = chamber = chamber_mesh(disc=disc, surface_radius=start, cells=cells)
+    unmoved = basis = quadratic_basis(chamber.mesh)
     depth = disc.outer_radius - float(np.mean(first.surface_radius))
     move, before, steps, status = np.inf, np.inf, 0, Status()
     while steps < _MAX_STEPS and status.ok and not _settled(move, before):
-        wanted = _wanted_move(chamber, liquid, target)
+        wanted = _wanted_move(chamber, basis, liquid, target)
         radius = chamber.surface_radius + wanted * _damping(disc, chamber.surface_radius, wanted)
         chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
+        basis = quadratic_basis(chamber.mesh)
         move, before, steps = float(np.abs(wanted).max()) / depth, move, steps + 1
         status = _near_walls(disc, radius, depth)
     if status.ok:
         status = _end_of_search(disc, chamber.surface_radius, move, _settled(move, before))
-    chamber = _hold_volume(disc, chamber, target) if status.ok else first
-    error = _measure(chamber) / target - 1 if status.ok else 0.0
+    chamber, basis = _hold_volume(disc, chamber, basis, target) if status.ok else (first, unmoved)
     return _FoundSurface(
         chamber=chamber,
+        basis=basis,
         status=status,
         steps=steps,
         last_move=move,
         rounding=move if move > _STEP_TOLERANCE else 0.0,
-        volume_error=error,
+        volume_error=float(basis.dx.sum()) / target - 1 if status.ok else 0.0,
     )
 
 
@@ -163,13 +175,8 @@ def _settled(move: float, before: float) -> bool:
 def refined_surface(radius: FloatArray) -> FloatArray:
     """Surface radii carried to a mesh with twice the cells by cubic interpolation, m: only a start."""
     for axis, count in enumerate(radius.shape):
-        at, lines = np.arange(count, dtype=np.float64), np.moveaxis(radius, axis, -1)
         finer = np.linspace(0, count - 1, 2 * count - 1)
-        if count < 4:
-            carried = [np.interp(finer, at, line) for line in lines.reshape(-1, count)]
-        else:
-            carried = [CubicSpline.through(at, line)(finer) for line in lines.reshape(-1, count)]
-        radius = np.moveaxis(np.reshape(carried, (*lines.shape[:-1], -1)), -1, axis)
+        radius = np.asarray(CubicSpline(np.arange(count), radius, axis=axis)(finer))
     return radius
 
 
@@ -178,26 +185,16 @@ def surface_flux_mismatch(*, solution: PressureSolution, liquid: RotatingLiquid)
 
     |n.grad p - rho (omega^2 r + g).n| / |rho (omega^2 r + g).n| over the surface.
     """
-    facets = facet_points(solution.chamber, FREE_SURFACE)
-    gradient = np.zeros(solution.pressure.size)
-    gradient[solution.chamber.grid[0]] = solution.surface_gradient
-    force = _normal_force(liquid, solution.chamber.length_scale * facets.points, facets.normals)
-    difference = facets.at_points(gradient) - force
-    return float(np.sqrt(np.sum(facets.weights * difference**2) / np.sum(facets.weights * force**2)))
-
-
-def _normal_force(liquid: RotatingLiquid, points: FloatArray, normals: FloatArray) -> FloatArray:
-    return np.asarray(np.einsum("i...,i...->...", liquid.body_force(points), normals))
+    surface, unit = solution.side(FREE_SURFACE), solution.chamber.length_scale
+    force = np.sum(liquid.body_force(unit * surface.points) * surface.normals, axis=0)
+    difference = solution.surface_flux(surface) - force
+    return float(np.sqrt(np.sum(surface.weights * difference**2) / np.sum(surface.weights * force**2)))
 
 
 def _target(disc: Disc, fill_ratio: float, dimension: int) -> float:
     """Area or volume in units of the mesh."""
     area = fill_ratio * float(liquid_area(disc=disc, surface_radius=disc.inner_radius)) / disc.outer_radius**2
     return area if dimension == 2 else area * disc.axial_width / disc.outer_radius
-
-
-def _measure(chamber: ChamberMesh) -> float:
-    return float(volume_points(chamber).weights.sum())
 
 
 def _no_ring(disc: Disc, liquid: RotatingLiquid, radius: float) -> Status | None:
@@ -223,29 +220,20 @@ def _far_too_thin(disc: Disc, liquid: RotatingLiquid, radius: float) -> bool:
     return fall > 100 * liquid.angular_velocity**2 * radius * (disc.outer_radius - radius)
 
 
-def _free_pressure(chamber: ChamberMesh, liquid: RotatingLiquid) -> FloatArray:
-    """Pressure up to a constant, with the normal force given on the whole boundary."""
-    problem = liquid.problem()
-    discrete = problem.discretise(chamber=chamber)
-    on_surface = replace(problem, wall_flux=lambda x, n: _normal_force(liquid, x, n))
-    load = discrete.load + on_surface.wall_load(chamber=chamber, boundary=FREE_SURFACE)
-    load -= load.mean()  # what quadrature leaves of the balance
-    balanced = replace(discrete, load=load)
-    return balanced.solve(start=np.zeros(load.size), pinned_surface=False).values
-
-
-def _wanted_move(chamber: ChamberMesh, liquid: RotatingLiquid, target: float) -> FloatArray:
+def _wanted_move(chamber: ChamberMesh, basis: Any, liquid: RotatingLiquid, target: float) -> FloatArray:
     """Radial move of every surface node, m."""
-    pressure, unit = _free_pressure(chamber, liquid), chamber.length_scale
-    facets = facet_points(chamber, FREE_SURFACE)
-    compliance = facets.weights / _normal_force(liquid, unit * facets.points, facets.normals)
-    here = facets.at_points(pressure)
-    shortage = unit * (target - _measure(chamber))
-    level = (shortage + np.sum(compliance * here)) / np.sum(compliance)
+    unit = chamber.length_scale
+    # With the force given on the whole boundary the pressure is free by a constant: one node holds it.
+    weak = WeakProblem.of(basis, liquid.body_force, unit=unit)
+    pressure = weak.solve(start=np.zeros(basis.N), fixed=np.zeros(1, dtype=np.int64)).values
+    surface = side(chamber.mesh, FREE_SURFACE)
+    force = np.linalg.norm(liquid.body_force(unit * surface.points), axis=0)
+    compliance = surface.weights / force
+    surplus = unit * (float(basis.dx.sum()) - target)
+    level = (surplus + np.sum(compliance * surface.at_points(pressure))) / np.sum(compliance)
     nodes = chamber.places[:, chamber.grid[0]]
-    radial = np.zeros_like(nodes)
-    radial[:2] = nodes[:2] / np.hypot(nodes[0], nodes[1])
-    return np.asarray((level - pressure[chamber.grid[0]]) / _normal_force(liquid, nodes, radial))
+    radial = np.sum(liquid.body_force(nodes)[:2] * nodes[:2], axis=0) / np.hypot(nodes[0], nodes[1])
+    return np.asarray((level - pressure[chamber.grid[0]]) / radial)
 
 
 def _damping(disc: Disc, radius: FloatArray, move: FloatArray) -> float:
@@ -255,15 +243,16 @@ def _damping(disc: Disc, radius: FloatArray, move: FloatArray) -> float:
         return float(min(1.0, _SAFE_SHARE * np.min(room / np.abs(move))))
 
 
-def _hold_volume(disc: Disc, chamber: ChamberMesh, target: float) -> ChamberMesh:
+def _hold_volume(disc: Disc, chamber: ChamberMesh, basis: Any, target: float) -> tuple[ChamberMesh, Any]:
     """Take the last rounding out of the volume by equal moves of all nodes."""
     for _ in range(3):
-        measure = _measure(chamber)
-        facets = facet_points(chamber, FREE_SURFACE)
-        move = chamber.length_scale * (measure - target) / facets.weights.sum()
-        radius = chamber.surface_radius + move
-        chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=chamber.cells)
-    return chamber
+        surplus = float(basis.dx.sum()) - target
+        if abs(surplus) <= _VOLUME_ROUNDING * target:
+            break
+        move = chamber.length_scale * surplus / side(chamber.mesh, FREE_SURFACE).weights.sum()
+        chamber = chamber_mesh(disc=disc, surface_radius=chamber.surface_radius + move, cells=chamber.cells)
+        basis = quadratic_basis(chamber.mesh)
+    return chamber, basis
 
 
 _DRY = Status(

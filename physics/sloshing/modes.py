@@ -14,17 +14,14 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.cut.faceting import SAFETY, faceting
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.convergence import gci
-from ringbalance.physics.results import Estimate, Statistics
-from ringbalance.physics.sloshing.imported import ring_waves
-from ringbalance.physics.sloshing.system import sloshing_system
+from ringbalance.physics.results import Estimate
+from ringbalance.physics.sloshing.system import SloshingSystem, imported_system, sloshing_system
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc
 
-IMPORTED_SHARES: Final = np.array([0.04, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0])
-"""Of the largest fill, at which the waves in an imported chamber are looked at: each takes seconds."""
 FORMAL_ORDER: Final = 4.0
 """Of an eigenvalue of quadratic elements: twice the order of its mode in the energy's norm."""
 
@@ -39,9 +36,47 @@ class _SloshingModes:
     """a, m, shape (n,)."""
     frequency_ratio: Estimate
     """s, natural angular frequency seen in the disc over the angular velocity, shape (n, modes)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Meshes:
+    """On which waves are solved: those given of a sector, two of an imported chamber's section."""
+
+    disc: Disc
     cells: tuple[tuple[int, int], ...]
-    """Cells of the meshes, finest first."""
-    statistics: Statistics
+    """Of a sector, finest first."""
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """Numbers of the meshes, finest first."""
+        return tuple(range(len(self.cells) if self.disc.geometry is None else 2))
+
+    def system(self, radius: float, level: int) -> tuple[SloshingSystem, float]:
+        """The problem below a surface of this radius, m, and its unit of length, m."""
+        disc = self.disc
+        if disc.geometry is None:
+            found = sloshing_system(disc=disc, surface_radius=radius, cells=self.cells[level])
+            return found, disc.outer_radius
+        return imported_system(
+            disc.geometry, surface_radius=radius, width=disc.axial_width, coarse=bool(level)
+        )
+
+    def half_width(self, values: FloatArray, radius: float) -> float:
+        """Uncertainty (95 %) of the first of the values on each mesh.
+
+        Source: grid convergence of Celik et al. (2008); of a section in straight lines, of order two, all
+        that halving them changes, and what the facets of a wall, between its nodes, miss of the depth.
+        """
+        if self.disc.geometry is None:
+            noise = 1e-12 * float(np.abs(values).max())
+            sizes = [1 / counts[1] for counts in self.cells]
+            return gci(
+                values=list(values), sizes=sizes, formal_order=FORMAL_ORDER, round_off=noise
+            ).uncertainty
+        outer = self.disc.outer_radius
+        # Frequencies grow with the root of the depth; r^2 changes by twice r times the depth.
+        deeper = SAFETY * faceting(self.disc.geometry).wall / (2 * outer)
+        return float(abs(values[0] - values[1]) + deeper / (2 * (outer - radius)) * abs(values[0]))
 
 
 def sloshing_modes(
@@ -59,46 +94,28 @@ def sloshing_modes(
         fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
         modes: how many, at least 1.
         cells: three meshes or more, finest first; default twice `default_cells` and two coarser ones, with
-            more cells along the angle for many modes.
+            more cells along the angle for many modes.  An imported chamber is solved in its middle section.
     Raises: ValueError: fill ratios outside (0, 1], no modes, or fewer than three meshes.
     Validity: small planar waves without viscosity on a circular surface, that is g much smaller than
-    omega^2 a; the ends are flat, so gravity across the shaft drives no others.
-    Source: Eq. 10 of the liquid-ring paper with the inertia that it leaves out; derived in `sloshing_system`.
+    omega^2 a; the ends are flat and the section is the same along the shaft, so gravity across it drives no
+    others.
+    Source: Eq. 10 of the liquid-ring paper with the inertia that it leaves out; derived in `section_system`.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)) or modes < 1:
         raise ValueError("fill_ratio must lie within (0, 1], and at least one mode must be asked for")
-    if disc.geometry is not None:
-        return _imported(disc, disc.geometry, fills, modes)
-    meshes = cells or default_sloshing_cells(disc=disc, modes=modes)
-    if len(meshes) < 3:
+    meshes = Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc, modes=modes))
+    if len(meshes.cells) < 3:
         raise ValueError("cells must list at least three meshes, finest first")
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
-    found = np.array([[_lowest(disc, float(a), counts, modes) for counts in meshes] for a in radii])
-    widths = np.apply_along_axis(_half_width, 1, found, meshes)
+    found = np.array([[_lowest(meshes, float(a), level, modes) for level in meshes.levels] for a in radii])
+    widths = [
+        [meshes.half_width(values, float(a)) for values in at.T] for a, at in zip(radii, found, strict=True)
+    ]
     return _SloshingModes(
         fill_ratio=fills,
         surface_radius=radii,
-        frequency_ratio=Estimate(value=found[:, 0].copy(), uncertainty=widths),
-        cells=meshes,
-        statistics=Statistics(unknowns=(2 * meshes[0][0] + 1) * (2 * meshes[0][1] + 1)),
-    )
-
-
-def _imported(disc: Disc, geometry: ChamberGeometry, fills: FloatArray, modes: int) -> _SloshingModes:
-    """Waves in three dimensions, those along the shaft among them, on a chamber's own mesh."""
-    radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
-    waves = [ring_waves(geometry=geometry, surface_radius=float(radius)) for radius in radii]
-    values, widths = (
-        np.array([getattr(each.frequency_ratio, name)[:modes] for each in waves])
-        for name in ("value", "uncertainty")
-    )
-    return _SloshingModes(
-        fill_ratio=fills,
-        surface_radius=radii,
-        frequency_ratio=Estimate(value=values, uncertainty=widths),
-        cells=((len(geometry.cells), 1),),
-        statistics=waves[0].statistics,
+        frequency_ratio=Estimate(value=found[:, 0].copy(), uncertainty=np.array(widths)),
     )
 
 
@@ -127,43 +144,24 @@ def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ..
     if modes < 1:
         raise ValueError("at least one mode must be asked for")
     top = disc.max_fill_ratio
-    if disc.geometry is not None:
-        return _imported_resonances(disc, modes, top)
-    middle = default_sloshing_cells(disc=disc, modes=modes)[1]
+    meshes = Meshes(disc=disc, cells=default_sloshing_cells(disc=disc, modes=modes)[1:])
+    tolerance = 1e-6 if disc.geometry is None else 1e-3
 
     def excess(logarithm: float, mode: int) -> float:
         a = float(surface_radius(disc=disc, fill_ratio=np.exp(logarithm)))
-        return float(_lowest(disc, a, middle, modes)[mode - 1] - 1)
+        return float(_lowest(meshes, a, 0, modes)[mode - 1] - 1)
 
     found = []
     low, high = np.log(1e-4 * top), float(np.log(top))
     for mode in range(1, modes + 1):
         if excess(high, mode) > 0 > excess(low, mode):
-            high = float(brentq(excess, low, high, args=(mode,), xtol=1e-6))
+            high = float(brentq(excess, low, high, args=(mode,), xtol=tolerance))
             found.append((mode, float(np.exp(high))))
     return tuple(found)
 
 
-def _imported_resonances(disc: Disc, modes: int, top: float) -> tuple[tuple[int, float], ...]:
-    """Between fills at which the waves are solved, by a straight line: to two digits."""
-    found = sloshing_modes(disc=disc, fill_ratio=top * IMPORTED_SHARES, modes=modes)
-    fills, ratios = found.fill_ratio, found.frequency_ratio.value
-    return tuple(
-        (mode + 1, float(np.interp(1.0, ratios[:, mode], fills)))
-        for mode in range(ratios.shape[1])
-        if ratios[0, mode] < 1 < ratios[-1, mode]
-    )
-
-
-def _lowest(disc: Disc, a: float, cells: tuple[int, int], modes: int) -> FloatArray:
-    system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
-    ratios = system.natural_frequencies()
+def _lowest(meshes: Meshes, a: float, level: int, modes: int) -> FloatArray:
+    ratios = meshes.system(a, level)[0].natural_frequencies()
     if ratios.size < modes:
-        raise ValueError(f"a mesh of {cells} cells has {ratios.size} modes, not {modes}")
+        raise ValueError(f"a mesh has {ratios.size} modes, not {modes}: give it more cells along the surface")
     return ratios[:modes]
-
-
-def _half_width(values: FloatArray, meshes: tuple[tuple[int, int], ...]) -> float:
-    sizes = [1 / counts[1] for counts in meshes]
-    noise = 1e-12 * float(np.abs(values).max())
-    return gci(values=list(values), sizes=sizes, formal_order=FORMAL_ORDER, round_off=noise).uncertainty

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.convergence import gci
-from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
-from ringbalance.physics.sloshing.imported import RingWaves, ring_waves
-from ringbalance.physics.sloshing.modes import FORMAL_ORDER, default_sloshing_cells
+from ringbalance.physics.results import Estimate, Status, StatusCode
+from ringbalance.physics.sloshing.modes import Meshes, default_sloshing_cells
 from ringbalance.physics.sloshing.range import SMALL, swept
-from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
+from ringbalance.physics.sloshing.system import SloshingSystem
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
 
@@ -45,7 +42,6 @@ class SloshingResponse:
     damped_share: FloatArray
     """Amplification with the walls' Stokes layers over that without any viscosity, shape (n,): near 1 away
     from resonance, and where it is small the peak rests on an estimate of the damping."""
-    statistics: Statistics
     status: Status
 
 
@@ -68,42 +64,32 @@ def sloshing_response(
         fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
         kinematic_viscosity: nu, m^2/s, zero or more; zero leaves resonance without a limit.
         frequency_ratio: s, above 0; 1 for gravity.
-        cells: three meshes or more, finest first; default those of `sloshing_modes`. An imported chamber
-            has its own mesh.
+        cells: three meshes or more, finest first; default those of `sloshing_modes`.
     Returns: SloshingResponse; status says where the waves might not be small, or gravity leaves no ring.
     Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
-    Validity: small planar waves; thin Stokes layers on all walls without the Coriolis force, which makes the
-        damping, and with it a peak, good to a factor of about two.
-    Source: derived in `sloshing_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
+    Validity: small planar waves, of an imported chamber those of its middle section: waves along the shaft,
+        and what a section that changes along it does to them, are left out; thin Stokes layers on all walls
+        without the Coriolis force, which makes the damping, and with it a peak, good to a factor of two.
+    Source: derived in `section_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     _check(fills, angular_velocity, kinematic_viscosity, gravity, frequency_ratio)
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
-    if disc.geometry is not None:
-        waves = [
-            ring_waves(
-                geometry=disc.geometry,
-                surface_radius=float(radius),
-                angular_velocity=angular_velocity,
-                kinematic_viscosity=kinematic_viscosity,
-                gravity=gravity,
-                frequency_ratio=frequency_ratio,
-            )
-            for radius in radii
-        ]
-        return _imported(fills, radii, waves)
-    meshes = cells or default_sloshing_cells(disc=disc)
+    meshes = Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc))
     ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
 
-    def on_mesh(radius: float, counts: tuple[int, int]) -> FloatArray:
-        system = sloshing_system(disc=disc, surface_radius=radius, cells=counts)
-        return np.asarray(_answers(system, np.array([frequency_ratio]), ekman)[0])
+    def on_mesh(radius: float, level: int) -> FloatArray:
+        system, unit = meshes.system(radius, level)
+        answers = _answers(system, np.array([frequency_ratio]), ekman)[0]
+        return np.asarray(answers * [1.0, unit / disc.outer_radius, 1.0, 1.0])
 
-    found = np.array([[on_mesh(float(a), counts) for counts in meshes] for a in radii])
-    widths = _half_widths(found, meshes)
+    found = np.array([[on_mesh(float(a), level) for level in meshes.levels] for a in radii])
+    widths = np.array(
+        [[meshes.half_width(values, float(a)) for values in at.T] for a, at in zip(radii, found, strict=True)]
+    )
     scale = gravity / angular_velocity**2
     amplitude = Estimate(value=scale * found[:, 0, 1], uncertainty=scale * widths[:, 1])
-    ends = np.array([_interval(disc, float(a), meshes[1], frequency_ratio, ekman) for a in radii])
+    ends = np.array([_interval(meshes, float(a), frequency_ratio, ekman) for a in radii])
     # At either end the solution errs by about the same share as in the middle.
     share = (widths / found[:, 0])[:, [0, 1, 3]]
     ends *= 1 + np.stack([-np.minimum(share, 1.0), share], axis=1)
@@ -117,57 +103,19 @@ def sloshing_response(
         surface_amplitude=amplitude,
         surface_amplitude_interval=scale * ends[:, :, 1],
         damped_share=found[:, 0, 2].copy(),
-        statistics=Statistics(unknowns=(2 * meshes[0][0] + 1) * (2 * meshes[0][1] + 1)),
         status=_status(fills, disc.outer_radius - radii, scale * ends[:, 1, 1], scale - radii),
     )
 
 
-def _interval(disc: Disc, radius: float, cells: tuple[int, int], ratio: float, ekman: float) -> FloatArray:
+def _interval(meshes: Meshes, radius: float, ratio: float, ekman: float) -> FloatArray:
     """Ends by natural frequencies of moment, displacement (as `_answers`) and wall pressure, shape (2, 3)."""
-    system = sloshing_system(disc=disc, surface_radius=radius, cells=cells)
+    # Peaks are looked for on the mesh in the middle, if there are three.
+    system, _ = meshes.system(radius, len(meshes.levels) // 3)
 
     def response(ratios: FloatArray) -> FloatArray:
         return _answers(system, ratios, ekman)[:, [0, 1, 3]]
 
     return np.stack(swept(response, frequency_ratio=ratio, natural=system.natural_frequencies()))
-
-
-def _imported(fills: FloatArray, radii: FloatArray, waves: Sequence[RingWaves]) -> SloshingResponse:
-    """Waves at each fill, in three dimensions, on a chamber's own mesh."""
-
-    def along(name: str) -> Estimate:
-        parts: list[Estimate] = [getattr(each, name) for each in waves]
-        value, uncertainty = (
-            np.array([float(getattr(p, n)) for p in parts]) for n in ("value", "uncertainty")
-        )
-        return Estimate(value=value, uncertainty=uncertainty)
-
-    def ends(name: str) -> FloatArray:
-        return np.array([getattr(each, f"{name}_interval") for each in waves])
-
-    return SloshingResponse(
-        fill_ratio=fills,
-        surface_radius=radii,
-        amplification=along("amplification"),
-        amplification_interval=ends("amplification"),
-        pressure_amplification=along("pressure_amplification"),
-        pressure_amplification_interval=ends("pressure_amplification"),
-        surface_amplitude=along("surface_amplitude"),
-        surface_amplitude_interval=ends("surface_amplitude"),
-        damped_share=np.array([each.damped_share for each in waves]),
-        statistics=waves[0].statistics,
-        status=next((each.status for each in waves if not each.status.ok), Status()),
-    )
-
-
-def _half_widths(found: FloatArray, meshes: tuple[tuple[int, int], ...]) -> FloatArray:
-    """By fill and quantity, from values by fill, mesh and quantity."""
-    sizes = [1 / counts[1] for counts in meshes]
-
-    def of(values: FloatArray) -> float:
-        return gci(values=list(values), sizes=sizes, formal_order=FORMAL_ORDER).uncertainty
-
-    return np.asarray(np.apply_along_axis(of, 1, found), dtype=np.float64)
 
 
 def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float, ratio: float) -> None:

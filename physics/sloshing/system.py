@@ -18,30 +18,31 @@ centrifugal stiffness, W what the Stokes layers on the walls take (E = nu/(omega
 The pressure is p'/rho = G + c - i s phi - 2 psi, and its mean over the free surface's moved place is zero, so
 the mean over the outer wall, where psi = 0, is
 
-    mean_w p'/rho = mean_w G - mean_a G - i s (mean_w phi - mean_a phi) + 2 mean_a psi.
+    mean_w p'/rho = mean_w G - mean_a G - i s (mean_w phi - mean_a phi) + 2 mean_a psi
 
-The difference of phi is int grad psi . grad chi for any chi that is 0 on one plate, 1 on the other, and
-grows evenly along the arcs of surface and wall: rot chi flows in through the one and out through the other.
+with int grad phi . grad v = int rot psi . grad v.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
-from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
+from skfem import Basis, BilinearForm, ElementQuad2, ElementTriP2, FacetBasis, LinearForm
+from skfem.helpers import grad
+from skfem.mapping import MappingIsoparametric
+from skfem.models.poisson import mass, unit_load
 
-from ringbalance.mesh.chamber import chamber_mesh
-from ringbalance.mesh.tensor_cells import line_shapes
-from ringbalance.physics.pressure.sparse import stiffness_matrix
+from ringbalance.mesh.chamber import FREE_SURFACE, chamber_mesh
+from ringbalance.mesh.section import Section, middle_section
+from ringbalance.physics.pressure.elements import stiffness
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 from ringbalance.scene.models import Disc
-
-_GAUSS, _WEIGHT = np.polynomial.legendre.leggauss(4)
-_SHAPE, _SLOPE = line_shapes(np.asarray(_GAUSS, dtype=np.float64))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,9 +60,9 @@ class SloshingSystem:
     outflow: FloatArray
     """Rows that take psi to the integrals of q, x q and y q over the free surface, shape (3, n)."""
     flux: FloatArray
-    """Rows that take psi to q at `places`, shape (m, n)."""
-    places: FloatArray
-    """Places on the free surface, shape (2, m)."""
+    """Rows that take psi to q at points of the free surface, shape (m, n)."""
+    nodes: IntArray
+    """Of the mesh, to which the values of psi belong, shape (n,)."""
     potential: FloatArray
     """Row that takes psi to the mean of phi over the outer wall less that over the surface, shape (n,)."""
     surface_mean: FloatArray
@@ -92,117 +93,139 @@ class SloshingSystem:
 
 @lru_cache(maxsize=128)
 def sloshing_system(*, disc: Disc, surface_radius: float, cells: tuple[int, int]) -> SloshingSystem:
-    """Assemble and condense the problem on one mesh.
+    """Assemble and condense the problem in the chamber of a disc, on one mesh.
 
     Args: `disc`: the disc; its width counts in the loss at the two ends alone. `surface_radius`: a, m.
         `cells`: along the radius and the angle.
     Raises: ValueError: as `chamber_mesh`.
-    Source: the equations at the head of this module, derived there.
     """
     chamber = chamber_mesh(disc=disc, surface_radius=surface_radius, cells=cells)
-    stiffness = csc_matrix(stiffness_matrix(chamber))
-    grid, nodes = chamber.grid, chamber.nodes
-    kept, inner = grid[0, 1:-1], grid[1:-1, 1:-1].ravel()
-    extension = _extension(stiffness, inner, kept)
-    condensed = stiffness[kept][:, kept] + stiffness[kept][:, inner] @ extension[kept.size :]
+    return section_system(chamber.mesh, ends=2 * disc.outer_radius / disc.axial_width)
+
+
+@lru_cache(maxsize=128)
+def imported_system(
+    geometry: ChamberGeometry, *, surface_radius: float, width: float, coarse: bool
+) -> tuple[SloshingSystem, float]:
+    """The problem in the middle section of an imported chamber, and its unit of length, m.
+
+    Args: `coarse`: on the corners of the cells alone.
+    Raises: ValueError: as `middle_section`.
+    """
+    section: Section = middle_section(geometry, surface_radius=surface_radius, coarse=coarse)
+    return section_system(section.mesh, ends=2 * section.scale / width), section.scale
+
+
+def section_system(mesh: Any, *, ends: float) -> SloshingSystem:
+    """Assemble and condense the problem on any section.
+
+    Args: `mesh`: lengths in outer radii, its boundaries named; all but the free surface are one wall.
+        `ends`: area of the two ends over that of the section, times outer radius over width: 2 R2/B.
+    Source: the equations at the head of this module, derived there.
+    """
+    near, element = _near(mesh)
+    basis = Basis(mesh, element, mapping=near, intorder=4)
+
+    def along(facets: Any) -> Any:
+        return FacetBasis(mesh, element, mapping=near, facets=facets, intorder=6)
+
+    top, sides = (
+        along(FREE_SURFACE),
+        along(np.setdiff1d(mesh.boundary_facets(), mesh.boundaries[FREE_SURFACE])),
+    )
+    surface, walls = basis.get_dofs(top.find).all(), basis.get_dofs(sides.find).all()
+    kept, inner = np.setdiff1d(surface, walls), np.setdiff1d(np.arange(basis.N), np.union1d(surface, walls))
+    matrix = stiffness(basis)
+    # Harmonic continuation into the liquid of each unknown on the surface.
+    extension = np.zeros((basis.N, kept.size))
+    extension[kept] = np.eye(kept.size)
+    into = matrix[inner][:, kept].toarray()
+    extension[inner] = -splu(matrix[inner][:, inner].tocsc()).solve(into)
+    condensed = matrix[kept] @ extension
     kinetic = np.asarray((condensed + condensed.T) / 2, dtype=np.float64)
-    surface = _Line.of(nodes[:, grid[0]])
-    # The Stokes layers on the two ends see all of the flow, so their share is the kinetic energy's.
-    ends = 2 * disc.outer_radius / disc.axial_width * kinetic
-    free = np.concatenate([kept, inner])
-    walls = np.concatenate([grid[:, 0], grid[-1, 1:-1], grid[::-1, -1]])
-    slip = stiffness[walls[1:-1]][:, free] @ extension
+    means = [load / load.sum() for load in (unit_load.assemble(along(OUTER_WALL)), unit_load.assemble(top))]
+    difference, places = means[0] - means[1], basis.doflocs[0] + 1j * basis.doflocs[1]
+
+    def on_surface(form: Any) -> FloatArray:
+        return np.asarray(form.assemble(top)[kept][:, kept].toarray())
+
     return SloshingSystem(
         kinetic=kinetic,
-        coriolis=-surface.integral(_SLOPE, _SHAPE, np.ones_like(surface.stretch))[1:-1, 1:-1],
-        centrifugal=surface.integral(_SLOPE, _SLOPE, surface.radius / surface.stretch)[1:-1, 1:-1],
-        wall_loss=ends + _loss_at_sides(_Line.of(nodes[:, walls]), slip),
-        outflow=surface.outflow()[:, 1:-1],
-        flux=surface.flux()[:, 1:-1],
-        places=surface.places.reshape(2, -1),
-        potential=_even_growth(grid) @ (stiffness[:, free] @ extension),
-        surface_mean=surface.mean()[1:-1],
-        wall_drive=_Line.of(nodes[:, grid[-1]]).mean_place - surface.mean_place,
+        coriolis=on_surface(_coriolis),
+        centrifugal=on_surface(_centrifugal),
+        # The Stokes layers on the two ends see all of the flow, so their share is the kinetic energy's.
+        wall_loss=ends * kinetic + _loss_at_sides(sides, np.setdiff1d(walls, surface), matrix @ extension),
+        outflow=np.stack([form.assemble(top)[kept] for form in _OUTFLOW]),
+        flux=_flux_rows(top, kept),
+        nodes=kept,
+        potential=_conjugate(basis, matrix, difference) @ extension,
+        surface_mean=means[1][kept],
+        wall_drive=complex(difference @ places),
     )
 
 
-def _even_growth(grid: IntArray) -> FloatArray:
-    """chi at all nodes: the share of the arc up to each, cells along an arc being of equal length."""
-    chi = np.empty(grid.size)
-    chi[grid] = np.linspace(0.0, 1.0, grid.shape[1])
-    return chi
+class _Near(MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no types
+    """In a film rounding exceeds the 1e-12 where scikit-fem's Newton method ends; it is quadratic."""
+
+    def invF(self, x: Any, tind: Any = None, **_: Any) -> Any:  # noqa: N802
+        return super().invF(x, tind, newton_tol=1e-6)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Line:
-    """A chain of quadratic elements along a boundary; arrays of elements by quadrature points."""
-
-    places: FloatArray
-    """Shape (2, elements, points)."""
-    stretch: FloatArray
-    """Arc length per unit of the reference coordinate, which runs from -1 to 1."""
-
-    @classmethod
-    def of(cls, nodes: FloatArray) -> _Line:
-        """The chain through nodes of shape (2, 2 elements + 1)."""
-        ends = np.stack([nodes[:, :-2:2], nodes[:, 1::2], nodes[:, 2::2]])
-        tangent = np.einsum("kie,kq->ieq", ends, _SLOPE)
-        return cls(places=np.einsum("kie,kq->ieq", ends, _SHAPE), stretch=np.hypot(*tangent))
-
-    @property
-    def radius(self) -> FloatArray:
-        return np.asarray(np.hypot(*self.places), dtype=np.float64)
-
-    def integral(self, first: FloatArray, second: FloatArray, factor: FloatArray) -> FloatArray:
-        """Matrix of the integrals of factor first second over the reference coordinate."""
-        local = np.einsum("iq,jq,eq,q->eij", first, second, factor, _WEIGHT)
-        count = 2 * factor.shape[0] + 1
-        matrix = np.zeros((count, count))
-        for k, block in enumerate(local):
-            matrix[2 * k : 2 * k + 3, 2 * k : 2 * k + 3] += block
-        return matrix
-
-    def outflow(self) -> FloatArray:
-        """Integrals of q, x q and y q with q = -d(psi)/d(arc), rows by node."""
-        factors = np.stack([np.ones_like(self.stretch), *self.places])
-        local = -np.einsum("jq,feq,q->fej", _SLOPE, factors, _WEIGHT)
-        rows = np.zeros((3, 2 * self.stretch.shape[0] + 1))
-        for j in range(3):
-            rows[:, j : j + local.shape[1] * 2 : 2][:, : local.shape[1]] += local[:, :, j]
-        return rows
-
-    def mean(self) -> FloatArray:
-        """Row that takes values at the nodes to their mean over the arc."""
-        # The shapes sum to one, so the columns of their mass matrix do to each one's integral.
-        row = self.integral(_SHAPE, _SHAPE, self.stretch).sum(axis=0)
-        return np.asarray(row / row.sum(), dtype=np.float64)
-
-    @property
-    def mean_place(self) -> complex:
-        """Mean of x + i y over the arc."""
-        x, y = np.einsum("feq,eq,q->f", self.places, self.stretch, _WEIGHT)
-        return complex(x, y) / float(np.einsum("eq,q->", self.stretch, _WEIGHT))
-
-    def flux(self) -> FloatArray:
-        """Values of q at the places, one row a place."""
-        elements, points = self.stretch.shape
-        rows = np.zeros((elements, points, 2 * elements + 1))
-        for k in range(elements):
-            rows[k, :, 2 * k : 2 * k + 3] = -_SLOPE.T / self.stretch[k][:, None]
-        return rows.reshape(elements * points, -1)
+def _near(mesh: Any) -> tuple[Any, Any]:
+    """Mapping and element of a section's mesh."""
+    own = mesh.mapping()
+    if isinstance(own, MappingIsoparametric):
+        return _Near(mesh, own.elem, own.bndelem), ElementQuad2()
+    return own, ElementTriP2()
 
 
-def _loss_at_sides(walls: _Line, slip: FloatArray) -> FloatArray:
+def _outward(psi: Any, w: Any) -> Any:
+    """q = n . rot psi, the flow out of the liquid."""
+    return w.n[0] * grad(psi)[1] - w.n[1] * grad(psi)[0]
+
+
+@BilinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
+def _coriolis(psi: Any, v: Any, w: Any) -> Any:
+    return (psi * _outward(v, w) - v * _outward(psi, w)) / 2
+
+
+@BilinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
+def _centrifugal(psi: Any, v: Any, w: Any) -> Any:
+    return np.hypot(*w.x) * _outward(psi, w) * _outward(v, w)
+
+
+@BilinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
+def _turned(psi: Any, v: Any, _: Any) -> Any:
+    return grad(psi)[1] * grad(v)[0] - grad(psi)[0] * grad(v)[1]
+
+
+_OUTFLOW = (
+    LinearForm(_outward),
+    LinearForm(lambda v, w: w.x[0] * _outward(v, w)),
+    LinearForm(lambda v, w: w.x[1] * _outward(v, w)),
+)
+
+
+def _flux_rows(top: Any, kept: IntArray) -> FloatArray:
+    """Rows that take psi to q at the quadrature points of the surface."""
+    normal, facets = top.normals, np.arange(top.nelems)
+    rows = np.zeros((top.nelems, top.dx.shape[1], top.N))
+    for numbers, (function,) in zip(top.element_dofs, top.basis, strict=True):
+        rows[facets, :, numbers] += normal[0] * function.grad[1] - normal[1] * function.grad[0]
+    return rows.reshape(-1, top.N)[:, kept]
+
+
+def _loss_at_sides(sides: Any, nodes: IntArray, flux: FloatArray) -> FloatArray:
     """Integral of the squared velocity along the plates and the outer wall, from the flux through them.
 
     The surface's two edges belong to the free surface, too; there the velocity is taken as zero.
     """
-    mass = walls.integral(_SHAPE, _SHAPE, walls.stretch)[1:-1, 1:-1]
-    return np.asarray(slip.T @ np.linalg.solve(mass, slip), dtype=np.float64)
+    inverse = splu(mass.assemble(sides)[nodes][:, nodes].tocsc())
+    return np.asarray(flux[nodes].T @ inverse.solve(flux[nodes]))
 
 
-def _extension(stiffness: csc_matrix, inner: IntArray, kept: IntArray) -> FloatArray:
-    """Harmonic continuation into the liquid of each unknown on the surface, these first."""
-    into = stiffness[inner][:, kept].toarray()
-    continued = splu(stiffness[inner][:, inner].tocsc()).solve(into)
-    return np.vstack([np.eye(kept.size), -continued])
+def _conjugate(basis: Any, matrix: Any, row: FloatArray) -> FloatArray:
+    """Row that takes psi to the value that a row, whose sum is zero, takes from its potential phi."""
+    adjoint = np.zeros(basis.N)
+    adjoint[1:] = splu(matrix[1:][:, 1:].tocsc()).solve(row[1:])
+    return np.asarray(_turned.assemble(basis).T @ adjoint)

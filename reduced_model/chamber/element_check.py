@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ringbalance.mesh.cut.table import TOLERANCE, chamber_table
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics import deferred
+from ringbalance.physics.pressure.imported import solved_ring
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms, chamber_pressure
@@ -227,7 +227,7 @@ class ImportedElements:
         """The pressure solved at a few fills; with the elements' error and the drawn volume's."""
         disc, density = scene.disc, scene.liquid.density
         rings = [
-            deferred.solved_ring(
+            solved_ring(
                 geometry=geometry,
                 density=density,
                 angular_velocity=scene.rotor.speed,

@@ -7,13 +7,15 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 
-from ringbalance.physics.sloshing.modes import IMPORTED_SHARES, resonant_fills, sloshing_modes
+from ringbalance.mesh.section import NoPlaneWavesError
+from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE
 from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.numbers import number, percent, short, shown
+from ringbalance.scene.models import Scene
 
 _MODES: Final = 4
 _POINTS: Final = 17
@@ -30,14 +32,21 @@ def _collect(work: Work) -> Record | None:
     scene = work.scene
     if scene.environment.shaft == "vertical" or scene.environment.gravity == 0:
         return None
+    try:
+        return _waves(scene)
+    except NoPlaneWavesError as error:
+        return {"left_out": str(error)}
+
+
+def _waves(scene: Scene) -> Record:
     largest = scene.disc.max_fill_ratio
     met = resonant_fills(disc=scene.disc, modes=_MODES)
     imported = scene.disc.geometry is not None
     # A peak is narrower than the distance of even points.
     peaks = [x * side for _, x in met for side in (0.96, 0.99, 1.0, 1.01, 1.04) if x * side <= largest]
     even = np.linspace(0.02, 1.0, _POINTS) * largest
-    # Each fill of an imported chamber takes seconds.
-    shown = largest * IMPORTED_SHARES if imported else np.unique([*even, *peaks])
+    # Each fill of an imported chamber takes two cuts of its mesh.
+    shown = even if imported else np.unique([*even, *peaks])
     fills = np.append(shown, scene.disc.initial_fill)
     modes = sloshing_modes(disc=scene.disc, fill_ratio=fills[:-1], modes=_MODES, cells=_COARSE)
     answer = sloshing_response(
@@ -78,6 +87,9 @@ def _collect(work: Work) -> Record | None:
 
 def _view(found: Record, _evidence: Record) -> Record:
     """Sentences and figures."""
+    if "left_out" in found:
+        text = found["left_out"]
+        return {"findings": [f"{text[0].upper()}{text[1:]}."]}
     return {
         "findings": [_equal(found), _avoid(found), *_reservation(found)],
         "frequencies": _frequencies(found),
@@ -188,7 +200,8 @@ def _quiet(found: Record) -> str:
     """Which modes count for little."""
     if found["imported"]:
         return (
-            "; those along the shaft hardly feel gravity, and a peak between two of the points may be missed"
+            "; solved in the chamber’s middle section: waves along the shaft, which gravity hardly drives, "
+            "and a section that changes along it are left out, and a peak between two points may be missed"
         )
     return "; even modes hardly feel gravity"
 

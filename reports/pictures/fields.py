@@ -10,19 +10,17 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from ringbalance.mesh.chamber import chamber_mesh, default_cells
-from ringbalance.mesh.export import write_cells, write_vtu
+from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.liquid_body import Level, liquid_body
-from ringbalance.mesh.quadratic_tetrahedra import FACES, Tetrahedra, tetrahedra
-from ringbalance.physics.pressure.imported import solve_on
-from ringbalance.physics.pressure.linear import LinearSolution
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
-from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
+from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
+from ringbalance.physics.pressure.elements import LinearSolution, quadratic_basis
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_on, solve_pressure
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.results.numbers import given
-from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Scene
 from ringbalance.verification.loops import calibration_of
@@ -37,18 +35,6 @@ _FILLS: Final = {
     Regime.UNDECIDED: "whether liquid fills it all the way or separates at the siphon crest cannot be told",
     Regime.BLOCKED: "gas stands over the siphon crest and nothing flows",
 }
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Outside:
-    """Faces that bound the liquid, for drawing."""
-
-    places: FloatArray
-    """Of all nodes, m, shape (n, 3)."""
-    faces: IntArray
-    """Corners in order, shape (faces, 4); a triangle repeats its last."""
-    pressure: FloatArray
-    """At the nodes, Pa, shape (n,)."""
 
 
 class ShownField(Protocol):
@@ -69,10 +55,6 @@ class ShownField(Protocol):
 
     def write(self, *, path: Path) -> Path:
         """Write gauge pressure, Pa, and depth below the free surface, m, to a VTU file. Raises: OSError."""
-        ...
-
-    def outside(self) -> _Outside:
-        """What bounds the liquid."""
         ...
 
 
@@ -111,12 +93,12 @@ class ChamberField:
 
     def record(self) -> Record:
         chamber, solution = self.solution.chamber, self.solution
-        quality = chamber.quality()
+        jacobian, aspect = chamber.quality()
         return {
             "cells": list(chamber.cells),
-            "unknowns": quality.nodes,
-            "minimum_scaled_jacobian": quality.minimum_scaled_jacobian,
-            "largest_aspect": quality.maximum_aspect,
+            "unknowns": chamber.grid.size,
+            "minimum_scaled_jacobian": jacobian,
+            "largest_aspect": aspect,
             "relative_residual": solution.statistics.relative_residual,
             "status": solution.status.text,
         }
@@ -128,16 +110,6 @@ class ChamberField:
         radius = np.hypot(*chamber.places[:2, line])
         return _profile(scene, self.fill_ratio, radius, self.solution.pressure[line])
 
-    def outside(self) -> _Outside:
-        chamber = self.solution.chamber
-        corners = chamber.grid[(slice(None, None, chamber.order),) * 3]
-        sides = [np.take(corners, end, axis=axis) for axis in range(3) for end in (0, -1)]
-        faces = [
-            np.stack([side[:-1, :-1], side[1:, :-1], side[1:, 1:], side[:-1, 1:]], axis=-1).reshape(-1, 4)
-            for side in sides
-        ]
-        return _Outside(places=chamber.places.T, faces=np.concatenate(faces), pressure=self.solution.pressure)
-
     def write(self, *, path: Path) -> Path:
         chamber = self.solution.chamber
         radius = np.hypot(*chamber.places[:2])
@@ -145,7 +117,7 @@ class ChamberField:
             "pressure_Pa": self.solution.pressure,
             "depth_m": np.maximum(radius - self.surface_radius, 0.0),
         }
-        return write_vtu(path, chamber=chamber, fields=fields)
+        return write_vtu(path, mesh=chamber.mesh.scaled(chamber.length_scale), fields=fields)
 
 
 def shown_fill(scene: Scene) -> float:
@@ -177,38 +149,30 @@ class ImportedField:
     fill_ratio: float
     surface_radius: float
     """m."""
-    body: Tetrahedra
+    mesh: Any
+    """`skfem.MeshTet2`, m."""
     solution: LinearSolution
 
     def record(self) -> Record:
         return {
-            "cells": [len(self.body.cells)],
-            "unknowns": len(self.body.nodes),
+            "cells": [self.mesh.nelements],
+            "unknowns": self.solution.values.size,
             "relative_residual": self.solution.statistics.relative_residual,
             "status": self.solution.status.text,
         }
 
     def pressure_profile(self, *, scene: Scene) -> Record:
         """Pressure at the nodes nearest to even radii, and the profile that Eq. 12 implies, SI."""
-        radius = np.hypot(self.body.nodes[:, 0], self.body.nodes[:, 1])
+        radius = np.hypot(*self.mesh.doflocs[:2])
         order = np.argsort(radius)
         even = np.linspace(radius[order[0]], radius[order[-1]], _RADII)
         nearest = order[np.minimum(np.searchsorted(radius[order], even), radius.size - 1)]
         return _profile(scene, self.fill_ratio, radius[nearest], self.solution.values[nearest])
 
     def write(self, *, path: Path) -> Path:
-        radius = np.hypot(self.body.nodes[:, 0], self.body.nodes[:, 1])
-        fields = {
-            "pressure_Pa": self.solution.values,
-            "depth_m": np.maximum(radius - self.surface_radius, 0.0),
-        }
-        return write_cells(path, kind="tetra10", points=self.body.nodes, cells=self.body.cells, fields=fields)
-
-    def outside(self) -> _Outside:
-        cell, face = np.nonzero(self.body.faces >= 0)
-        corners = np.take_along_axis(self.body.cells[cell], FACES[face], axis=1)
-        faces = np.concatenate([corners, corners[:, -1:]], axis=1)
-        return _Outside(places=self.body.nodes, faces=faces, pressure=self.solution.values)
+        depth = np.maximum(np.hypot(*self.mesh.doflocs[:2]) - self.surface_radius, 0.0)
+        fields = {"pressure_Pa": self.solution.values, "depth_m": depth}
+        return write_vtu(path, mesh=self.mesh, fields=fields)
 
 
 def _imported_field(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: float) -> ImportedField:
@@ -217,10 +181,10 @@ def _imported_field(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: floa
     Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem.
     """
     radius = float(surface_radius(disc=scene.disc, fill_ratio=fill_ratio))
-    body = liquid_body(tetrahedra(geometry), Level(constant=radius**2 / 2))
+    mesh = scikit_fem_mesh(liquid_body(tetrahedra(geometry), Level(constant=radius**2 / 2)))
     liquid = RotatingLiquid(density=scene.liquid.density, angular_velocity=scene.rotor.speed)
-    solution = solve_on(TetrahedronSpace(body=body), liquid.problem())
-    return ImportedField(fill_ratio=fill_ratio, surface_radius=radius, body=body, solution=solution)
+    solution = solve_on(quadratic_basis(mesh), liquid.problem())
+    return ImportedField(fill_ratio=fill_ratio, surface_radius=radius, mesh=mesh, solution=solution)
 
 
 def shown_field(scene: Scene, *, fill_ratio: float) -> ShownField:

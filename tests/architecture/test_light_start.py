@@ -63,23 +63,6 @@ def test_a_calibration_loads_no_flow_solver_and_no_mesh_files() -> None:
     assert [name for name in modules(CALIBRATION) if ".navier_stokes" in name] == []
 
 
-def test_a_calibration_loads_no_solver_that_it_does_not_use() -> None:
-    """Its finite elements need numpy alone, in three dimensions, too; what needs a matrix does not."""
-    solvers = {"pyamg", "scipy", "skfem"}
-    solved = "assert found.chamber.check.solves"
-    start = "import ringbalance as r\nscene = r.load_scene(r.bundled_scene('liquid_ring_paper'))"
-    assert not loaded(f"{start}\nfound = r.calibrate(scene)\n{solved}") & solvers
-    large = (
-        "from ringbalance.mesh.chamber import chamber_mesh\n"
-        "from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure\n"
-        "chamber = chamber_mesh(disc=scene.disc, surface_radius=0.035, cells=(4, 12, 4))\n"
-        "liquid = RotatingLiquid(density=1e3, angular_velocity=1e3)\n"
-        "solve_pressure(chamber=chamber, problem=liquid.problem())"
-    )
-    assert not loaded(f"{start}\n{large}") & solvers
-    assert "scipy" in loaded("from ringbalance.physics.pressure.sparse import stiffness_matrix")
-
-
 def test_a_compiler_would_be_seen() -> None:
     assert "numba" in loaded("import ringbalance.controller.ensemble.monte_carlo")
 

@@ -8,8 +8,14 @@ import pytest
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.liquid_body import Level, jacobians, liquid_body
-from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, face_nodes, lonely, tetrahedra
-from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
+from ringbalance.mesh.quadratic_tetrahedra import (
+    Tetrahedra,
+    face_nodes,
+    lonely,
+    scikit_fem_mesh,
+    tetrahedra,
+)
+from ringbalance.physics.pressure.elements import quadratic_basis, side
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -34,12 +40,12 @@ def _surface(body: Tetrahedra) -> np.ndarray:
 def test_it_holds_the_volume_outside_the_surface(kind: CellKind, radius: float) -> None:
     body = liquid_body(_sector(6, kind), Level(constant=radius**2 / 2))
     exact = _ANGLE / 2 * _WIDTH * (1 - radius**2)
-    space = TetrahedronSpace(body=body)
+    mesh = scikit_fem_mesh(body)
     # Quadratic edges leave their arcs by R (angle / 2)^4 / 32: 2e-7 R here, over a depth of at least 0.04 R.
-    assert space.weights.sum() == pytest.approx(exact, rel=2e-5)
+    assert quadratic_basis(mesh).dx.sum() == pytest.approx(exact, rel=2e-5)
     assert jacobians(body).min() > 0
     assert np.abs(np.hypot(*_surface(body)[:, :2].T) - radius).max() < 1e-9
-    areas = {name: space.facets(name).weights.sum() for name in space.boundaries}
+    areas = {name: side(mesh, name).weights.sum() for name in mesh.boundaries}
     assert areas[FREE_SURFACE] == pytest.approx(_ANGLE * radius * _WIDTH, rel=2e-5)
     assert areas["outer_wall"] == pytest.approx(_ANGLE * _WIDTH, rel=2e-5)
     assert areas["plate_left"] == pytest.approx((1 - radius) * _WIDTH, rel=2e-5)
@@ -50,12 +56,12 @@ def test_it_holds_the_volume_outside_the_surface(kind: CellKind, radius: float) 
 def test_every_face_is_shared_or_named_and_the_normals_close(kind: CellKind) -> None:
     body = liquid_body(_sector(5, kind), Level(constant=0.3, tilt=(0.05, -0.03, 0.04)))
     assert np.array_equal(lonely(body.cells, len(body.nodes)), body.faces >= 0)
-    space = TetrahedronSpace(body=body)
-    total = sum(space.facets(name).area.sum(axis=(0, 1)) for name in space.boundaries)
-    assert np.abs(total).max() < 1e-12
+    mesh = scikit_fem_mesh(body)
+    sides = [side(mesh, name) for name in mesh.boundaries]
+    assert np.abs(sum(each.area.sum(axis=(1, 2)) for each in sides)).max() < 1e-12
     # Gauss: the integral of x . n is three times the volume, on curved cells within the quadrature.
-    outflow = sum((f.points * f.area).sum() for f in map(space.facets, space.boundaries))
-    assert outflow / 3 == pytest.approx(space.weights.sum(), rel=1e-6)
+    outflow = sum((each.points * each.area).sum() for each in sides)
+    assert outflow / 3 == pytest.approx(quadratic_basis(mesh).dx.sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize("fill", [0.03, 0.25, 0.5, 0.9])
@@ -67,7 +73,7 @@ def test_a_chamber_with_fillets_and_a_gas_tube_holds_what_exact_integrals_say(fi
     exact = fill * chamber_volume(disc=disc)
     # Where a fillet leaves no room in a flat cell, the surface stays nearly straight over up to 7 mm: 0.16 mm
     # off on average, of 4.6 mm, over a tenth of it.
-    assert TetrahedronSpace(body=body).weights.sum() == pytest.approx(exact, rel=3e-3)
+    assert quadratic_basis(scikit_fem_mesh(body)).dx.sum() == pytest.approx(exact, rel=3e-3)
     assert jacobians(body).min() > 0
 
 

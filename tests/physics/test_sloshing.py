@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial import cKDTree
 from skfem import Basis, ElementQuad2, FacetBasis, LinearForm, condense, solve
 from skfem.models.poisson import laplace
 
 from ringbalance.mesh.chamber import chamber_mesh
-from ringbalance.mesh.export import scikit_fem_mesh
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
@@ -179,19 +177,16 @@ class Potential:
 
     def __init__(self, disc: Disc, *, radius: float, cells: tuple[int, int]) -> None:
         chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
-        self.mesh, numbers = scikit_fem_mesh(chamber)
-        # Places of the chamber's grid in that mesh.
-        self.grid = np.argsort(numbers)[chamber.grid]
+        self.mesh, self.grid = chamber.mesh, chamber.grid
         self.basis = Basis(self.mesh, ElementQuad2())
-        self.dofs = cKDTree(self.basis.doflocs.T).query(self.mesh.doflocs.T)[1]
 
-    def of(self, psi: Any) -> tuple[Any, Any]:
-        """int grad phi . grad v = int rot psi . grad v; psi and phi at all dofs."""
+    def of(self, psi: Any, nodes: Any) -> tuple[Any, Any]:
+        """int grad phi . grad v = int rot psi . grad v; psi and phi at all nodes."""
         fixed = np.zeros(self.basis.N)
-        fixed[self.dofs[self.grid[0, 1:-1]]] = psi
+        fixed[nodes] = psi
         rim = [self.grid[0], self.grid[-1], self.grid[:, 0], self.grid[:, -1]]
         stiff = laplace.assemble(self.basis)
-        stream = solve(*condense(stiff, x=fixed, D=np.unique(self.dofs[np.concatenate(rim)])))
+        stream = solve(*condense(stiff, x=fixed, D=np.unique(np.concatenate(rim))))
 
         @LinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
         def turned(v: Any, w: Any) -> Any:
@@ -202,11 +197,7 @@ class Potential:
 
     def mean(self, values: Any, row: int) -> float:
         """Over the surface (0) or the outer wall (-1)."""
-        nodes = self.mesh.doflocs[:, self.grid[row, 0]]
-        facets = self.mesh.facets_satisfying(
-            lambda x: np.abs(np.hypot(*x) - np.hypot(*nodes)) < 1e-3 * self.mesh.doflocs.max()
-        )
-        own = FacetBasis(self.mesh, ElementQuad2(), facets=facets)
+        own = FacetBasis(self.mesh, ElementQuad2(), facets="outer_wall" if row else "free_surface")
         return float(np.sum(own.interpolate(values) * own.dx) / np.sum(own.dx))
 
 
@@ -214,11 +205,11 @@ def test_the_mean_potential_on_the_wall_is_that_of_the_potential_itself(disc: Di
     cells, a = (8, 24), 35e-3
     system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
     field = Potential(disc, radius=a, cells=cells)
-    x, y = field.mesh.doflocs[:, field.grid[0, 1:-1]]
+    x, y = field.mesh.doflocs[:, system.nodes]
     angles = np.arctan2(y, x) - np.arctan2(y, x).mean()
     half = disc.central_angle / 2 - np.arcsin(disc.plate_thickness / a)
     psi = np.cos(np.pi / 2 * angles / half) + 0.3 * np.sin(np.pi * angles / half)
-    phi = field.of(psi)[1]
+    phi = field.of(psi, system.nodes)[1]
     assert system.potential @ psi == pytest.approx(field.mean(phi, -1) - field.mean(phi, 0), rel=1e-4)
     assert abs(system.potential @ psi) > 1e-4
 
@@ -231,7 +222,7 @@ def test_pressure_of_the_forced_waves_stands_on_surface_and_wall(disc: Disc) -> 
     swinging = -(s**2) * system.kinetic + 2j * s * system.coriolis + system.centrifugal
     psi = np.linalg.solve(swinging, 1j * s * (system.outflow[1] + 1j * system.outflow[2]))
     field = Potential(disc, radius=a, cells=cells)
-    parts = [field.of(part) for part in (psi.real, psi.imag)]
+    parts = [field.of(part, system.nodes) for part in (psi.real, psi.imag)]
     stream, phi = (one + 1j * other for one, other in zip(*parts, strict=True))
     scale = np.hypot(*field.mesh.doflocs).max()
     drive = (field.basis.doflocs[0] + 1j * field.basis.doflocs[1]) / scale
@@ -241,7 +232,7 @@ def test_pressure_of_the_forced_waves_stands_on_surface_and_wall(disc: Disc) -> 
 
     pressure = drive - 1j * s * phi - 2 * stream
     pressure = pressure - mean(pressure, 0)
-    surface = field.dofs[field.grid[0]]
+    surface = field.grid[0]
     angle = np.angle(field.basis.doflocs[0][surface] + 1j * field.basis.doflocs[1][surface])
     flux = -np.gradient(stream[surface], angle * a / scale)
     inner = slice(8, -8)

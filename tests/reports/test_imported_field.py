@@ -43,9 +43,7 @@ def test_its_profile_is_the_exact_one_from_the_surface_to_the_wall(
     assert shown["pressure_Pa"] == pytest.approx(exact, abs=1e-3 * exact[-1])
 
 
-def test_its_file_and_its_drawn_faces_hold_the_liquid(
-    scene: Scene, field: ImportedField, tmp_path: Path
-) -> None:
+def test_its_file_holds_the_liquid(scene: Scene, field: ImportedField, tmp_path: Path) -> None:
     volume = _FILL * chamber_volume(disc=scene.disc)
     grid = pyvista.read(field.write(path=tmp_path / "field.vtu"))
     # VTK and drawings take straight edges for curved ones: 16 cells along 84 degrees, 1 % of the depth.
@@ -53,7 +51,3 @@ def test_its_file_and_its_drawn_faces_hold_the_liquid(
     assert np.max(grid.point_data["depth_m"]) == pytest.approx(
         scene.disc.outer_radius - field.surface_radius, rel=1e-5
     )
-    drawn = field.outside()
-    corners = drawn.places[drawn.faces]
-    halves = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
-    assert np.linalg.det(halves).sum() / 6 == pytest.approx(volume, rel=1e-2)

@@ -66,15 +66,13 @@ def test_the_wall_pressure_holds_the_centrifugal_force_of_a_thin_film(paper_scen
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_derivatives_of_the_manufactured_pressure(dimension: int) -> None:
-    exact = Manufactured(length=0.0445, width=0.062, half_angle=math.pi / 4)
+    exact = Manufactured(length=0.0445, width=0.062)
     place = np.array([0.031, 0.012, 0.009])[:dimension]
     step = 1e-5
     shifts = step * np.eye(dimension)
     ahead = np.array([exact.pressure(place + d) for d in shifts])
     behind = np.array([exact.pressure(place - d) for d in shifts])
     np.testing.assert_allclose(exact.gradient(place), (ahead - behind) / (2 * step), rtol=1e-6)
-    curvature = np.sum(ahead + behind - 2 * exact.pressure(place)) / step**2
-    assert float(exact.laplacian(place)) == pytest.approx(float(curvature), rel=1e-4)
 
 
 def test_the_manufactured_flow_satisfies_its_equation() -> None:

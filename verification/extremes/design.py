@@ -13,7 +13,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.physics import deferred
+from scipy.stats.qmc import Sobol
+
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
@@ -101,7 +102,7 @@ def design(*, count: int, seed: int) -> tuple[Point, ...]:
     Source: Sobol's sequence, scrambled after Owen, as in scipy.stats.qmc.
     """
     size = 1 << max(count - 1, 0).bit_length()
-    shares = deferred.Sobol(2 * len(AXES), rng=seed).random(size)[:count]
+    shares = Sobol(2 * len(AXES), rng=seed).random(size)[:count]
     return tuple(_point(row[: len(AXES)], row[len(AXES) :]) for row in shares)
 
 

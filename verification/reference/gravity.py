@@ -25,7 +25,7 @@ from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level
 from ringbalance.verification.orders import OrderStudy, field_error, order_figure, orders_found, refined_cells
-from ringbalance.verification.rings import mutated_pressure
+from ringbalance.verification.rings import mutated_force
 
 _GAUSS: Final = 60
 _TILT: Final = 0.1
@@ -37,9 +37,12 @@ _DIRECTION: Final = 0.6
 _GRAVITY: Final = 9.80665
 _GRAVITY_FLIPPED: Final = "gravity_sign_flipped"
 _FACTORS: Final[Mapping[str | None, Mapping[str, float]]] = MappingProxyType(
-    {"source_off_by_a_percent": {"source": 1.01}, "wall_condition_off_by_a_percent": {"wall": 1.01}}
+    {
+        "force_off_by_a_percent": {"along": 1.01, "across": 1.01},
+        "force_across_off_by_a_percent": {"across": 1.01},
+    }
 )
-"""Mutations of the pressure problem."""
+"""Mutations of the body force."""
 _FILL_SHARE: Final = 0.8
 """Of the largest fill, in the study."""
 
@@ -161,7 +164,7 @@ def study(
         along=-sum(true.gravity[2:]),
     )
     liquid = replace(true, gravity=tuple(-g for g in true.gravity)) if defect == _GRAVITY_FLIPPED else true
-    with mutated_pressure(**_FACTORS.get(defect, {})):
+    with mutated_force(**_FACTORS.get(defect, {})):
         solutions = [solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=fill, cells=c) for c in cells]
     for solution in solutions:
         if not solution.status.ok:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.mesh.liquid_body import Level as SurfaceLevel
 from ringbalance.mesh.liquid_body import liquid_body
-from ringbalance.mesh.quadratic_tetrahedra import tetrahedra
+from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
+from ringbalance.physics.pressure.elements import quadratic_basis, side
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
-from ringbalance.physics.pressure.imported import ImportedRing, solve_on, solved_ring
-from ringbalance.physics.pressure.tetrahedra import TetrahedronSpace
+from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
+from ringbalance.physics.pressure.solve import solve_on
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene
@@ -80,24 +81,23 @@ def _balance(ring: ImportedRing, omega: float) -> float:
 
 @lru_cache(maxsize=8)
 def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> dict[str, OrderStudy]:
-    exact = Manufactured(length=disc.outer_radius, width=disc.axial_width, half_angle=disc.central_angle / 2)
+    exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
     problem, errors = exact.problem(defect), []
     a = float(surface_radius(disc=disc, fill_ratio=_FILL))
     for size in sizes:
         chamber = tetrahedra(disc_chamber(disc, (size, 2 * size, size)))
-        space = TetrahedronSpace(body=liquid_body(chamber, SurfaceLevel(constant=a**2 / 2)))
-        errors.append(_errors(space, exact, solve_on(space, problem).values))
+        basis = quadratic_basis(scikit_fem_mesh(liquid_body(chamber, SurfaceLevel(constant=a**2 / 2))))
+        errors.append(_errors(basis, exact, solve_on(basis, problem).values))
     field, wall = zip(*errors, strict=True)
     steps = [1 / size for size in sizes]
     return {"field": OrderStudy.of(size=steps, error=field), "wall": OrderStudy.of(size=steps, error=wall)}
 
 
-def _errors(space: TetrahedronSpace, exact: Manufactured, values: FloatArray) -> tuple[float, float]:
+def _errors(basis: Any, exact: Manufactured, values: FloatArray) -> tuple[float, float]:
     """Root mean square of the field's error, and the error of the force on the outer wall, relative."""
-    true = exact.pressure(space.points.T)
-    found = space.at_points(values)
-    wall = space.facets("outer_wall")
-    force = np.sum(wall.weights * exact.pressure(np.moveaxis(wall.points, -1, 0)))
-    weights = space.weights
-    field = np.sqrt(np.sum(weights * (found - true) ** 2) / np.sum(weights * true**2))
+    true = exact.pressure(np.asarray(basis.global_coordinates()))
+    difference = np.asarray(basis.interpolate(values)) - true
+    wall = side(basis.mesh, "outer_wall")
+    force = np.sum(wall.weights * exact.pressure(wall.points))
+    field = np.sqrt(np.sum(basis.dx * difference**2) / np.sum(basis.dx * true**2))
     return float(field), abs(float(np.sum(wall.weights * wall.at_points(values)) / force) - 1)

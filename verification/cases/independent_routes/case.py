@@ -9,7 +9,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference
 from ringbalance.verification.paper_numbers import with_plate
 from ringbalance.verification.reference.exact_chamber import exact_totals
-from ringbalance.verification.rings import found_of, mesh_table, mutated_pressure
+from ringbalance.verification.rings import found_of, mesh_table, mutated_force
 
 _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
 
@@ -43,7 +43,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _ring(scene: Scene, dimension: int, defect: str | None, share: float = 1.0) -> RingQuantities:
     disc = with_plate(scene.disc, 0.0) if defect == "plates_left_out" else scene.disc
-    with mutated_pressure(source=1.00001 if defect == "source_off" else 1.0):
+    factor = 1.00001 if defect == "force_off" else 1.0
+    with mutated_force(along=factor, across=factor):
         return ring_quantities(
             disc=disc,
             density=scene.liquid.density,

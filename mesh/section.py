@@ -1,0 +1,146 @@
+"""The plane section through the middle of an imported chamber's liquid, as a mesh of straight triangles.
+
+The liquid's quadratic tetrahedra, each divided into eight straight ones, are cut by a plane across the shaft:
+a plane leaves a tetrahedron in a triangle or a quadrilateral, and a named face in a named line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from skfem import MeshTri1
+
+from ringbalance.mesh.chamber import FREE_SURFACE
+from ringbalance.mesh.liquid_body import Level, liquid_body
+from ringbalance.mesh.quadratic_tetrahedra import FACES, face_nodes, tetrahedra
+from ringbalance.scene.arrays import BoolArray, IntArray
+from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
+
+_BESIDE: Final = 1e-4
+"""Of the chamber's width: so far beside the middle the plane lies.  Through nodes, as of a mesh that is
+symmetric about it, it would lose edges of the surface."""
+_EIGHT: Final = np.array(
+    [
+        [0, 4, 6, 7],
+        [4, 1, 5, 8],
+        [6, 5, 2, 9],
+        [7, 8, 9, 3],
+        [4, 5, 6, 8],
+        [4, 6, 7, 8],
+        [6, 7, 8, 9],
+        [5, 6, 8, 9],
+    ]
+)
+"""Straight parts of a quadratic tetrahedron; each of its faces is divided as in `_FOUR`."""
+_FOUR: Final = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+
+
+class NoPlaneWavesError(ValueError):
+    """A section whose surface is not one line from wall to wall, or that has walls inside."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Section:
+    """The liquid's cross-section."""
+
+    mesh: Any
+    """`skfem.MeshTri1`, lengths over `scale`, with its boundaries by name."""
+    scale: float
+    """Largest distance of the liquid from the shaft, m."""
+
+
+def middle_section(geometry: ChamberGeometry, *, surface_radius: float, coarse: bool = False) -> Section:
+    """Section of the liquid outside a concentric surface, half-way along the shaft.
+
+    Args: `surface_radius`: a, m. `coarse`: by the corners of the cells alone, on chords twice as long.
+    Raises: ValueError: as `liquid_body`.
+    Raises: NoPlaneWavesError: the free surface is not one chain of edges from wall to wall, or a wall is
+        closed in itself: stream functions would differ from wall to wall.
+    """
+    body = liquid_body(tetrahedra(geometry), Level(constant=surface_radius**2 / 2))
+    low, high = geometry.points[:, 2].min(), geometry.points[:, 2].max()
+    height = body.nodes[:, 2] - (low + high) / 2 - _BESIDE * (high - low)
+    cells, facets = body.cells[:, :4], body.cells[:, FACES].reshape(-1, 3)
+    parts = 1
+    if not coarse:
+        cells = body.cells[:, _EIGHT].reshape(-1, 4)
+        sides = np.stack([face_nodes(body.cells, k) for k in range(4)], axis=1)
+        facets, parts = sides[:, :, _FOUR].reshape(-1, 3), len(_FOUR)
+    names = np.repeat(body.faces.ravel(), parts)
+    triangles, _ = _crossings(cells, height > 0)
+    lines, cut = _crossings(facets[names >= 0], height > 0)
+    ends = np.sort(np.concatenate([triangles.reshape(-1, 2), lines.reshape(-1, 2)]), axis=1)
+    edges, numbers = np.unique(ends, axis=0, return_inverse=True)
+    share = (height[edges[:, 0]] / (height[edges[:, 0]] - height[edges[:, 1]]))[:, None]
+    places = ((1 - share) * body.nodes[edges[:, 0]] + share * body.nodes[edges[:, 1]])[:, :2]
+    scale = float(np.hypot(*places.T).max())
+    corners, pairs = np.split(numbers.ravel(), [3 * len(triangles)])
+    mesh = MeshTri1(np.ascontiguousarray(places.T / scale), np.ascontiguousarray(corners.reshape(-1, 3).T))
+    by_name = {
+        name: pairs.reshape(-1, 2)[names[names >= 0][cut] == number] for number, name in enumerate(body.names)
+    }
+    return Section(mesh=_with_boundaries(mesh, by_name), scale=scale)
+
+
+def _crossings(simplices: IntArray, above: BoolArray) -> tuple[IntArray, IntArray]:
+    """Edges of tetrahedra or triangles from one side of the plane to the other, by triangle or line.
+
+    Returns: Ends of the edges at the corners of each triangle or line, shape (n, corners, 2); the simplex
+        that each of them lies in.
+    """
+    # Corners above first: the lone corner is the first or the last one.
+    order = np.argsort(~above[simplices], axis=1, kind="stable")
+    corners = np.take_along_axis(simplices, order, axis=1)
+    count, size = above[simplices].sum(axis=1), simplices.shape[1]
+    cases = {1: [[(0, k) for k in range(1, size)]], size - 1: [[(k, size - 1) for k in range(size - 1)]]}
+    if size == 4:
+        cases[2] = [[(0, 2), (0, 3), (1, 3)], [(0, 2), (1, 3), (1, 2)]]
+    parts, which = [], []
+    for number, pieces in cases.items():
+        here = np.flatnonzero(count == number)
+        parts += [corners[here][:, piece] for piece in pieces]
+        which += [here] * len(pieces)
+    return np.concatenate(parts), np.concatenate(which)
+
+
+def _with_boundaries(mesh: Any, by_name: dict[str, IntArray]) -> Any:
+    """The mesh with facets named by their ends. Raises: NoPlaneWavesError."""
+    size = mesh.p.shape[1]
+    known = mesh.facets[0].astype(np.int64) * size + mesh.facets[1]
+    order = np.argsort(known)
+
+    def facets(pairs: IntArray) -> IntArray:
+        low, high = np.sort(pairs.astype(np.int64), axis=1).T
+        return np.asarray(order[np.searchsorted(known[order], low * size + high)], dtype=np.int32)
+
+    named = {name: facets(pairs) for name, pairs in by_name.items() if len(pairs)}
+    rim = mesh.boundary_facets()
+    whole = np.sort(np.concatenate(list(named.values()))) if named else np.empty(0)
+    surface = (
+        mesh.facets[:, named[FREE_SURFACE]] if FREE_SURFACE in named else np.empty((2, 0), dtype=np.int64)
+    )
+    ends = np.bincount(surface.ravel(), minlength=1)
+    if not (
+        np.array_equal(whole, np.sort(rim))
+        and _pieces(mesh.facets[:, rim]) == 1 == _pieces(surface)
+        and (ends == 1).sum() == 2
+        and ends.max() == 2
+        and OUTER_WALL in named
+    ):
+        raise NoPlaneWavesError(
+            "in the chamber's middle the free surface is not one line from wall to wall, or a wall stands "
+            "alone in the liquid: no plane waves are solved there"
+        )
+    return mesh.with_boundaries(named)
+
+
+def _pieces(lines: IntArray) -> int:
+    """Number of connected parts."""
+    nodes, ends = np.unique(lines, return_inverse=True)
+    first, second = ends.reshape(lines.shape)
+    graph = coo_array((np.ones(first.size), (first, second)), shape=(nodes.size, nodes.size))
+    return int(connected_components(graph, directed=False, return_labels=False))

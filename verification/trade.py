@@ -255,8 +255,8 @@ def _chamber_models(scene: Scene, fills: FloatArray, *, meshes: bool) -> dict[st
         return ring.wall_pressure.value, ring.moment.value
 
     def elements(cells: tuple[int, ...]) -> tuple[FloatArray, ...]:
-        ladder = tuple(tuple(max(1, n // k) for n in cells) for k in (1, 2, 4))
-        ring = scene_ring(scene, fill_ratio=fills, gravity=False, cells=ladder)
+        meshes_of_three = tuple(tuple(max(1, n // k) for n in cells) for k in (1, 2, 4))
+        ring = scene_ring(scene, fill_ratio=fills, gravity=False, cells=meshes_of_three)
         return ring.wall_pressure.value, ring.moment.value
 
     walls = "closed form" if scene.disc.geometry is None else "integrals over the walls"

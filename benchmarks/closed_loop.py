@@ -26,7 +26,7 @@ from dataclasses import asdict, replace
 from functools import partial
 
 from closed_loop_growth import Growth, compile_seconds, consequences_seconds, growth, order_of_growth
-from closed_loop_lines import FILL_ERROR, Line, Rivals, ensemble_lines, loosest, operation_lines, run_lines
+from closed_loop_lines import FILL_ERROR, Line, Rivals, ensemble_lines, loosest, run_lines
 from closed_loop_plain import by_the_law, in_numbers
 from rich.console import Console
 from rich.table import Table
@@ -46,10 +46,8 @@ def compare(scene: Scene, *, repeats: int, members: int, console: Console) -> tu
         "paper's law in numbers": loosest(scene, paper, in_numbers(scene, paper)),
         "paper's law by its interface": loosest(scene, paper, by_the_law(scene, paper)),
     }
-    console.print("one operation")
-    lines = operation_lines(scene, paper, rivals, repeats)
     console.print("one run")
-    lines += run_lines(scene, paper, rivals, repeats)
+    lines = run_lines(scene, paper, rivals, repeats)
     console.print(f"{members} noisy runs under the paper's law")
     rounds = min(repeats, 3)
     lines += ensemble_lines(scene, paper, rivals, members, rounds)

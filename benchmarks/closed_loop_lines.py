@@ -12,19 +12,16 @@ import numpy as np
 from closed_loop_plain import Plain, plain_run
 
 from ringbalance.controller.ensemble.monte_carlo import (
-    ensemble_transfer,
+    ensemble_dynamics,
     simulate_ensemble,
     simulate_members,
 )
 from ringbalance.controller.ensemble.run import EnsemblePlan
 from ringbalance.controller.ensemble.samples import Members
-from ringbalance.controller.ensemble.transfer import linear_fill
-from ringbalance.controller.liquid_ring.integrators import closed_form, integrator_of
-from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.models import Scene
+from ringbalance.verification.reference.transfers import Drive, closed_form
 
 FILL_ERROR = 1e-6
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
@@ -111,8 +108,7 @@ def loosest(scene: Scene, model: BalancerModel, velocity: Callable[[float], floa
     Raises: RuntimeError: no tolerance reaches it.
     """
     drives = drives_of(scene, model)
-    integrator = integrator_of(model.flow)
-    exact = [integrator(drive, np.array([t])).fill[-1] for drive, t in drives]
+    exact = [closed_form(drive, np.array([t])).fill[-1] for drive, t in drives]
     for tolerance in TOLERANCES:
         plain = Plain(
             velocity=velocity,
@@ -126,56 +122,6 @@ def loosest(scene: Scene, model: BalancerModel, velocity: Callable[[float], floa
     raise RuntimeError("solve_ivp does not reach the error asked for")
 
 
-def operation_lines(scene: Scene, model: BalancerModel, rivals: Rivals, repeats: int) -> list[Line]:
-    """One operation: in numbers, with its record, and in a batch.
-
-    Args: `rivals`: by name. `repeats`: timed rounds.
-    Returns: Three lines for each rival.
-    """
-    drive, duration = drives_of(scene, model)[0]
-    instants, transfer = np.array([duration]), ensemble_transfer(scene, model)
-    fills, times = np.linspace(0.2, 0.3, BATCH), np.full(BATCH, duration)
-    numbers = numbers_of(drive)
-    ours = (
-        (
-            "one operation",
-            least_seconds(lambda: linear_fill(drive.fill, duration, *numbers), repeats, 500),
-            100,
-        ),
-        (
-            "one operation, as a Transfer",
-            least_seconds(lambda: closed_form(drive, instants), repeats, 50),
-            None,
-        ),
-        (
-            "one operation in a batch",
-            least_seconds(lambda: transfer.after(fills, times), repeats, 5).per(BATCH),
-            100,
-        ),
-    )
-    lines = []
-    for name, plain in rivals.items():
-        rival = least_seconds(partial(plain.operate, drive.fill, duration), repeats, 20)
-        lines += [
-            Line(what=f"{name}: {what}", ours=own, rival=rival, wanted=wanted) for what, own, wanted in ours
-        ]
-    return lines
-
-
-def numbers_of(drive: Drive) -> tuple[float, ...]:
-    """What `linear_fill` takes beside fill and time.
-
-    Args: `drive`: of a law with a closed form.
-    Returns: Six numbers.
-    Raises: ValueError: another law.
-    """
-    law = drive.law
-    if not isinstance(law, PaperLaw):
-        raise ValueError("only the paper's law has a closed form")
-    a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
-    return a, b, drive.gas_pressure, drive.exchange_rate, drive.total, drive.lowest
-
-
 def run_lines(scene: Scene, model: BalancerModel, rivals: Rivals, repeats: int) -> list[Line]:
     """A whole run with an exact sensor: of an ensemble of one, and by `simulate` with its record.
 
@@ -183,7 +129,7 @@ def run_lines(scene: Scene, model: BalancerModel, rivals: Rivals, repeats: int) 
     Returns: Three lines for each rival.
     """
     still = replace(scene, sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0))
-    plan = EnsemblePlan.of(scene=still, model=model, transfer=ensemble_transfer(still, model))
+    plan = EnsemblePlan.of(scene=still, model=model, dynamics=ensemble_dynamics(still, model))
     alone = Members.alike(still, size=1)
     ours = (
         ("a whole run", least_seconds(lambda: plan.run(alone, seed=0), repeats, 20), 20),

@@ -26,8 +26,8 @@ from closed_loop_plain import plain_run
 from moving_injection import FILL_ERROR, METHODS, TOLERANCES, WANTED, Rival, least, ours, piped_scene
 from rich.console import Console
 
-from ringbalance.controller.ensemble.monte_carlo import ensemble_transfer, simulate_ensemble, simulate_members
-from ringbalance.controller.ensemble.transfer import RELATIVE_ERROR
+from ringbalance.controller.ensemble.monte_carlo import ensemble_dynamics, simulate_ensemble, simulate_members
+from ringbalance.controller.ensemble.run import RELATIVE_ERROR
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
@@ -108,8 +108,7 @@ def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
     )
     model = calibrate(scene).model
     dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG, HELD))
-    assert dynamics is not None
-    plant = ensemble_transfer(scene, model).plant
+    plant = ensemble_dynamics(scene, model).plant(total=2 * scene.disc.initial_fill)
     if not all(plant[name][0] > 0 for name in ("inertia", "line", "lifts", "valve_lag")):
         raise RuntimeError("the ensemble leaves out what is to be compared")
     carried = Carried(rival=Rival(scene, model), total=2 * scene.disc.initial_fill)

@@ -23,7 +23,7 @@ from scipy.integrate import solve_ivp
 
 from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_motion import begin
-from ringbalance.controller.ensemble.transfer import RELATIVE_ERROR
+from ringbalance.controller.ensemble.run import RELATIVE_ERROR
 from ringbalance.controller.formulas import flow_shape
 from ringbalance.controller.liquid_ring.compiled_events import command
 from ringbalance.controller.liquid_ring.compiled_march import advance
@@ -249,7 +249,6 @@ def rows(repeats: int) -> list[dict[str, object]]:
     scene = piped_scene()
     model = calibrate(scene).model
     dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG, HELD))
-    assert dynamics is not None
     rival, found = Rival(scene, model), []
     for duration in DURATIONS:
         exact = ours(dynamics, duration, error=1e-10, count=1)

@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_text, line_warning
 from ringbalance.reduced_model.terms import neglected_in_injections
@@ -34,7 +34,6 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "balancer": simulation.balancer,
         "controller": simulation.controller,
         "law": simulation.law,
-        "integrator": simulation.integrator,
         "settled": simulation.settled,
         "settling_time_s": simulation.settling_time,
         "verdict": simulation.verdict.value,
@@ -148,7 +147,7 @@ def simulation_rows(simulation: Simulation) -> Rows:
             *(Finding(code="out_of_range", values={"text": model.text}) for _ in (model,) if not model.ok),
         ),
         facts=(
-            ("flow law", f"{simulation.law} ({simulation.integrator.replace('_', ' ')})"),
+            ("flow law", simulation.law),
             ("gas line", line_text(simulation.gas_line)),
             ("neglected", neglected_in_injections(simulation.models_used).text),
         ),

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ringbalance.controller.document import simulation_document
+from ringbalance.controller.liquid_ring.motion import gives_forces
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
-from ringbalance.controller.terms import can_carry
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
@@ -34,7 +34,7 @@ def line_runs(scene: Scene, model: BalancerModel) -> tuple[_LineRun, ...]:
     """Runs with all terms of an injection modelled; none where the scene gives its gas line, or the law no
     forces."""
     ends = line_ends(scene)
-    if len(ends) == 1 or not can_carry(scene, model):
+    if len(ends) == 1 or not gives_forces(model.flow):
         return ()
     found = []
     for end in ends:

@@ -16,9 +16,7 @@ from ringbalance.controller.algorithms.target_vector import TargetVector
 from ringbalance.controller.algorithms.trial import Trial
 from ringbalance.controller.checks import check_fit, check_settings
 from ringbalance.controller.formulas import Cause, has_held, has_risen, stop_cause
-from ringbalance.controller.liquid_ring.integrators import integrator_of
 from ringbalance.controller.liquid_ring.plant import Advance, DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.transfer import Integrator
 from ringbalance.controller.outcome import Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
 from ringbalance.controller.run_findings import run_findings
@@ -43,11 +41,8 @@ Progress = Callable[[float, float], None]
 
 GAS_POINTS: Final = 8
 """Instants recorded within one command's valve-open time."""
-DRIFT_POINTS: Final = 4
-"""Instants recorded within a wait during which liquid may run back."""
 TAIL_POINTS: Final = 12
-"""The same where terms are modelled, so that an operation continues after its valve has closed."""
-RUNGE_KUTTA: Final = "runge_kutta"
+"""Instants recorded within a wait: an operation continues after its valve has closed."""
 MAX_SAMPLES: Final = 10_000
 """Of one run: a command costs some hundredths of a second to work out and to carry through time."""
 IDLE_OPERATIONS: Final = 3
@@ -60,7 +55,6 @@ def simulate(
     *,
     flow_law: CompleteLaw | None = None,
     controller: Controller[Any] | None = None,
-    integrator: Integrator | None = None,
     sensor: Sensor | None = None,
     progress: Progress | None = None,
     modelled: Collection[str] | None = None,
@@ -75,8 +69,6 @@ def simulate(
     the same answer, to its time limit.
     Args:
         flow_law: in place of `model`, a law that carries its own moments and volumes.
-        integrator: how operations are carried through time by the flow law alone; default the closed form
-            when the law has one, else the quadrature. With one given no further term is modelled.
         sensor: default the scene's noise from the scene's seed.
         modelled: of "tube inertia", "gas filling", "valve lag" and "liquid held in the tube" those to model;
             default all that the scene gives numbers for.
@@ -84,19 +76,15 @@ def simulate(
             fill at which gas enters the port.
     Raises: SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
         slow to form a ring, or a model made for another disc.
-    Raises: ValueError: both a model and a flow law, or neither; terms to model beside an integrator, or ones
-        that the scene or the law gives no numbers for.
+    Raises: ValueError: both a model and a flow law, or neither; terms to model that the scene or
+        the law gives no numbers for.
     Source: section 5 and Fig. 5 of the liquid-ring paper.
     """
     check_settings(scene)
     check_ring(scene)
     balancer = _one_of(model, flow_law)
     check_fit(scene, balancer)
-    if modelled and integrator is not None:
-        raise ValueError("an integrator carries the flow law alone: give it, or terms to model")
-    quasi_steady = integrator or integrator_of(balancer.flow)
-    asked = () if integrator is not None else modelled
-    used = run_models(scene=scene, model=balancer, asked=asked)
+    used = run_models(scene=scene, model=balancer, asked=modelled)
     residual = residual_fill_ratio(scene, law=balancer.flow) if residual_fill is None else residual_fill
     dynamics = dynamics_of(scene=scene, model=balancer, modelled=terms_modelled(used), residual_fill=residual)
     used_controller = controller or controller_of(scene, balancer)
@@ -107,10 +95,7 @@ def simulate(
         plant=LiquidRing(
             model=balancer,
             chambers=scene.disc.chambers,
-            gas_pressure=scene.gas.pressure,
-            integrator=quasi_steady,
             dynamics=dynamics,
-            residual_fill=residual,
         ),
         controller=used_controller,
         sensor=sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed),
@@ -120,8 +105,7 @@ def simulate(
         state=DiscState.initial(disc=scene.disc),
     )
     run.cause = run.go(progress or (lambda _, __: None))
-    name = getattr(quasi_steady, "__name__", "custom") if dynamics is None else RUNGE_KUTTA
-    return _record(run, integrator=name, used=used)
+    return _record(run, used=used)
 
 
 def _own_name(controller: Controller[Any] | None) -> str:
@@ -257,16 +241,13 @@ class _Run(Facts):
         before = self._vibration()
         self._pass(advance)
         self.operated = True
-        if self.plant.dynamics is not None:
-            self._wait()
-            self._conclude(len(advance.operations))
+        self._wait()
+        self._conclude(len(advance.operations))
         change = abs(self._vibration() - before)
         # Noise keeps opening the other valve a little; what counts is the one that should do the work.
         done = [injection.operation for injection in self.injections[-len(advance.operations) :]]
         working = max(done, key=lambda one: one.duration).moved or change > self.scene.controller.limit
         self.idle = 0 if working else self.idle + 1
-        if self.plant.dynamics is None:
-            self._wait()
 
     def _permitted(self, asked: Mapping[int, float]) -> dict[int, float]:
         """The valve-open times that leave each driven chamber its residual fill."""
@@ -295,9 +276,7 @@ class _Run(Facts):
         duration = min(self.scene.controller.period, self.remaining)
         self.cut = self.cut or duration < self.scene.controller.period
         if duration > 0:
-            points = 1 if self._rests else DRIFT_POINTS
-            points = points if self.plant.dynamics is None else TAIL_POINTS
-            self._pass(self.plant.advance(self.state, gas_times={}, duration=duration, points=points))
+            self._pass(self.plant.advance(self.state, gas_times={}, duration=duration, points=TAIL_POINTS))
 
     def _pass(self, advance: Advance) -> None:
         time = self.time + advance.instants
@@ -322,7 +301,7 @@ class _Run(Facts):
             self.since = min(self.since, float(time[0]))
 
 
-def _record(run: _Run, *, integrator: str, used: tuple[ModelUsed, ...]) -> Simulation:
+def _record(run: _Run, *, used: tuple[ModelUsed, ...]) -> Simulation:
     """Judge a finished run and freeze it."""
     time, fills = np.concatenate(run.times), np.concatenate(run.fills, axis=1)
     seen = np.concatenate(run.vibrations)
@@ -334,7 +313,6 @@ def _record(run: _Run, *, integrator: str, used: tuple[ModelUsed, ...]) -> Simul
         balancer="liquid_ring",
         controller=run.own_algorithm or run.scene.controller.kind,
         as_scene=run.as_scene,
-        integrator=integrator,
         outcome=run.outcome,
         settled=settled,
         settling_time=run.settling_time if settled else None,

@@ -11,7 +11,7 @@ import numpy as np
 
 from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.simulation import (
     NOISE_DEVIATIONS,
     Injection,
@@ -151,7 +151,7 @@ def _unmoved(facts: Facts) -> Outcome:
 def _over_too_soon(facts: Facts) -> bool:
     """Whether the gas would drive liquid, had it the time to fill the chamber."""
     plant, done = facts.plant, longest(facts).operation
-    if plant.dynamics is None:
+    if plant.dynamics.quasi_steady:
         return False
     flow, total = plant.model.flow, facts.state.pairs[0].total
     other = min(max(total - done.fill_after, 0.0), flow.max_fill_ratio)

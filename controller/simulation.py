@@ -181,8 +181,6 @@ class Simulation(DeferredResult):
     """`controller.kind` of the scene; of another algorithm the name of its type."""
     as_scene: bool
     """Whether algorithm and sensor are those of the scene."""
-    integrator: str
-    """How operations were carried through time."""
     outcome: Outcome
     settled: bool
     """Whether the amplitude held within the limit for the hold time and is expected to stay."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Lift
+from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Lift, gives_forces
 from ringbalance.physics.gas import VENTED, GasLine
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
@@ -30,7 +30,7 @@ def run_models(
     Raises: ValueError: a term that is not known, or that the scene or the law gives no numbers for.
     """
     _check(scene, model, asked or ())
-    return models_used(scene, law=model.name, obstacles=_obstacles(scene, model), asked=asked)
+    return models_used(scene, law=model.name, obstacles=_obstacles(model), asked=asked)
 
 
 def terms_modelled(used: Sequence[ModelUsed]) -> tuple[str, ...]:
@@ -45,8 +45,8 @@ def dynamics_of(
     modelled: Collection[str],
     residual_fill: float = 0.0,
     checked: bool = False,
-) -> Dynamics | None:
-    """The plant's terms; None when none is modelled.
+) -> Dynamics:
+    """What moves the liquid: the flow law, and beyond it the modelled terms.
 
     Args: `residual_fill`: of a driven chamber. `checked`: whether the terms are known to have numbers, as
         for the many scenes of a fit that differ in values alone.
@@ -56,11 +56,8 @@ def dynamics_of(
         _check(scene, model, modelled)
     line = GasLine.of(scene.gas) if FILLING in modelled else None
     gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
-    column = Column.of(law=model.flow, tube=scene.tube, gas_off=gas_off)
-    if not modelled or column is None:
-        return None
     return Dynamics(
-        column=column,
+        column=Column.of(law=model.flow, tube=scene.tube, gas_off=gas_off),
         inertia=INERTIA in modelled,
         line=line,
         valve_lag=(scene.gas.valve_lag or 0.0) if LAG in modelled else 0.0,
@@ -75,11 +72,6 @@ def dynamics_of(
     )
 
 
-def can_carry(scene: Scene, model: BalancerModel) -> bool:
-    """Whether a law gives the forces that terms of an injection need."""
-    return Column.of(law=model.flow, tube=scene.tube) is not None
-
-
 def _check(scene: Scene, model: BalancerModel, asked: Collection[str]) -> None:
     for term in asked:
         if term not in IN_INJECTIONS:
@@ -87,13 +79,13 @@ def _check(scene: Scene, model: BalancerModel, asked: Collection[str]) -> None:
         gas = scene.gas
         unknown = (term == FILLING and gas.conductance is None) or (term == LAG and gas.valve_lag is None)
         no_crest = term == HELD and isinstance(model.flow, PaperLaw)
-        if unknown or no_crest or not can_carry(scene, model):
+        if unknown or no_crest or not gives_forces(model.flow):
             raise ValueError(f"{term} cannot be modelled: the scene or the law gives no numbers for it")
 
 
-def _obstacles(scene: Scene, model: BalancerModel) -> dict[str, str]:
+def _obstacles(model: BalancerModel) -> dict[str, str]:
     """Why the law cannot carry a term, by term."""
-    if not can_carry(scene, model):
+    if not gives_forces(model.flow):
         return dict.fromkeys(IN_INJECTIONS, "this law gives velocities and no forces")
     if isinstance(model.flow, PaperLaw):
         return {

@@ -1,4 +1,7 @@
-"""What a fit asks of a scene, whichever balancer it has: parameters, held inputs, errors of its models."""
+"""What a fit asks of a balancer: its quantities, their priors, and errors of its models.
+
+One side for each balancer that has kinds of data (`data.kinds`); a further one is one more.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Final
+from types import MappingProxyType
+from typing import Any, Final, Protocol
 
 import numpy as np
 
+from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.eccentric_mass.inputs import eccentric_value, eccentric_with
-from ringbalance.controller.eccentric_mass.scene_records import (
-    ECCENTRIC_MASS,
-    EccentricScene,
-    eccentric_scene,
-)
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.device import Models
@@ -25,13 +26,21 @@ from ringbalance.physics.tube.uncertainty import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.scene.joint import with_model_error
 from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, half_widths, nominal_value, shifted
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.uncertain import (
+    NORMAL_95,
+    UNCERTAIN_QUANTITIES,
+    half_widths,
+    nominal_value,
+    shifted,
+)
 
 _LITTLE: Final = 1e-4
 """Of a quantity, or in SI units where it is zero."""
 _REACH: Final = 30.0
 """Factor up to which a value is looked for."""
+_PHASE: Final = "imbalance.phase"
 _OF_FLOW: Final = {
     f"model: {cause}": (cause, 1.0, 0.0) for cause in (START_ERROR, CLEARING_ERROR, CAVITY_ERROR)
 }
@@ -53,141 +62,179 @@ expanded uncertainty (95 %).
 """
 
 
-def models_for(scene: AnyScene) -> Models | None:
+class _Side(Protocol):
+    """What a fit asks of the scenes of one balancer."""
+
+    def models(self, scene: Any) -> Models | None:
+        """Models that predictions take; None where there is but one."""
+        ...
+
+    def instead(self, scene: Any) -> Mapping[str, str]:
+        """Names of parameters that stand in for others."""
+        ...
+
+    def parameter(self, scene: Any, name: str) -> Parameter:
+        """Raises: FitError: a name that cannot be fitted."""
+        ...
+
+    def widths(self, scene: Any) -> Mapping[str, float]:
+        """Expanded uncertainties (95 %), SI, by name; only those above zero."""
+        ...
+
+    def values(self, scene: Any) -> dict[str, float]:
+        """Value, SI, of every quantity that may be uncertain and that the scene has."""
+        ...
+
+    def moved(self, scene: Any, name: str, change: float) -> SceneFile:
+        """The scene with one uncertain quantity changed, SI, as far as a device can have it."""
+        ...
+
+    def errors(self, scene: Any) -> tuple[str, ...]:
+        """Names of the errors of its models, of `MODEL_ERRORS`."""
+        ...
+
+
+class _LiquidRing:
+    def models(self, scene: Scene) -> Models:
+        return Models.of(scene)
+
+    def instead(self, scene: Scene) -> Mapping[str, str]:
+        """A prescribed k stands in for the loss that it leaves out."""
+        return {} if scene.tube.drag_coefficient is None else {"extra_loss": "drag_coefficient"}
+
+    def parameter(self, scene: Scene, name: str) -> Parameter:
+        return Parameter.of(scene, name)
+
+    def widths(self, scene: Scene) -> Mapping[str, float]:
+        return half_widths(scene)
+
+    def values(self, scene: Scene) -> dict[str, float]:
+        values = {name: nominal_value(scene=scene, quantity=name) for name in UNCERTAIN_QUANTITIES}
+        return {name: value for name, value in values.items() if value is not None}
+
+    def moved(self, scene: Scene, name: str, change: float) -> Scene:
+        return shifted(scene=scene, quantity=name, change=change)
+
+    def errors(self, scene: Scene) -> tuple[str, ...]:
+        """A prescribed k has no model."""
+        return tuple(MODEL_ERRORS if scene.tube.drag_coefficient is None else _OF_FLOW)
+
+
+class _EccentricMasses:
+    """Quantities go by their paths, such as "rotor.damping" and "masses.friction_arm[0]"."""
+
+    def models(self, _: EccentricScene) -> None:
+        return None
+
+    def instead(self, _: EccentricScene) -> Mapping[str, str]:
+        return {}
+
+    def parameter(self, scene: EccentricScene, name: str) -> Parameter:
+        values, is_angle = self.values(scene), name == _PHASE
+        if name not in values:
+            raise FitError.unknown(name, tuple(values))
+        start = values[name]
+        if start <= 0 and not is_angle:
+            raise FitError(f"{name} is zero: give a value above zero to fit it")
+        width = self.widths(scene).get(name)
+        low, high = (start - math.pi, start + math.pi) if is_angle else (start / _REACH, start * _REACH)
+        return Parameter(
+            name=name,
+            symbol=name,
+            start=start,
+            lowest=low,
+            highest=high,
+            prior=width / NORMAL_95 if width else None,
+            scale=1.0 if is_angle else None,
+            change=partial(eccentric_with, name=name),
+        )
+
+    def widths(self, scene: EccentricScene) -> Mapping[str, float]:
+        inputs = balancer_of(scene).inputs()
+        return {each.path: each.half_width for each in inputs if each.half_width > 0}
+
+    def values(self, scene: EccentricScene) -> dict[str, float]:
+        return {each.path: each.value for each in balancer_of(scene).inputs()}
+
+    def moved(self, scene: EccentricScene, name: str, change: float) -> EccentricScene:
+        value = eccentric_value(scene, name)
+        moved = value + change if name == _PHASE else max(value + change, 0.1 * value)
+        return eccentric_with(scene, moved, name=name)
+
+    def errors(self, _: EccentricScene) -> tuple[str, ...]:
+        return ()
+
+
+_SIDES: Final[Mapping[str, _Side]] = MappingProxyType(
+    {"liquid_ring": _LiquidRing(), "eccentric_mass": _EccentricMasses()}
+)
+
+
+def _side(scene: SceneFile) -> _Side:
+    if scene.balancer not in _SIDES:
+        raise FitError(f"no kind of data tells of the balancer {scene.balancer}")
+    return _SIDES[scene.balancer]
+
+
+def models_for(scene: SceneFile) -> Models | None:
     """Models that predictions take; None where there is but one."""
-    return Models.of(scene) if isinstance(scene, Scene) else None
+    return _side(scene).models(scene)
 
 
-def parameters_for(scene: AnyScene, names: Sequence[str]) -> tuple[Parameter, ...]:
+def parameters_for(scene: SceneFile, names: Sequence[str]) -> tuple[Parameter, ...]:
     """Parameters by name. Raises: FitError: a name that cannot be fitted, or twice the same, or none."""
     if not names or len(set(names)) < len(names):
         raise FitError("name at least one parameter, and each once")
-    if isinstance(scene, Scene):
-        return tuple(Parameter.of(scene, name) for name in names)
-    return tuple(_eccentric_parameter(eccentric_scene(scene), name) for name in names)
+    return tuple(_side(scene).parameter(scene, name) for name in names)
 
 
-def informed(scene: AnyScene, data: Sequence[Observations]) -> list[str]:
-    """Parameters that data inform; a prescribed k stands in for the loss that it leaves out."""
+def informed(scene: SceneFile, data: Sequence[Observations]) -> list[str]:
+    """Parameters that data inform."""
     names = dict.fromkeys(name for each in data for name in PREDICTED[each.kind].informs(each))
-    prescribed = isinstance(scene, Scene) and scene.tube.drag_coefficient is not None
-    return ["drag_coefficient" if prescribed and name == "extra_loss" else name for name in names]
+    instead = _side(scene).instead(scene)
+    return [instead.get(name, name) for name in names]
 
 
-def held_for(scene: AnyScene, fitted: Sequence[str]) -> dict[str, float]:
+def held_for(scene: SceneFile, fitted: Sequence[str]) -> dict[str, float]:
     """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted, and of what its
     models may be off by."""
-    inputs = {name: width / NORMAL_95 for name, width in _widths(scene).items() if name not in fitted}
-    return inputs | (dict.fromkeys(model_errors(scene), 1.0) if isinstance(scene, Scene) else {})
+    side = _side(scene)
+    inputs = {name: width / NORMAL_95 for name, width in side.widths(scene).items() if name not in fitted}
+    return inputs | dict.fromkeys(side.errors(scene), 1.0)
 
 
-def _widths(scene: AnyScene) -> Mapping[str, float]:
-    """Expanded uncertainties (95 %), SI."""
-    return half_widths(scene) if isinstance(scene, Scene) else _eccentric_widths(eccentric_scene(scene))
+def model_errors(scene: SceneFile) -> tuple[str, ...]:
+    """Names of the errors of a scene's models, of `MODEL_ERRORS`."""
+    return _side(scene).errors(scene)
 
 
-def _values(scene: AnyScene) -> dict[str, float]:
-    """Value, SI, of every quantity that may be uncertain and that the scene has."""
-    if not isinstance(scene, Scene):
-        driven = eccentric_scene(scene)
-        return {name: eccentric_value(driven, name) for name in _fitted_names(driven)}
-    values = {name: nominal_value(scene=scene, quantity=name) for name in UNCERTAIN_QUANTITIES}
-    return {name: value for name, value in values.items() if value is not None}
+def value_of(scene: SceneFile, name: str) -> float:
+    """Value, SI, of an uncertain quantity that the scene has."""
+    return _side(scene).values(scene)[name]
 
 
-def both_sides(scene: AnyScene, name: str, change: float) -> tuple[AnyScene, AnyScene]:
+def both_sides(scene: SceneFile, name: str, change: float) -> tuple[SceneFile, SceneFile]:
     """The scene with one of these lower and higher by a change, SI, as far as a device can have it."""
     # Errors of models are nearly linear, and there are many of them.
     low = scene if name in MODEL_ERRORS else changed(scene, name, -change)
     return low, changed(scene, name, change)
 
 
-def changed(scene: AnyScene, name: str, change: float) -> AnyScene:
+def changed(scene: SceneFile, name: str, change: float) -> SceneFile:
     """The scene with one uncertain quantity changed, SI, or an error of a model, in standard deviations."""
-    if not isinstance(scene, Scene):
-        return _eccentric_shifted(eccentric_scene(scene), name, change)
     if name in MODEL_ERRORS:
-        return with_model_error(scene, name, change)
-    return shifted(scene=scene, quantity=name, change=change)
-
-
-def _nearby(scene: AnyScene, name: str) -> AnyScene:
-    """The scene with one of its quantities a little lower, or a little above zero."""
-    value = _values(scene)[name]
-    return changed(scene, name, -_LITTLE * abs(value) if value else _LITTLE)
-
-
-def _exact_for(scene: AnyScene, fitted: Sequence[str]) -> list[str]:
-    """Quantities that are neither fitted nor stated as uncertain."""
-    known = {*_widths(scene), *fitted}
-    return [name for name in _values(scene) if name not in known]
+        return with_model_error(liquid_ring_scene(scene), name, change)
+    return _side(scene).moved(scene, name, change)
 
 
 def exact_inputs(result: FitResult) -> list[str]:
     """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
     problem, t = result.optimum.residuals.problem, result.optimum.t
-    fitted, predicted = [parameter.name for parameter in result.parameters], problem.at(t)
-    return [
-        name
-        for name in _exact_for(problem.scene, fitted)
-        if np.any(replace(problem, scene=_nearby(problem.scene, name)).at(t) != predicted)
-    ]
-
-
-def _fitted_names(scene: EccentricScene) -> tuple[str, ...]:
-    """All that can be fitted."""
-    found: list[str] = []
-    for table, content in ECCENTRIC_MASS.tables.items():
-        for key in (name for name, declared in content.keys.items() if declared.uncertain):
-            value = getattr(getattr(scene, table), key)
-            found += (
-                [f"{table}.{key}[{i}]" for i in (0, 1)] if isinstance(value, tuple) else [f"{table}.{key}"]
-            )
-    return tuple(found)
-
-
-def _eccentric_parameter(scene: EccentricScene, name: str) -> Parameter:
-    """A quantity by its path, such as "rotor.damping"; a list's entries by "masses.friction_arm[0]".
-
-    Raises: FitError: no such quantity, or a value that is zero.
-    """
-    if name not in _fitted_names(scene):
-        raise FitError.unknown(name, _fitted_names(scene))
-    start, is_angle = eccentric_value(scene, name), name == "imbalance.phase"
-    if start <= 0 and not is_angle:
-        raise FitError(f"{name} is zero: give a value above zero to fit it")
-    width = _eccentric_widths(scene).get(name)
-    low, high = (start - math.pi, start + math.pi) if is_angle else (start / _REACH, start * _REACH)
-    return Parameter(
-        name=name,
-        symbol=name,
-        start=start,
-        lowest=low,
-        highest=high,
-        prior=width / NORMAL_95 if width else None,
-        scale=1.0 if is_angle else None,
-        change=partial(eccentric_with, name=name),
-    )
-
-
-def _eccentric_widths(scene: EccentricScene) -> dict[str, float]:
-    """Expanded uncertainties (95 %) that the scene states, SI."""
-    stated = {each.quantity: each for each in scene.uncertainty}
-    widths = {
-        name: stated[path].absolute(eccentric_value(scene, name))
-        for name in _fitted_names(scene)
-        if (path := name.split("[")[0]) in stated
-    }
-    return {name: width for name, width in widths.items() if width > 0}
-
-
-def _eccentric_shifted(scene: EccentricScene, name: str, change: float) -> EccentricScene:
-    """The scene with one value changed, as far as a machine can have it."""
-    value = eccentric_value(scene, name)
-    moved = value + change if name == "imbalance.phase" else max(value + change, 0.1 * value)
-    return eccentric_with(scene, moved, name=name)
-
-
-def model_errors(scene: Scene) -> tuple[str, ...]:
-    """Names of those that a scene has: a prescribed k has no model."""
-    return tuple(MODEL_ERRORS if scene.tube.drag_coefficient is None else _OF_FLOW)
+    scene, predicted = problem.scene, problem.at(t)
+    known = {*_side(scene).widths(scene), *(parameter.name for parameter in result.parameters)}
+    found = []
+    for name, value in _side(scene).values(scene).items():
+        nearby = changed(scene, name, -_LITTLE * abs(value) if value else _LITTLE)
+        if name not in known and np.any(replace(problem, scene=nearby).at(t) != predicted):
+            found.append(name)
+    return found

@@ -68,7 +68,6 @@ def _criticism(told: Review) -> dict[str, Any]:
         {
             "test": each.test,
             "residuals_of": each.block,
-            "against": each.against,
             "p_value": each.p_value,
             "corrected_p_value": each.corrected,
             "fails": each.fails,

@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from ringbalance.identification.balancers import both_sides, held_for, informed, models_for, parameters_for
-from ringbalance.identification.data.kinds import KINDS
+from ringbalance.identification.data.kinds import kinds_of
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
 from ringbalance.identification.intervals import Profile, covariance, profiles
@@ -62,7 +62,7 @@ def problem_of(
     if not data:
         raise FitError("give at least one file of measurements")
     for each in data:
-        if KINDS[each.kind].balancer != scene.balancer:
+        if each.kind not in kinds_of(scene.balancer):
             raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
         if reason := PREDICTED[each.kind].obstacle(scene, each):
             raise FitError(f"{each.file}: {reason}")

@@ -22,8 +22,7 @@ from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.result import Joint
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.model_errors import LARGEST_ERROR
-from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.uncertain import NORMAL_95
 
 _ROUNDS: Final = 4
@@ -114,8 +113,5 @@ def scene_as_fitted(best: Optimum, held: Mapping[str, float]) -> AnyScene:
     for (name, sd), step in zip(held.items(), steps.tolist(), strict=True):
         scene = changed(scene, name, step * sd)
     as_fitted: AnyScene = replace(residuals.problem, scene=scene).scene_at(best.t)
-    if not isinstance(as_fitted, Scene):
-        return as_fitted
-    gas = as_fitted.gas
-    off = gas.pressure - residuals.problem.models.gas_pressure
-    return replace(as_fitted, gas=replace(gas, gauge_correction=off))
+    models = residuals.problem.models
+    return as_fitted if models is None else models.with_gauge_correction(liquid_ring_scene(as_fitted))

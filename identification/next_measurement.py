@@ -6,14 +6,14 @@ data.  Their noise is that of the fit; a kind that was not measured has an assum
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.balancers import both_sides
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.measurements import Observations
@@ -152,7 +152,7 @@ def _first_series(block: Block) -> FloatArray:
 
 def _grids(scene: AnyScene) -> dict[str, Grid]:
     """Values of what is set, by kind and column, SI, over the ranges of a scene."""
-    return _ring_grids(scene) if isinstance(scene, Scene) else _eccentric_grids(eccentric_scene(scene))
+    return _GRIDS[scene.balancer](scene)
 
 
 def _eccentric_grids(scene: EccentricScene) -> dict[str, Grid]:
@@ -184,6 +184,12 @@ def _ring_grids(scene: Scene) -> dict[str, Grid]:
         "trial_weight": weights,
         "trial_amplitude": weights,
     }
+
+
+_GRIDS: Final[Mapping[str, Callable[[Any], dict[str, Grid]]]] = {
+    "liquid_ring": _ring_grids,
+    "eccentric_mass": _eccentric_grids,
+}
 
 
 def _offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> Observations:

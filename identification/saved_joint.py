@@ -8,8 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.inputs import eccentric_value
-from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
+from ringbalance.identification.balancers import value_of
 from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, path_of
 from ringbalance.identification.saved_places import Place, place_of
@@ -17,8 +16,8 @@ from ringbalance.scene.fitted import MODEL, NO_UNIT
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.model_errors import ERROR_NAME, ModelError
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.uncertain import NORMAL_95, nominal_value
+from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
+from ringbalance.scene.uncertain import NORMAL_95
 
 _DIGITS: Final = 9
 _PARTS: Final = ("even", "odd")
@@ -97,22 +96,14 @@ def put_joint(
         return
     values = [(place_of(each.path, document), each) for each in pulled if each.held and not each.is_model]
     for place, each in values:
-        _put_value(document, place, _value(scene, each.name))
-        _put_width(document, place, each.standard_deviation, _value(scene, each.name))
-    if isinstance(scene, Scene):
-        _put_errors(document, scene)
-        if any(each.name == "pressure" for each in (*pulled, *joint) if each in pulled or not each.held):
-            place_of("gas.gauge_correction", document).put(document, scene.gas.gauge_correction)
+        _put_value(document, place, value_of(scene, each.name))
+        _put_width(document, place, each.standard_deviation, value_of(scene, each.name))
+    if any(each.is_model for each in joint):
+        _put_errors(document, liquid_ring_scene(scene))
+    if any(each.name == "pressure" for each in (*pulled, *joint) if each in pulled or not each.held):
+        correction = liquid_ring_scene(scene).gas.gauge_correction
+        place_of("gas.gauge_correction", document).put(document, correction)
     document["fitted"] = {"quantities": list(_quantities(document, joint))}
-
-
-def _value(scene: AnyScene, name: str) -> float:
-    if not isinstance(scene, Scene):
-        return eccentric_value(eccentric_scene(scene), name)
-    value = nominal_value(scene=scene, quantity=name)
-    if value is None:
-        raise ValueError(f"the scene has no {name}")
-    return value
 
 
 def _put_value(document: dict[str, Any], place: Place, value: float) -> None:

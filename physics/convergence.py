@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
-from ringbalance.physics.roots import bracketed_minimum
 from ringbalance.scene.arrays import FloatArray
 
 _LOWEST_ORDER = 0.5
@@ -242,7 +242,7 @@ def _free(values: FloatArray, h: FloatArray, weights: FloatArray, formal_order: 
     low, high = start - 0.1, start + 0.1
     if low <= 0 <= high:
         low, high = (0.02, high) if start > 0 else (low, -0.02)
-    order = bracketed_minimum(deviation, low, high, tolerance=1e-9)
+    order = float(minimize_scalar(deviation, bounds=(low, high), method="bounded", options={"xatol": 1e-9}).x)
     return _linear(values, h, weights, (order,), order)
 
 

@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
 
-from ringbalance.physics.splines import monotone_slopes
 from ringbalance.scene.arrays import FloatArray, clipped
 
 _NEWTON_STEPS = 5
@@ -191,7 +191,8 @@ def level_table(*, start: float, stop: float, value: npt.ArrayLike) -> HermiteTa
     step = (stop - start) / (y.size - 1)
     rises = np.abs(np.diff(y))
     steepest = _STEEPEST * np.minimum(np.append(rises[:1], rises), np.append(rises, rises[-1:]))
-    slope = np.clip(monotone_slopes(y), -steepest, steepest)
+    nodes = np.arange(y.size)
+    slope = np.clip(PchipInterpolator(nodes, y).derivative()(nodes), -steepest, steepest)
     return HermiteTable(start=start, step=step, value=y, slope=slope / step, curvature=np.zeros_like(y))
 
 

@@ -142,8 +142,8 @@ def write_report(
         views = _Views(pool=pool)
         common: dict[str, Any] = {"level": level, "pool": pool, "progress": progress}
         common["scene_text"] = scene_text
-        if scene.balancer in DRIVEN:
-            evidence = DRIVEN[scene.balancer](scene, **common)
+        if collect := DRIVEN.get(scene.balancer):
+            evidence = collect(scene, **common)
         else:
             ring = liquid_ring_scene(scene)
             with _pictures(ring, stage, opengl) as pictures:

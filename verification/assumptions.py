@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import RestsOn
@@ -63,6 +62,14 @@ def _value_of(scene: Any, path: str) -> float | None:
     return value
 
 
+def _with_part(scene: Any, table: str, **values: Any) -> Any:
+    return dataclasses.replace(scene, **{table: dataclasses.replace(getattr(scene, table), **values)})
+
+
+_CHANGES: Final[Mapping[str, Callable[..., Any]]] = {"eccentric_mass": changed}
+"""How values are changed in scenes whose defaults follow from others."""
+
+
 def overridden(scene: Any, overrides: Mapping[str, float | Literal["absent"]]) -> Any:
     """A scene of either balancer with some SI values changed by "table.key"; "absent" stands for None.
 
@@ -73,11 +80,8 @@ def overridden(scene: Any, overrides: Mapping[str, float | Literal["absent"]]) -
         if not hasattr(getattr(scene, table, None), key):
             raise ValueError(f'a scene has no quantity "{path}"')
         value = None if given == "absent" else given
-        if isinstance(scene, EccentricScene):
-            scene = changed(scene, table, **{key: value})
-        else:
-            part = dataclasses.replace(getattr(scene, table), **{key: value})
-            scene = dataclasses.replace(scene, **{table: part})
+        change: Callable[..., Any] = _CHANGES.get(scene.balancer, _with_part)
+        scene = change(scene, table, **{key: value})
     return scene
 
 

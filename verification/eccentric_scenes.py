@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.keys.declaration import Entries, Key, keys_of
@@ -26,15 +26,8 @@ _DRAWN: Final = 240
 
 @lru_cache(maxsize=1)
 def driven_scene() -> EccentricScene:
-    """The eccentric-mass paper's own rotor.
-
-    Returns: The bundled scene.
-    Raises: TypeError: the bundled scene is of another balancer.
-    """
-    scene = load_scene(bundled_scene(DRIVEN_SCENE))
-    if not isinstance(scene, EccentricScene):
-        raise TypeError(f"{DRIVEN_SCENE} is no scene of eccentric masses")
-    return scene
+    """The eccentric-mass paper's own rotor."""
+    return eccentric_scene(load_scene(bundled_scene(DRIVEN_SCENE)))
 
 
 def thinned(values: npt.ArrayLike) -> FloatArray:

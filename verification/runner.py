@@ -157,7 +157,7 @@ def _outcome(
 
 
 def _imported(scene: Any) -> bool:
-    return isinstance(scene, Scene) and scene.disc.geometry is not None
+    return bool(scene.mesh_digest)
 
 
 def scene_of(definition: CaseDefinition, scene: Scene) -> Any:

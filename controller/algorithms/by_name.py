@@ -8,9 +8,9 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.algorithms.target_vector import TargetVector
 from ringbalance.controller.algorithms.trial import Trial
-from ringbalance.controller.liquid_ring.integrators import integrator_of
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.rotor import chamber_letters
+from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.describe import scene_fault
@@ -80,9 +80,12 @@ def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
         ring=LiquidRing(
             model=model,
             chambers=scene.disc.chambers,
-            gas_pressure=scene.gas.pressure,
-            integrator=integrator_of(model.flow),
-            residual_fill=residual_fill_ratio(scene, law=model.flow),
+            dynamics=dynamics_of(
+                scene=scene,
+                model=model,
+                modelled=(),
+                residual_fill=residual_fill_ratio(scene, law=model.flow),
+            ),
         ),
         initial=DiscState.initial(disc=scene.disc),
         influence=settings.assumed_influence,

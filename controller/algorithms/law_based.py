@@ -16,8 +16,6 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand, opening
 from ringbalance.controller.liquid_ring.motion import PairState
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.reach import gas_time
-from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.controller.rotor import chamber_directions, disc_unbalance
 from ringbalance.reduced_model.law.model import MomentCurve
 from ringbalance.scene.arrays import FloatArray
@@ -173,13 +171,7 @@ class LawBased:
 
     def _advanced(self, state: _LawBasedState, interval: float) -> DiscState:
         times = {valve.chamber: min(self._acting(valve), interval) for valve in state.valves}
-        disc, rest = state.disc, interval
-        if times:
-            disc = self.ring.advance(disc, gas_times=times, duration=max(times.values()), points=1).state
-            rest -= max(times.values())
-        if rest > 0 and (self.ring.floods or any(pair.primed for pair in disc.pairs)):
-            disc = self.ring.advance(disc, gas_times={}, duration=rest, points=1).state
-        return disc
+        return self.ring.advance(state.disc, gas_times=times, duration=interval, points=1).state
 
     def _acting(self, valve: ValveCommand) -> float:
         """Of a valve-open time, s, what moves liquid by the law."""
@@ -226,22 +218,9 @@ class LawBased:
         first = wanted < pair.fill
         chamber = index if first else index + self.ring.chambers // 2
         target = wanted if first else total - wanted
-        drive = self._drive(pair, first=first)
-        found = gas_time(
-            drive=drive, fill=target, integrator=self.ring.integrator, longest=self.maximum_gas_time
-        )
-        blocked = found == 0 and target < drive.fill
-        return chamber, self.probe if blocked else found
-
-    def _drive(self, pair: PairState, *, first: bool) -> Drive:
-        return Drive(
-            law=self.ring.model.flow,
-            fill=pair.fill if first else pair.opposite_fill,
-            total=pair.total,
-            exchange_rate=self.ring.model.tube_area / self.ring.model.chamber_volume,
-            gas_pressure=self.ring.gas_pressure,
-            primed=pair.primed,
-        )
+        time = self.ring.gas_time(pair, first=first, fill=target, longest=self.maximum_gas_time)
+        blocked = time == 0 and target < (pair.fill if first else pair.opposite_fill)
+        return chamber, self.probe if blocked else time
 
 
 def _vector(measurement: Measurement) -> complex:

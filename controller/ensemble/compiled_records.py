@@ -18,13 +18,8 @@ Record = Any
 """One element of an array with one of the types below; compiled code changes it in place."""
 
 _REAL: Final = (
-    "squared_per_pressure",  # a, m^3/kg, of u^2 = a (p + b (x_A - x_C)); zero for a law that is tabled
-    "pressure_per_fill",  # b, Pa
-    "gas_pressure",  # gauge, Pa
-    "exchange_rate",  # S/V, 1/m
     "total",  # x_A + x_C
     "lowest",  # smallest x
-    "highest",  # largest x
     "initial_fill",
     "moment_step",  # between the nodes of the moment's table, in x
     "start_real",  # vibration with level chambers, m
@@ -43,48 +38,20 @@ _REAL: Final = (
     "maximum_gas_time",  # s
 )
 _WHOLE: Final = (
-    "linear",  # whether the law has a closed form
     "floods",  # whether liquid runs through an unprimed tube with the gas off
-    "lowest_empties",  # whether the driven chamber has no liquid left at `lowest`
-    "highest_empties",  # whether the opposite chamber has none left at `highest`
     "chambers",
     "rises_tolerated",
     "idle_tolerated",
     "asymmetric",  # whether a pair has a moment across its axis
-    "moving",  # whether liquid, gas and valves have dynamics of their own
     "gas_points",
-    "drift_points",
     "tail_points",
     "most_samples",
 )
-INTERVALS: Final = 256
-"""Room for the intervals of all flows, fixed as are all sizes, so that compiled code serves every law."""
-PATH_NODES: Final = 16_384
-"""Room for the nodes of all paths."""
-ON: Final = 0
-"""The flows with gas on and a full tube."""
-DRY: Final = 1
-"""With gas on and an empty tube."""
-OFF: Final = 2
-"""With gas off and a full tube."""
-OFF_DRY: Final = 3
-"""With gas off and an empty tube."""
 SHARED: Final = np.dtype(
     [(name, np.float64) for name in _REAL]
     + [(name, np.int64) for name in _WHOLE]
     + [(name, np.uint64) for name in ("key_0", "key_1")]
     + [
-        (
-            "begin",
-            np.int64,
-            (OFF_DRY + 2,),
-        ),  # first interval of the four flows, and behind the last
-        ("edge", np.float64, (INTERVALS,)),  # lowest x of an interval
-        ("sense", np.int64, (INTERVALS,)),  # 1: out of the driven chamber, -1: back into it, 0: none
-        ("holds", np.int64, (INTERVALS,)),  # whether the tube holds a column afterwards
-        ("first", np.int64, (INTERVALS,)),  # node of the interval's path, where it has one
-        ("last", np.int64, (INTERVALS,)),
-        ("node", np.float64, (PATH_NODES, 4)),  # time, x, leaving and arriving dx/dt
         ("moment", np.float64, (MOMENT_NODES, 4)),  # of a pair: value, slope per step; both across its axis
         ("axis", np.float64, (MAX_CHAMBERS // 2, 2)),  # directions of the pairs
         ("offset", np.float64, (MAX_CHAMBERS,)),  # added to a valve's share, s
@@ -152,10 +119,7 @@ _RUN_WHOLE: Final = (
 _RUN_PAIRS: Final = (
     "fill",  # x of the chamber on the positive side
     "wet",  # whether the tube holds a continuous column
-    "side",  # whether the last gas went into the chamber on the positive side
-    "fill_before",  # the three at the start of the stretch of time that was last moved through
-    "wet_before",
-    "side_before",
+    "fill_before",  # at the last command
     "trial",  # room for the fills at one instant
     "runs_back",  # whether liquid still ran back as the last wait ended
 )

@@ -9,11 +9,6 @@ from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.ensemble.compiled_disc import (
     any_wet,
     drains,
-    kept,
-    leave_out,
-    move,
-    note_settling,
-    opening,
     reset,
     vibration,
 )
@@ -35,7 +30,6 @@ from ringbalance.controller.formulas import (
     vector_gas_time,
     vector_shares,
 )
-from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.scene.arrays import FloatArray
 
 _CERTAIN: Final = 1 + 1e-9
@@ -55,10 +49,9 @@ def run_members(
 ) -> None:
     """Run members one after the other; `runs`, of type `RUN`, holds what differs and is filled.
 
-    `plant`, of type `PLANT`, is given each member's gas line.
-
-    Where `shared.moving`, `motions`, of type `MOTION`, has room for every pair twice and one more, and
-    `notes` for the instants of an injection and its tail and for the fills of every pair then.
+    `plant`, of type `PLANT`, is given each member's gas line; `motions`, of type `MOTION`, has room for every
+    pair twice and one more, and `notes` for the instants of an injection and its tail and for the fills of
+    every pair then.
     """
     for i in range(runs.size):
         run = runs[i]
@@ -69,13 +62,8 @@ def run_members(
             if run.cause == NONE and run.samples < shared.most_samples:
                 run.samples += 1
                 _sample(shared, run)
-                if run.cause == NONE and shared.moving:
+                if run.cause == NONE:
                     _inject(shared, plant, run, motions, notes, workspace)
-                elif run.cause == NONE:
-                    _keep_residual(shared, run)
-                    if run.pair >= 0:
-                        _gas(shared, run)
-                    _wait(shared, run)
         _judge(shared, run)
 
 
@@ -119,11 +107,10 @@ def _holds(shared: Record, run: Record, time: float) -> bool:
 def _start(shared: Record, plant: Record, run: Record, motions: Any) -> None:
     """Level chambers, nothing remembered."""
     reset(shared, run)
-    if motions is not None:
-        plant.passing, plant.critical_ratio = run.gas_line[0], run.gas_line[1]
-        plant.dead_volume, plant.valve_lag = run.gas_line[2], run.gas_line[3]
-        for i in range(shared.chambers // 2):
-            begin(plant, motions[i], shared.initial_fill, run.speed, run.residual_fill)
+    plant.passing, plant.critical_ratio = run.gas_line[0], run.gas_line[1]
+    plant.dead_volume, plant.valve_lag = run.gas_line[2], run.gas_line[3]
+    for i in range(shared.chambers // 2):
+        begin(plant, motions[i], shared.initial_fill, run.speed, run.residual_fill)
     _forget(run)
     _look(shared, run)
     _expect(shared, run)
@@ -217,7 +204,7 @@ def _cause(shared: Record, run: Record) -> int:
 def _inject(
     shared: Record, plant: Record, run: Record, motions: Any, notes: FloatArray, workspace: FloatArray
 ) -> None:
-    """From a command, if any, to the next sample, with moving liquid."""
+    """From a command, if any, to the next sample."""
     half, commanded = shared.chambers // 2, run.pair >= 0
     for i in range(half):
         run.fill_before[i] = run.fill[i]
@@ -232,20 +219,6 @@ def _inject(
         run.operated = 1
         _count_idle(shared, run, _working(run))
     run.pair, run.other_pair = -1, -1
-    _finish(shared, run)
-
-
-@in_place
-def _wait(shared: Record, run: Record) -> None:
-    """Until the next sample, or the end; liquid moves where a tube is full."""
-    length = max(min(shared.period, shared.time_limit - run.time), 0.0)
-    run.pair, run.other_pair = -1, -1
-    run.cut = 1 if length < shared.period else run.cut
-    if length > 0.0 and any_wet(shared, run):
-        move(shared, run, length)
-        _look(shared, run)
-        note_settling(shared, run, length, shared.drift_points)
-    run.time += length
     _finish(shared, run)
 
 
@@ -266,44 +239,11 @@ def _working(run: Record) -> int:
 
 
 @in_place
-def _gas(shared: Record, run: Record) -> None:
-    """All valves of a command open together; pairs flow in parallel."""
-    length = max(run.duration, run.other_duration) if run.other_pair >= 0 else run.duration
-    run.real_before, run.imaginary_before = run.real, run.imaginary
-    move(shared, run, length)
-    _look(shared, run)
-    note_settling(shared, run, length, shared.gas_points)
-    _count_idle(shared, run, _working(run))
-    run.time += length
-    run.operated = 1
-
-
-@in_place
 def _count_idle(shared: Record, run: Record, working: int) -> None:
     """Whether the last command has moved anything."""
     change = math.hypot(run.real - run.real_before, run.imaginary - run.imaginary_before)
     moved = abs(run.fill[working] - run.fill_before[working]) > NOTICEABLE or change > shared.limit
     run.idle = 0 if moved else run.idle + 1
-
-
-@in_place
-def _keep_residual(shared: Record, run: Record) -> None:
-    """Shorten the valve-open times that would take a chamber below its residual fill."""
-    if run.residual_fill <= 0.0 or run.pair < 0:
-        return
-    run.duration = _permitted(shared, run, run.pair, run.first > 0, run.duration)
-    if run.other_pair >= 0:
-        run.other_duration = _permitted(shared, run, run.other_pair, run.other_first > 0, run.other_duration)
-    leave_out(run)
-
-
-@in_place
-def _permitted(shared: Record, run: Record, pair: int, first: bool, duration: float) -> float:
-    """A valve-open time, s, that leaves the residual fill; zero where it would be below the minimum."""
-    driven = run.fill[pair] if first else shared.total - run.fill[pair]
-    above = driven > run.residual_fill + NEAR_RESIDUAL
-    found = opening(shared, run, pair, first, duration) if above else 0.0
-    return kept(shared, run, found, duration, pair if first else pair + shared.chambers // 2)
 
 
 @in_place

@@ -13,7 +13,7 @@ import numpy as np
 from ringbalance.controller.checks import check_fit
 from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns
 from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
-from ringbalance.controller.ensemble.transfer import PairTransfer
+from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
@@ -121,7 +121,7 @@ def simulate_ensemble(
     seed: int,
     *,
     uncertainty_95: MemberUncertainty | None = None,
-    transfer: PairTransfer | None = None,
+    dynamics: Dynamics | None = None,
     quantiles: Sequence[float] = QUANTILES,
     workers: int = 2,
     progress: Progress | None = None,
@@ -140,9 +140,9 @@ def simulate_ensemble(
     if n < 1 or workers < 1:
         raise ValueError(f"an ensemble needs members and workers, not n={n} and workers={workers}")
     model = flow_law if isinstance(flow_law, BalancerModel) else BalancerModel.of(flow_law)
-    followed = ensemble_transfer(scene, model) if transfer is None else transfer
+    followed = ensemble_dynamics(scene, model) if dynamics is None else dynamics
     widths = MemberUncertainty.of(scene, model) if uncertainty_95 is None else uncertainty_95
-    plan = EnsemblePlan.of(scene=scene, model=model, transfer=followed)
+    plan = EnsemblePlan.of(scene=scene, model=model, dynamics=followed)
     tally = _Tally(time_limit=scene.run.time_limit, quantiles=quantiles)
 
     def run(block: int) -> MemberRuns:
@@ -160,7 +160,7 @@ def simulate_members(
     model: BalancerModel,
     *,
     members: Members | None = None,
-    transfer: PairTransfer | None = None,
+    dynamics: Dynamics | None = None,
     size: int = 1,
     seed: int = 0,
 ) -> MemberRuns:
@@ -171,12 +171,12 @@ def simulate_members(
     given = Members.alike(scene, size=size) if members is None else members
     if given.proportional.size > BLOCK:
         raise ValueError(f"at most {BLOCK} members at once")
-    followed = ensemble_transfer(scene, model) if transfer is None else transfer
-    return EnsemblePlan.of(scene=scene, model=model, transfer=followed).run(given, seed=seed)
+    followed = ensemble_dynamics(scene, model) if dynamics is None else dynamics
+    return EnsemblePlan.of(scene=scene, model=model, dynamics=followed).run(given, seed=seed)
 
 
-def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
-    """The compiled operation of a scene's balancer, after the checks of `simulate_ensemble`."""
+def ensemble_dynamics(scene: Scene, model: BalancerModel) -> Dynamics:
+    """What moves the liquid of a scene's balancer, after the checks of `simulate_ensemble`."""
     check_ring(scene)
     check_fit(scene, model)
     longest = scene.run.time_limit
@@ -189,12 +189,7 @@ def ensemble_transfer(scene: Scene, model: BalancerModel) -> PairTransfer:
         )
         raise SceneError([fault])
     modelled = terms_modelled(run_models(scene=scene, model=model))
-    return PairTransfer.of(
-        model=model,
-        total=2 * scene.disc.initial_fill,
-        gas_pressure=scene.gas.pressure,
-        dynamics=dynamics_of(scene=scene, model=model, modelled=modelled),
-    )
+    return dynamics_of(scene=scene, model=model, modelled=modelled)
 
 
 def _block(

@@ -11,13 +11,14 @@ import numpy.typing as npt
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.ensemble.compiled_noise import noise_key
-from ringbalance.controller.ensemble.compiled_records import GAS_LINE, MOMENT_NODES, RUN
+from ringbalance.controller.ensemble.compiled_records import GAS_LINE, MOMENT_NODES, RUN, SHARED
 from ringbalance.controller.ensemble.compiled_sample import run_members
 from ringbalance.controller.ensemble.samples import LARGEST_RATIO, Members
-from ringbalance.controller.ensemble.transfer import PairTransfer
 from ringbalance.controller.formulas import piece_rise
+from ringbalance.controller.liquid_ring.motion import Dynamics
+from ringbalance.controller.liquid_ring.plant import floods
 from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
-from ringbalance.controller.loop import DRIFT_POINTS, GAS_POINTS, IDLE_OPERATIONS, TAIL_POINTS
+from ringbalance.controller.loop import GAS_POINTS, IDLE_OPERATIONS, TAIL_POINTS
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
@@ -68,6 +69,9 @@ class MomentTable(NamedTuple):
 
 NOTES: Final = GAS_POINTS + 1 + TAIL_POINTS
 """Instants of an injection and its wait, with the earlier closing of two valves."""
+RELATIVE_ERROR: Final = 1e-4
+"""Allowed to one step of a member's states: an injection then ends within 1e-6 in fill of a single run's, and
+within 3e-5 without inertia."""
 MOST_SAMPLES: Final = 100_000
 """Of one compiled run, which costs a thousandth of an interpreted one."""
 
@@ -150,11 +154,13 @@ class EnsemblePlan:
         return np.asarray(members.proportional * self.loop.rate * faster <= largest * np.maximum(error, 0.0))
 
     @classmethod
-    def of(cls, *, scene: Scene, model: BalancerModel, transfer: PairTransfer) -> EnsemblePlan:
+    def of(cls, *, scene: Scene, model: BalancerModel, dynamics: Dynamics) -> EnsemblePlan:
         """Prepare the runs of an ensemble."""
-        shared, chambers = transfer.shared.copy(), scene.disc.chambers
+        shared, chambers, total = np.zeros(1, dtype=SHARED), scene.disc.chambers, 2 * scene.disc.initial_fill
         axes = chamber_directions(chambers)[: chambers // 2]
-        moment = MomentTable.of(model=model, total=2 * scene.disc.initial_fill)
+        moment = MomentTable.of(model=model, total=total)
+        shared["total"], shared["lowest"] = total, moment.lowest
+        shared["floods"] = floods(model.flow, total=total)
         parts = [part for z in (np.real, np.imag) for part in (z(moment.value), z(moment.slope))]
         shared["moment"], shared["moment_step"] = np.stack(parts, axis=1), moment.step
         shared["asymmetric"] = bool(np.any(moment.value.imag))
@@ -165,7 +171,7 @@ class EnsemblePlan:
         shared["offset"][0, :chambers] = scene.controller.offsets(chambers)
         return cls(
             shared=shared,
-            plant=transfer.plant,
+            plant=dynamics.plant(total=total, relative_error=RELATIVE_ERROR),
             loop=loop,
             rotor=scene.rotor,
             drawing=Drawing.of(scene, law=model.flow),
@@ -188,7 +194,6 @@ def _loop(scene: Scene) -> dict[str, float]:
         "rises_tolerated": target_vector_of(scene).rises_tolerated,
         "idle_tolerated": IDLE_OPERATIONS + scene.disc.chambers,
         "gas_points": GAS_POINTS,
-        "drift_points": DRIFT_POINTS,
         "tail_points": TAIL_POINTS,
         "most_samples": MOST_SAMPLES,
     }

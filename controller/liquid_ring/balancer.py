@@ -29,10 +29,11 @@ from ringbalance.controller.document import show, simulation_history
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
 from ringbalance.controller.line_runs import line_runs, line_runs_text
+from ringbalance.controller.liquid_ring.motion import gives_forces
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
 from ringbalance.controller.simulation import Simulation
-from ringbalance.controller.terms import can_carry, run_models
+from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.search import recommended
 from ringbalance.controller.tuning.settling import drawn_run
@@ -186,7 +187,7 @@ class LiquidRingBalancer:
             modelled=given.modelled,
             to_time_limit=given.to_time_limit,
         )
-        return replace(run, findings=(*run.findings, *_of_own_law(scene, given.flow_law, run)))
+        return replace(run, findings=(*run.findings, *_of_own_law(given.flow_law, run)))
 
     def rotor(self) -> CommonRotor:
         """See `Balancer`."""
@@ -279,14 +280,14 @@ class LiquidRingBalancer:
         return simulation_history(run)
 
 
-def _of_own_law(scene: Scene, law: object, run: Simulation) -> Iterator[Finding]:
+def _of_own_law(law: object, run: Simulation) -> Iterator[Finding]:
     """What a run takes from elsewhere, or leaves out, because a law of the caller's own does not give it."""
     if law is None or isinstance(law, CalibratedLaw | PaperLaw | str):
         return
     rows = [row.term for row in run.models_used if row.term in IN_INJECTIONS and row.model == NOT_MODELLED]
     if names := lacking(law):
         yield Finding(code="own_law_lacks", values={"names": names})
-    if rows and not can_carry(scene, run.model):
+    if rows and not gives_forces(run.model.flow):
         yield Finding(code="own_law_without_forces", values={"terms": rows})
 
 

@@ -25,6 +25,7 @@ from typing import Final
 
 from ringbalance.controller.compilation.compiled import in_place, inlined
 from ringbalance.controller.liquid_ring.records import HEAD, HYDROSTATIC, RETURN_CREST, TO_CREST, Record
+from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.regime import CLEARING
 
 _SLOWEST: Final = 1e-150
@@ -33,6 +34,7 @@ _NEWTON_STEPS: Final = 60
 """At the most; each that leaves the interval known to hold the root is replaced by half of that."""
 _CONVERGED: Final = 1e-9
 """Of a piece of a table: Newton's next change would be below round-off."""
+_SEPARATED: Final = int(Regime.SEPARATED)
 _SLOW_FROUDE: Final = CLEARING[0]
 _FAST_FROUDE: Final = CLEARING[1]
 _HALF_CLEARED: Final = (_SLOW_FROUDE + _FAST_FROUDE) / 2
@@ -54,6 +56,31 @@ def table(plant: Record, which: int, x: float) -> tuple[float, float]:
     if t != held:
         inside += (t - held) * slope
     return inside, slope * plant.nodes_per[which]
+
+
+@in_place
+def tabled(
+    plant: Record, x: float, p: float, q: float, primed: bool, log_speed: float
+) -> tuple[float, float, bool, bool]:
+    """Flow by a law that gives velocities alone.
+
+    Returns: velocity out of chamber 0, m/s, and its slope over x; whether the tube holds a column afterwards;
+    whether the flow is separated at the crest.
+    """
+    # The tables count from the chamber with gas.
+    back = q > p
+    which = (0 if max(p, q) > 0.0 else 2) + (0 if primed else 1)
+    driven = plant.total - x if back else x
+    place = (driven - plant.table_start[which]) * plant.nodes_per[which]
+    cell = min(max(math.floor(place), 0), plant.pieces[which] - 1)
+    c = plant.cells[which, cell]
+    t = min(max(place - cell, 0.0), 1.0)
+    square = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+    faster = math.exp(log_speed)
+    speed = math.copysign(math.sqrt(abs(square)), square) * faster
+    slope = (c[1] + t * (2.0 * c[2] + 3.0 * t * c[3])) * plant.nodes_per[which]
+    slope *= 0.5 * faster * faster / max(abs(speed), _SLOWEST)
+    return -speed if back else speed, slope, c[4] > 0.0, c[5] == _SEPARATED
 
 
 @in_place
@@ -237,6 +264,9 @@ def steady(
     plant: Record, x: float, opposite: float, p: float, q: float, primed: bool, log_speed: float
 ) -> tuple[float, bool]:
     """Velocity without inertia, m/s out of chamber 0, and whether the column is separated."""
+    if plant.tabled:
+        flow = tabled(plant, x, p, q, primed, log_speed)
+        return flow[0], flow[3]
     ahead = _directed(plant, ends(plant, x, opposite, p, q, 1), 1, primed, log_speed)
     if ahead[0] > 0.0:
         return ahead
@@ -249,6 +279,8 @@ def holds(
     plant: Record, x: float, opposite: float, p: float, q: float, primed: bool, log_speed: float
 ) -> bool:
     """Whether the tube holds a column after the flow without inertia, or at rest."""
+    if plant.tabled:
+        return tabled(plant, x, p, q, primed, log_speed)[2]
     at = ends(plant, x, opposite, p, q, 1)
     if can_flow(plant, at, primed):
         return _fills(plant, at, 1, primed, log_speed)
@@ -350,4 +382,6 @@ def crest_slopes(plant: Record, at: tuple[float, float, float, float]) -> tuple[
 @in_place
 def open_to_gas(plant: Record, at: tuple[float, float, float, float]) -> bool:
     """Whether its liquid leaves the upstream port open, or flow is ruled out without gas."""
+    if plant.tabled:
+        return False
     return bool(at[2] < plant.port_pressure or not _allowed(plant, at))

@@ -18,10 +18,10 @@ from ringbalance.controller.liquid_ring.compiled_column import (
     holds_at_rest,
     open_to_gas,
     steady,
+    tabled,
 )
 from ringbalance.controller.liquid_ring.compiled_lift import arrived, crest_stop, lift_push, shown
-from ringbalance.controller.liquid_ring.records import EVENTS, WORK, P, Record, U, X
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import EVENTS, WORK, Event, P, Record, U, X
 from ringbalance.reduced_model.law.flow_law import Regime
 
 NONE: Final = EVENTS.index(Event.NONE)
@@ -122,6 +122,11 @@ def limit_in_the_way(plant: Record, x: float, direction: int) -> int:
 @in_place
 def would_start(plant: Record, state: Four, primed: bool) -> int:
     """Direction in which resting liquid would flow; zero for none."""
+    if plant.tabled:
+        speed = tabled(
+            plant, state[0], state[2] - plant.ambient_pressure, state[3] - plant.ambient_pressure, primed, 0.0
+        )[0]
+        return 1 if speed > 0.0 else -1 if speed < 0.0 else 0
     at = pair_ends(plant, state, 1)
     if can_flow(plant, at, primed):
         return 1
@@ -152,6 +157,8 @@ def separates(plant: Record, motion: Record, state: Four) -> bool:
     """Whether a primed column at rest separates."""
     if not motion.primed or would_start(plant, state, True) != 0:
         return False
+    if plant.tabled:
+        return not holds_column(plant, motion, state)
     return not holds_at_rest(plant, pair_ends(plant, state, 1), True)
 
 

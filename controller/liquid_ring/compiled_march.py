@@ -45,8 +45,7 @@ from ringbalance.controller.liquid_ring.compiled_step import (
     shorten,
     take,
 )
-from ringbalance.controller.liquid_ring.records import EVENTS, P, Record, U, X
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import EVENTS, Event, P, Record, U, X
 from ringbalance.scene.arrays import FloatArray
 
 _ROUND_OFF: Final = 1e-12
@@ -75,9 +74,7 @@ def carry(
     count: int,
     w: FloatArray,
 ) -> float:
-    """The one way in from Python, so that what both of these need is made into machine code once.
-
-    Lets a time pass for `motions[0]` as `advance` does, with its fills in row 1 of `notes`; or, given a
+    """Let a time pass for `motions[0]` as `advance` does, with its fills in row 1 of `notes`; or, given a
     driven chamber, which is not below zero, finds its `opening_within` on `motions[1]`.  Returns: a time, s.
     """
     if chamber >= 0:
@@ -221,9 +218,14 @@ def _step(
             notes[row, motion.noted] = shown(plant, motion, w[BETWEEN, X])
             motion.noted += 1
     y = motion.state
-    before = shown(plant, motion, y[X])
+    before, start = shown(plant, motion, y[X]), y[X]
     for i in range(8):
         y[i] = w[END, i]
+    stuck = event and moves and not plant.inertia and abs(y[X] - start) < _NOTHING_MOVED
+    if stuck and flow_end(plant, motion, now(motion)) == NONE:
+        # Round-off is all that is left before the stall.
+        _stop(plant, motion, STALLED)
+        return h, False
     if motion.direction == -outward(motion) and not (motion.valve_0 or motion.valve_1):
         motion.ran_back += abs(shown(plant, motion, y[X]) - before)
     if motion.direction != 0 and plant.inertia and y[U] * motion.direction < 0.0:
@@ -380,6 +382,10 @@ def _note(plant: Record, motion: Record, event: int, direction: int) -> None:
         is_open = motion.valve_1 > 0 if motion.chamber else motion.valve_0 > 0
         if motion.regime_start == RESTING and event == NONE:
             motion.regime_start = regime(plant, motion)
+        if event == NONE:
+            motion.ended = 0.0
+        elif motion.ended == 0.0:
+            motion.ended = motion.now
         if event == EMPTY and motion.event != EMPTY:
             motion.run_dry = motion.closes if is_open else 0.0
         if event != STALLED or is_open:

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import in_place, inlined
-from ringbalance.controller.liquid_ring.compiled_column import accelerations, hydrostatic, steady
+from ringbalance.controller.liquid_ring.compiled_column import accelerations, hydrostatic, steady, tabled
 from ringbalance.controller.liquid_ring.compiled_gas import gas_volume, line_rates, near_end, rest_after
 from ringbalance.controller.liquid_ring.compiled_lift import lift_rates, lift_speed
 from ringbalance.controller.liquid_ring.records import WORK, P, Record, U, X
@@ -74,6 +74,9 @@ def _column(
     if direction == 0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     p, q = p - ambient, q - ambient
+    if plant.tabled:
+        flow = tabled(plant, x, p, q, primed, motion.log_speed)
+        return (flow[0] if flow[0] * direction > 0.0 else 0.0), 0.0, 0.0, flow[1], 0.0, 0.0
     own, other = hydrostatic(plant, x), hydrostatic(plant, plant.total - x)
     f = plant.gas_factor
     at = (f * p, f * q, own[0], other[0]) if direction > 0 else (f * q, f * p, other[0], own[0])

@@ -31,6 +31,8 @@ class Passage:
     primed: bool
     motion: Motion
     """At the end; its record's event is UNFINISHED when the bound on the number of steps was reached."""
+    ended: float
+    """s, at which the flow out of the chamber that was driven last ended; zero where it has not."""
     ran_back: float
     """Change of x by flow out of the chamber that was not driven last, with both valves closed."""
 
@@ -48,7 +50,17 @@ def pass_time(dynamics: Dynamics, pair: PairState, *, instants: FloatArray) -> P
         fill=stands(plant[0], state[0])[1],
         primed=bool(state["primed"][0]),
         motion=_unpacked(plant, state),
+        ended=float(state["ended"][0]),
         ran_back=float(state["ran_back"][0]),
+    )
+
+
+def opened(dynamics: Dynamics, *, chamber: int, duration: float) -> tuple[Switch, Switch]:
+    """What a command to open a valve for a time, s, does to it: both movements come a lag late."""
+    lag = dynamics.valve_lag
+    return (
+        Switch(after=lag, chamber=chamber, opens=True),
+        Switch(after=lag + duration, chamber=chamber, opens=False),
     )
 
 

@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
 
-from ringbalance.controller.liquid_ring.records import PIECES, PLANT
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import FLOWS, PIECES, PLANT, Event
 from ringbalance.physics.gas import (
     HEAT_CAPACITY_RATIO,
     REFERENCE_PRESSURE,
@@ -76,13 +76,32 @@ class Column:
     """Of a one-way law: hydrostatic pressure of a vented chamber above which liquid leaves it, Pa."""
     gas_factor: float = 1.0
     """Gas pressure on the liquid over the one at the place of measurement."""
+    velocities: FlowLaw | None = None
+    """A law that gives velocities and no forces, in place of all these."""
 
     @classmethod
-    def of(cls, *, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column | None:
-        """The column that a flow law describes; None for a law that gives velocities and no forces."""
+    def of(cls, *, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column:
+        """The column that a flow law describes."""
         if isinstance(law, CalibratedLaw):
             return _calibrated(law, tube, gas_off)
-        return _paper(law, tube, gas_off) if isinstance(law, PaperLaw) else None
+        if isinstance(law, PaperLaw):
+            return _paper(law, tube, gas_off)
+        return cls(
+            density=1.0,
+            length=tube.length,
+            crest_ends=(1.0, 1.0),
+            tables=(),
+            port_pressure=0.0,
+            crest=None,
+            one_way=False,
+            gas_off=gas_off,
+            velocities=law,
+        )
+
+
+def gives_forces(law: FlowLaw) -> bool:
+    """Whether a law knows the forces on the column, which terms beyond its velocity need."""
+    return isinstance(law, CalibratedLaw | PaperLaw)
 
 
 def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:
@@ -215,7 +234,7 @@ class PairState:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dynamics:
-    """The terms of a plant that its flow law does not know."""
+    """What moves the liquid of a pair: its flow law, and the terms that the law does not know."""
 
     column: Column
     inertia: bool
@@ -240,6 +259,11 @@ class Dynamics:
     """Fill of a driven chamber that no command goes below."""
     lift: Lift | None = None
     """None: liquid passes the crest as soon as the gas can hold it there."""
+
+    @property
+    def quasi_steady(self) -> bool:
+        """Whether the flow law alone moves the liquid."""
+        return not self.inertia and self.line is None and self.valve_lag == 0 and self.lift is None
 
     def plant(self, *, total: float, relative_error: float = RELATIVE_ERROR) -> npt.NDArray[np.void]:
         """Record of type `PLANT`, shape (1,), of a pair with a sum of fill ratios."""
@@ -287,6 +311,8 @@ def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDAr
     plant["total"], plant["relative_error"], plant["most_steps"] = total, relative_error, MOST_STEPS
     plant["first_step"] = _FIRST_STEP * (relative_error / RELATIVE_ERROR) ** 0.25
     _fill_line(plant, dynamics.line)
+    if column.velocities is not None:
+        _fill_velocities(plant, column.velocities)
     for which, table in enumerate(column.tables):
         pieces = table.coefficients.T
         if len(pieces) > PIECES:
@@ -295,6 +321,32 @@ def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDAr
         plant["pieces"][0, which] = len(pieces)
         plant["table_start"][0, which], plant["nodes_per"][0, which] = table.start, 1.0 / table.step
     return plant
+
+
+def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:
+    """Tables of a law of velocities, one of `FLOWS` each: u|u| by powers of the place, column, regime.
+
+    u|u| is straight where the law has it so, as near a stall.  A law that changes its regime within a piece
+    does so at its end.
+    """
+    total, largest = float(plant["total"][0]), law.max_fill_ratio
+    lowest, highest = max(0.0, total - largest), min(total, largest)
+    x = np.linspace(lowest, highest, PIECES + 1)
+    plant["tabled"] = True
+    plant["table_start"], plant["pieces"], plant["nodes_per"] = lowest, PIECES, PIECES / (highest - lowest)
+    for which, (gas, primed) in enumerate(FLOWS):
+        flow = law.evaluate(
+            fill_ratio=x,
+            opposite_fill_ratio=np.clip(total - x, 0.0, largest),
+            gas_pressure=float(plant["gas_pressure"][0]) if gas else 0.0,
+            primed=primed,
+        )
+        square = flow.velocity * np.abs(flow.velocity)
+        powers = PchipInterpolator(np.arange(PIECES + 1.0), square).c[::-1]
+        ends = square[:-1] * square[1:] <= 0
+        powers[:, ends] = 0.0
+        powers[0, ends], powers[1, ends] = square[:-1][ends], np.diff(square)[ends]
+        plant["cells"][0, which] = np.stack([*powers, flow.primed[:-1], flow.regime[:-1]], axis=1)
 
 
 def _fill_line(plant: npt.NDArray[np.void], line: GasLine | None) -> None:

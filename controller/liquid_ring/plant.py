@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ringbalance.controller.formulas import NOTICEABLE
-from ringbalance.controller.liquid_ring.interval import longest_opening, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, PairState, Record, Switch
-from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL, opening_within
-from ringbalance.controller.liquid_ring.transfer import Drive, Event, Integrator, Transfer, floods
+from ringbalance.controller.liquid_ring.interval import Passage, longest_opening, opened, pass_time
+from ringbalance.controller.liquid_ring.motion import Dynamics, PairState, Record
+from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
+from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.rotor import chamber_directions, disc_unbalance
-from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Disc, Scene
+
+_SCAN: Final = 33
+"""Instants at which a fill is looked for before its time is found."""
+_TIME_ERROR: Final = 1e-13
+"""Of a valve-open time, relative to the longest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +55,7 @@ class DiscState:
 
 @dataclass(frozen=True, kw_only=True)
 class Operation:
-    """What one command to one valve did: by its closing or, where terms are modelled, by the next sample."""
+    """What one command to one valve did, by the next sample."""
 
     chamber: int
     """Index of the driven chamber."""
@@ -56,7 +64,7 @@ class Operation:
     fill_before: float
     """x of the driven chamber at the command."""
     fill_after: float
-    """x of the driven chamber when the valve closed; with terms modelled, at the next sample."""
+    """x of the driven chamber at the next sample."""
     regime_start: Regime
     regime_end: Regime
     event: Event
@@ -92,18 +100,22 @@ class Advance:
 
 @dataclass(frozen=True, kw_only=True)
 class LiquidRing:
-    """The disc's flow law, moments and gas, with the integrator that carries it through time."""
+    """The disc's flow law and moments, with what moves its liquid."""
 
     model: BalancerModel
     chambers: int
     """n, even."""
-    gas_pressure: float
-    """Gauge, Pa, in a chamber while its valve is open."""
-    integrator: Integrator
-    dynamics: Dynamics | None = None
-    """Terms that the flow law does not know; None: none of them is modelled."""
-    residual_fill: float = 0.0
-    """Of a driven chamber, below which gas would enter its port; `permitted` keeps to it."""
+    dynamics: Dynamics
+
+    @property
+    def gas_pressure(self) -> float:
+        """Of the supply, gauge, Pa."""
+        return self.dynamics.gas_pressure
+
+    @property
+    def residual_fill(self) -> float:
+        """Of a driven chamber, below which gas would enter its port; `permitted` keeps to it."""
+        return self.dynamics.residual
 
     @cached_property
     def floods(self) -> bool:
@@ -124,12 +136,7 @@ class LiquidRing:
             return duration
         if (pair.fill if first else pair.opposite_fill) <= self.residual_fill + NEAR_RESIDUAL:
             return 0.0
-        if self.dynamics is not None:
-            return longest_opening(self.dynamics, pair, chamber=0 if first else 1, duration=duration)
-        drive = self._drive(pair, first=first, gas_pressure=self.gas_pressure)
-        return opening_within(
-            drive=drive, least=self.residual_fill, duration=duration, integrator=self.integrator
-        )
+        return longest_opening(self.dynamics, pair, chamber=0 if first else 1, duration=duration)
 
     def advance(
         self, state: DiscState, *, gas_times: Mapping[int, float], duration: float, points: int
@@ -145,9 +152,8 @@ class LiquidRing:
         if gas_times:
             instants = np.unique(np.concatenate([instants, list(gas_times.values())]))
         half = self.chambers // 2
-        carry = self._pair if self.dynamics is None else self._moving_pair
         paths = [
-            carry(pair, index, _open_valve(gas_times, index, index + half), instants)
+            self._pair(pair, index, _open_valve(gas_times, index, index + half), instants)
             for index, pair in enumerate(state.pairs)
         ]
         operations = [path.operation for path in paths if path.operation is not None]
@@ -163,51 +169,12 @@ class LiquidRing:
         )
 
     def _pair(self, pair: PairState, index: int, valve: _Valve | None, instants: FloatArray) -> _Path:
-        """Gas on until the valve closes, then gas off to the end."""
-        if valve is None:
-            return self._gas_off(pair, instants)
-        on = instants[instants <= valve.duration]
-        first = valve.chamber == index
-        transfer = self.integrator(self._drive(pair, first=first, gas_pressure=self.gas_pressure), on)
-        after = _moved(pair, transfer, first=first)
-        off = self._gas_off(after, instants[on.size :] - valve.duration)
-        before = pair.fill if first else pair.opposite_fill
-        operation = Operation(
-            chamber=valve.chamber,
-            duration=valve.duration,
-            fill_before=before,
-            fill_after=float(transfer.fill[-1]),
-            regime_start=transfer.regime_start,
-            regime_end=transfer.regime_end,
-            event=transfer.event,
-            energy=self.gas_pressure * self.model.chamber_volume * (before - float(transfer.fill[-1])),
-            closing_pressure=self.gas_pressure,
-            run_dry=_run_dry(transfer, before, valve.duration),
-        )
-        fill = np.concatenate([_first_fill(pair, transfer, first=first), off.fill])
-        return replace(off, fill=fill, operation=operation)
-
-    def _gas_off(self, pair: PairState, instants: FloatArray) -> _Path:
-        """A full tube lets the levels run back; one that does not hold its column empties at once."""
-        if instants.size == 0 or not (pair.primed or self.floods):
-            return _Path(state=pair, fill=np.full(instants.shape, pair.fill))
-        first = pair.driven_first
-        transfer = self.integrator(self._drive(pair, first=first, gas_pressure=0.0), instants)
-        after = _moved(pair, transfer, first=first)
-        fill = _first_fill(pair, transfer, first=first)
-        drift = abs(after.fill - pair.fill)
-        runs_back = drift > NOTICEABLE and (after.primed or self.floods)
-        return _Path(state=after, fill=fill, drift=drift, runs_back=runs_back)
-
-    def _moving_pair(self, pair: PairState, index: int, valve: _Valve | None, instants: FloatArray) -> _Path:
         """Fill, velocity, gas and valves as one system; a command is added to what is under way."""
-        if self.dynamics is None:
-            raise ValueError("this plant has no terms to carry through time")
         begun = pair if valve is None else self._commanded(pair, valve, index)
         passage = pass_time(self.dynamics, begun, instants=instants)
         after = replace(begun, fill=passage.fill, primed=passage.primed, motion=passage.motion)
         operation = None if valve is None else self._operation(after, valve)
-        moves = passage.primed or passage.motion.velocity != 0
+        moves = passage.primed or passage.motion.velocity != 0 or (self.floods and not self.dynamics.inertia)
         return _Path(
             state=after,
             fill=passage.fills,
@@ -218,12 +185,8 @@ class LiquidRing:
 
     def _commanded(self, pair: PairState, valve: _Valve, index: int) -> PairState:
         """The valve opens and closes a lag after its command."""
-        lag = 0.0 if self.dynamics is None else self.dynamics.valve_lag
         side = int(valve.chamber != index)
-        switches = (
-            Switch(after=lag, chamber=side, opens=True),
-            Switch(after=lag + valve.duration, chamber=side, opens=False),
-        )
+        switches = opened(self.dynamics, chamber=side, duration=valve.duration)
         motion = replace(
             pair.motion,
             pending=tuple(sorted((*pair.motion.pending, *switches), key=lambda switch: switch.after)),
@@ -248,20 +211,52 @@ class LiquidRing:
 
     def concluded(self, state: DiscState, operation: Operation) -> Operation:
         """What a pair's last command, as first returned, has done by now, its tail included."""
-        if self.dynamics is None:
-            return operation
         pair = state.pairs[operation.chamber % (self.chambers // 2)]
         return self._operation(pair, _Valve(chamber=operation.chamber, duration=operation.duration))
 
-    def _drive(self, pair: PairState, *, first: bool, gas_pressure: float) -> Drive:
-        return Drive(
-            law=self.model.flow,
-            fill=pair.fill if first else pair.opposite_fill,
-            total=pair.total,
-            exchange_rate=self.model.tube_area / self.model.chamber_volume,
-            gas_pressure=gas_pressure,
-            primed=pair.primed,
+    def gas_time(self, pair: PairState, *, first: bool, fill: float, longest: float) -> float:
+        """Valve-open time, s, that lowers the driven chamber of a pair at rest to a fill ratio.
+
+        Args: `first`: whether the chamber on the positive side is driven. `longest`: s, that it keeps to.
+        Returns: Zero when the fill is not below the present one or nothing flows; the time of the stall when
+            the flow stalls before; below the smallest possible fill the last velocity is kept.
+        """
+        instants = np.linspace(0.0, longest, _SCAN)
+        driven = self._commanded(pair, _Valve(chamber=0 if first else 1, duration=2.0 * longest), 0)
+
+        def above(at: FloatArray) -> tuple[Passage, FloatArray]:
+            passage = pass_time(self.dynamics, driven, instants=at)
+            fills = passage.fills if first else pair.total - passage.fills
+            return passage, np.asarray(fills - fill, dtype=np.float64)
+
+        path, left = above(instants)
+        event = path.motion.record.event
+        if (pair.fill if first else pair.opposite_fill) <= fill or event is Event.BLOCKED:
+            return 0.0
+        if left[-1] > 0:
+            more = float(left[-1]) / self._last_rate(pair) if event in {Event.EMPTY, Event.FULL} else 0.0
+            return min(path.ended + more, longest) if path.ended > 0 else longest
+        place = int(np.argmax(left <= 0))
+        before, after = float(instants[place - 1]), float(instants[place])
+        after = path.ended if before < path.ended < after else after
+        if above(np.array([after]))[1][0] >= 0:
+            return after
+        return float(
+            brentq(lambda time: above(np.array([time]))[1][0], before, after, xtol=_TIME_ERROR * longest)
         )
+
+    def _last_rate(self, pair: PairState) -> float:
+        """Fill ratio that leaves a driven chamber per second as its flow ends at a limit, 1/s."""
+        largest = self.model.flow.max_fill_ratio
+        fill = max(0.0, pair.total - largest)
+        flow = self.model.flow.evaluate(
+            fill_ratio=fill,
+            opposite_fill_ratio=min(pair.total - fill, largest),
+            gas_pressure=self.gas_pressure,
+            primed=True,
+        )
+        rate = float(flow.velocity) * self.model.tube_area / self.model.chamber_volume
+        return rate if rate > 0 else math.inf
 
     def least_fill(self, *, state: DiscState) -> float:
         """Fill to which injections can bring a chamber: the residual one, or that at which the gas stalls."""
@@ -332,23 +327,18 @@ class _Path:
     runs_back: bool = False
 
 
-def _run_dry(transfer: Transfer, before: float, duration: float) -> float:
-    if before <= 0:
-        return duration
-    return 0.0 if transfer.event is not Event.EMPTY else duration - (transfer.event_time or 0.0)
-
-
-def _first_fill(pair: PairState, transfer: Transfer, *, first: bool) -> FloatArray:
-    return transfer.fill if first else np.asarray(pair.total - transfer.fill, dtype=np.float64)
-
-
-def _moved(pair: PairState, transfer: Transfer, *, first: bool) -> PairState:
-    fill = float(_first_fill(pair, transfer, first=first)[-1])
-    return replace(pair, fill=fill, primed=transfer.primed, driven_first=first)
-
-
 def _open_valve(gas_times: Mapping[int, float], first: int, opposite: int) -> _Valve | None:
     asked = [_Valve(chamber=i, duration=gas_times[i]) for i in (first, opposite) if i in gas_times]
     if len(asked) > 1:
         raise ValueError(f"gas into chambers {first} and {opposite} of one pair at once")
     return asked[0] if asked else None
+
+
+def floods(law: FlowLaw, *, total: float) -> bool:
+    """Whether liquid of a pair leaves its fullest chamber through an unprimed tube with the gas off.
+
+    So it does where the crest lies outside that chamber's level, and without a crest.
+    """
+    lowest = max(0.0, total - law.max_fill_ratio)
+    flow = law.evaluate(fill_ratio=lowest, opposite_fill_ratio=total - lowest, gas_pressure=0.0)
+    return float(flow.velocity) != 0.0

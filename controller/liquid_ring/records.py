@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.transfer import Event
+
+class Event(StrEnum):
+    """What ended the flow before its time."""
+
+    NONE = "none"
+    BLOCKED = "blocked"
+    """Nothing flowed from the start."""
+    STALLED = "stalled"
+    """The velocity fell to zero."""
+    EMPTY = "empty"
+    """The giving chamber ran empty."""
+    FULL = "full"
+    """The receiving chamber reached its largest fill."""
+    UNFINISHED = "unfinished"
+    """The bound on the number of steps was reached; the fills after that are the last ones found."""
+
 
 Record = Any
 """One element of an array with one of the types below; compiled code changes it in place."""
@@ -19,6 +35,8 @@ TO_CREST: Final = 2
 """ln((alpha + k_up) u^2/2) over ln u, flow out of chamber 0."""
 RETURN_CREST: Final = 3
 """The same for flow out of chamber 1."""
+FLOWS: Final = ((True, True), (True, False), (False, True), (False, False))
+"""Whether gas is on and the tube primed, in the tables of a law that gives velocities alone."""
 PIECES: Final = 4096
 """Room for the pieces of a table, fixed, so that compiled code serves every law."""
 
@@ -58,6 +76,7 @@ _PLANT_WHOLE: Final = (
     "trapped",
     "one_way",  # whether liquid leaves only a chamber with gas or a high level, as under the paper's Eq. 19
     "inertia",
+    "tabled",  # whether the law gives velocities alone, which `cells` then hold by fill
     "lifts",  # whether an unprimed tube is filled up to the crest before liquid passes
     "line",  # whether valve and line take time to pass gas
     "most_steps",
@@ -91,6 +110,7 @@ _MOTION_REAL: Final = (
     "least_fill",  # of the driven chamber since
     "residual",  # fill of a driven chamber that no command goes below
     "closing_pressure",  # of the driven chamber's gas when its valve closed, gauge, Pa
+    "ended",  # s since the interval began, at which the flow out of the driven chamber last ended
     "run_dry",  # time for which its valve stays open to the empty chamber, s
     "front",  # fraction of the path up to which liquid stood in the tube at `started`, from chamber `side`
 )

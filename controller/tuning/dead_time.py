@@ -13,12 +13,12 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ringbalance.controller.liquid_ring.interval import pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Switch
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
-from ringbalance.physics.roots import bracketed_root
 from ringbalance.reduced_model.gas_line import line_ends, standing_amplitude
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.short_injection import Fills, short_injections
@@ -78,7 +78,7 @@ def _lost(fills: Fills, dynamics: Dynamics, metres: float, steady: float) -> flo
     longest = steady + _LONGEST
     if not short(steady) < 0 < short(longest):
         return 0.0
-    return bracketed_root(short, steady, longest, tolerance=1e-5) - steady
+    return float(brentq(short, steady, longest, xtol=1e-5 * _LONGEST)) - steady
 
 
 def compensated(scene: Scene, model: BalancerModel, dead: tuple[float, ...]) -> Scene:

@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from scipy.special import chdtri, ndtri
 
-from ringbalance.identification.criticism.patterns import LinearFit
+from ringbalance.identification.criticism.residual_tests import LinearFit
 from ringbalance.scene.arrays import FloatArray
 
 _LEVEL: Final = 0.05

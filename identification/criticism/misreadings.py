@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
 
 _LONGEST_TIME: Final = 10.0
 """s, of an injection: seconds are looked for where milliseconds stand, and not hours."""
-Change = Callable[[Observations, Scene | None], Observations | None]
+Change = Callable[[Observations, Any], Observations | None]
+"""Takes the scene, too, which kinds of one balancer alone ask for a value of that balancer."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ def _with(observations: Observations, **columns: FloatArray) -> Observations:
     return replace(observations, columns={**observations.columns, **columns})
 
 
-def _exchanged(observations: Observations, _: Scene | None) -> Observations | None:
+def _exchanged(observations: Observations, _: Any) -> Observations | None:
     """Columns of before and after, with their uncertainties."""
     if observations.kind != "injection":
         return None
@@ -61,7 +61,7 @@ def _exchanged(observations: Observations, _: Scene | None) -> Observations | No
 def _turned(*names: str) -> Change:
     """Angles of these names with the other sign."""
 
-    def change(observations: Observations, _: Scene | None) -> Observations | None:
+    def change(observations: Observations, _: Any) -> Observations | None:
         chosen = {n: -v for n, v in observations.columns.items() if n.startswith(names)}
         vibration = any(n.startswith("phase") for n in observations.columns)
         return _with(observations, **chosen) if chosen and vibration else None
@@ -69,9 +69,9 @@ def _turned(*names: str) -> Change:
     return change
 
 
-def _lettered(observations: Observations, scene: Scene | None) -> Observations | None:
+def _lettered(observations: Observations, scene: Any) -> Observations | None:
     """Chambers counted against the rotation from A."""
-    if scene is None or observations.kind != "injection" or scene.disc.chambers < 4:
+    if observations.kind != "injection" or scene.disc.chambers < 4:
         return None
     letters = chamber_letters(scene.disc.chambers)
     count = len(letters)
@@ -80,7 +80,7 @@ def _lettered(observations: Observations, scene: Scene | None) -> Observations |
 
 
 def _amplitudes(factor: float) -> Change:
-    def change(observations: Observations, _: Scene | None) -> Observations | None:
+    def change(observations: Observations, _: Any) -> Observations | None:
         columns = {n: factor * v for n, v in observations.columns.items() if n.startswith("amplitude")}
         widths = {n: factor * v if n in columns else v for n, v in observations.uncertainty.items()}
         return replace(_with(observations, **columns), uncertainty=widths) if columns else None
@@ -91,8 +91,8 @@ def _amplitudes(factor: float) -> Change:
 def _pressures(factor: float, *, absolute: bool = False) -> Change:
     """Of the gas, in another unit, or less that of the surroundings."""
 
-    def change(observations: Observations, scene: Scene | None) -> Observations | None:
-        if scene is None or observations.kind not in ("injection", "transfer"):
+    def change(observations: Observations, scene: Any) -> Observations | None:
+        if observations.kind not in ("injection", "transfer"):
             return None
         gauge = factor * observations.columns["pressure"]
         gauge = gauge - scene.gas.ambient_pressure if absolute else gauge
@@ -101,7 +101,7 @@ def _pressures(factor: float, *, absolute: bool = False) -> Change:
     return change
 
 
-def _seconds(observations: Observations, _: Scene | None) -> Observations | None:
+def _seconds(observations: Observations, _: Any) -> Observations | None:
     if observations.kind not in ("injection", "transfer"):
         return None
     times = 1e3 * observations.columns["gas_time"]

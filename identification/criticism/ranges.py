@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.kinds import KINDS, Column
+from ringbalance.identification.data.kinds import KINDS, Column, kinds_of
 from ringbalance.identification.likelihood import Problem
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.scene.models import Scene
@@ -19,6 +19,7 @@ from ringbalance.scene.units import format_quantity
 FAR: Final = 5.0
 """Ratio of a column's median to the nearer end of the scene's range: below the ten of the smallest mistake of
 a unit, and beyond what a test rig changes."""
+_RANGED: Final = kinds_of("liquid_ring")
 _FAR_VIBRATION: Final = 100.0
 """The same of vibrations, which the scene seldom knows better."""
 
@@ -39,14 +40,14 @@ class ComparedColumn:
 
 
 def compared_columns(problem: Problem) -> tuple[ComparedColumn, ...]:
-    """Columns against what a liquid-ring scene has; other scenes have no such ranges yet."""
-    return tuple(_compared(problem)) if isinstance(problem.scene, Scene) else ()
+    """Columns against what the scene has; kinds of eccentric masses have no such ranges yet."""
+    return tuple(_compared(problem))
 
 
 def _compared(problem: Problem) -> Iterator[ComparedColumn]:
     for block in problem.blocks:
         observations = block.observations
-        ranges = _ranges(problem.scene, observations.kind)
+        ranges = _ranges(problem.scene, observations.kind) if observations.kind in _RANGED else {}
         for column in KINDS[observations.kind].columns:
             values, known = observations.columns.get(column.name), ranges.get(column.name)
             if values is None or known is None or not np.any(values):

@@ -30,7 +30,6 @@ from ringbalance.identification.criticism.ranges import ComparedColumn
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
 
 DECISIVE: Final = math.log(1e6)
 """Gain of the log likelihood."""
@@ -101,8 +100,7 @@ def _reading(problem: Problem, code: str, chosen: Sequence[int], gain: float, *,
 
 def _choices(problem: Problem, kind: Misreading) -> Iterator[tuple[int, ...]]:
     """Places of the files that are read otherwise: each that can be, and all of them."""
-    scene = problem.scene if isinstance(problem.scene, Scene) else None
-    able = [i for i, b in enumerate(problem.blocks) if kind.change(b.observations, scene) is not None]
+    able = [i for i, b in enumerate(problem.blocks) if kind.change(b.observations, problem.scene) is not None]
     yield from ((i,) for i in able)
     if kind.together and len(able) > 1:
         yield tuple(able)
@@ -166,8 +164,7 @@ class _Comparison:
 
     def _changed(self, kind: Misreading, rows: _Rows) -> _Rows | None:
         problem = self.problem
-        scene = problem.scene if isinstance(problem.scene, Scene) else None
-        observations = kind.change(rows.block.observations, scene)
+        observations = kind.change(rows.block.observations, problem.scene)
         if observations is None:
             return None
         block = Block.of(observations)

@@ -15,10 +15,9 @@ from ringbalance.controller.eccentric_mass.inputs import eccentric_with
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.criticism.explained import Explained, shares_explained
 from ringbalance.identification.criticism.law_comparison import LawComparison
-from ringbalance.identification.criticism.patterns import Criticism, LinearFit
 from ringbalance.identification.criticism.ranges import ComparedColumn, compared_columns
 from ringbalance.identification.criticism.readings import Reading, other_readings
-from ringbalance.identification.data.kinds import KINDS
+from ringbalance.identification.criticism.residual_tests import Criticism, LinearFit
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.predict.device import Device
@@ -47,7 +46,6 @@ WITHOUT: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
     }
 )
 """Of eccentric masses: the kind of data that an effect moves, and the values that are zero without it."""
-ORDER = "the order of measurement"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,12 +81,12 @@ class Review:
 
     @property
     def text(self) -> str:
-        """The verdict on the fit; residuals without a pattern say nothing of data that are read wrongly."""
+        """The verdict on the fit; sound residuals say nothing of data that are read wrongly."""
         if not self._read_wrongly:
             return self.criticism.text
-        patterns = [] if self.criticism.describes else [self.criticism.text]
+        residuals = [] if self.criticism.describes else [self.criticism.text]
         return "the fit does not describe the data as they are read: " + "; ".join(
-            [*self._read_wrongly, *patterns]
+            [*self._read_wrongly, *residuals]
         )
 
     @property
@@ -102,7 +100,7 @@ class Review:
         found, best = _at_solution(result), result.optimum
         ranges = compared_columns(best.residuals.problem)
         return cls(
-            criticism=Criticism.of(found.fit, found.covariates),
+            criticism=Criticism.of(found.fit),
             laws=tuple(_comparisons(result, found)),
             explained=shares_explained(best),
             readings=other_readings(best, ranges),
@@ -113,8 +111,8 @@ class Review:
 def _comparisons(result: FitResult, found: _AtSolution) -> Iterator[LawComparison]:
     best = result.optimum
     problem, scene = best.residuals.problem, best.residuals.problem.scene_at(best.t)
-    predictions = _by_other_tubes if isinstance(scene, Scene) else _by_other_machines
-    for name, predicted in predictions(problem, scene):
+    # Each yields nothing without data of the kinds that it is about.
+    for name, predicted in (*_by_other_tubes(problem, scene), *_by_other_machines(problem, scene)):
         residuals = found.turned(best.residuals.at(best.t, predicted=predicted))
         yield LawComparison.of(found.fit, other=name, residuals=residuals)
 
@@ -214,8 +212,6 @@ class _AtSolution:
 
     fit: LinearFit
     """Of a vibration the part along its predicted change, and the part across."""
-    covariates: Mapping[str, FloatArray]
-    """By name, shape (n,); NaN where a row has none."""
     turn: FloatArray
     """Rotation of the rows of vibrations into these parts, shape (measured, measured)."""
 
@@ -245,8 +241,8 @@ def _at_solution(result: FitResult) -> _AtSolution:
             block=np.concatenate([blocks, rest]),
             data=data,
             known_noise=known,
+            order=_order(problem, parts.size),
         ),
-        covariates=_covariates(result, parts.size),
         turn=turn,
     )
 
@@ -275,18 +271,11 @@ def _rotation(result: FitResult) -> FloatArray:
     return turn
 
 
-def _covariates(result: FitResult, size: int) -> Mapping[str, FloatArray]:
-    """What was set, and the order; angles apart, which have no least and no largest."""
-    problem, found, at = result.optimum.residuals.problem, {ORDER: np.full(size, np.nan)}, 0
+def _order(problem: Problem, size: int) -> FloatArray:
+    """Row of its file that each residual is of; the two parts of a vibration have one."""
+    order, at = np.zeros(size), 0
     for block in problem.blocks:
-        observations = block.observations
-        width = block.measured.size // len(observations)
-        mine = slice(at, at + block.measured.size)
-        found[ORDER][mine] = np.tile(np.arange(float(len(observations))), width)
-        for column in KINDS[observations.kind].columns:
-            values = observations.columns.get(column.name)
-            if values is None or column.measured or column.amplitude or column.dimension == "angle":
-                continue
-            found.setdefault(column.words, np.full(size, np.nan))[mine] = np.tile(values, width)
-        at += block.measured.size
-    return found
+        rows, count = len(block.observations), block.measured.size
+        order[at : at + count] = np.tile(np.arange(float(rows)), count // rows)
+        at += count
+    return order

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from ringbalance.identification.data.tables import dimension_of, split_head
 from ringbalance.scene.faults import SceneError, did_you_mean
@@ -100,7 +100,7 @@ class DataKind:
     """One kind of measurement."""
 
     title: str
-    balancer: Literal["liquid_ring", "eccentric_mass"]
+    balancer: str
     columns: tuple[Column, ...]
     one_of: tuple[str, ...] = ()
     """Columns of which a file has exactly one."""
@@ -286,6 +286,16 @@ KINDS: Final[Mapping[str, DataKind]] = MappingProxyType(
         "positioning": _POSITIONING,
     }
 )
+
+
+def kinds_of(balancer: str) -> tuple[str, ...]:
+    """Names of the kinds that belong to a balancer."""
+    kinds: dict[str, list[str]] = {}
+    for name, kind in KINDS.items():
+        kinds.setdefault(kind.balancer, []).append(name)
+    return tuple(kinds.get(balancer, ()))
+
+
 """By the word that a file's `kind` has."""
 
 

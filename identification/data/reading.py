@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.kinds import AMPLITUDES, KINDS, Column, DataKind, unknown_kind
+from ringbalance.identification.data.kinds import AMPLITUDES, KINDS, Column, DataKind, kinds_of, unknown_kind
 from ringbalance.identification.data.measurements import SOURCE_KEYS, Observations
 from ringbalance.identification.data.tables import (
     Table,
@@ -29,8 +29,7 @@ from ringbalance.identification.data.tables import (
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, SceneError, did_you_mean, toml_text
 from ringbalance.scene.keys.fields import LETTERS, half_width
-from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.units import FieldError, parse_quantity
 
 AMPLITUDE: Final = "amplitude"
@@ -133,9 +132,9 @@ def _kind(table: Table, scene: AnyScene) -> tuple[DataKind | None, list[Fault]]:
         problem, value = unknown_kind(str(word)), toml_text(word)
         return None, [data_fault(table.file, "kind", problem, value=value, allowed=", ".join(KINDS))]
     kind = KINDS[word]
-    if kind.balancer == scene.balancer:
+    if word in kinds_of(scene.balancer):
         return kind, []
-    own = ", ".join(name for name, each in KINDS.items() if each.balancer == scene.balancer)
+    own = ", ".join(kinds_of(scene.balancer))
     problem = f'the balancer of {scene.file} is "{scene.balancer}", and these data belong to another'
     return None, [data_fault(table.file, "kind", problem, value=toml_text(word), allowed=own)]
 
@@ -230,8 +229,7 @@ def _range_faults(table: Table, head: str, column: Column, values: FloatArray) -
 
 
 def _chamber_faults(table: Table, scene: AnyScene) -> Iterator[Fault]:
-    assert isinstance(scene, Scene)
-    letters = LETTERS[: scene.disc.chambers]
+    letters = LETTERS[: liquid_ring_scene(scene).disc.chambers]
     for line, cell in zip(table.lines, table.texts("chamber"), strict=True):
         if len(cell) != 1 or cell not in letters:
             problem = f"the disc has no chamber of that name{did_you_mean(cell, letters)}"
@@ -240,10 +238,10 @@ def _chamber_faults(table: Table, scene: AnyScene) -> Iterator[Fault]:
 
 def _fill_faults(table: Table, scene: AnyScene, columns: Mapping[str, FloatArray]) -> Iterator[Fault]:
     """Fills of a driven chamber beyond the liquid of its pair."""
-    if not isinstance(scene, Scene) or "fill_ratio" not in columns:
+    if "fill_ratio" not in columns:
         return
     head = next(head for head in table.heads if (split_head(head) or ("",))[0] == "fill_ratio")
-    total = 2 * scene.disc.initial_fill
+    total = 2 * liquid_ring_scene(scene).disc.initial_fill
     rows = zip(table.lines, table.texts(head), columns["fill_ratio"].tolist(), strict=True)
     for line, cell, fill in rows:
         if total * (1 + _ROUNDED) < fill <= 1:

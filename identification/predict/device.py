@@ -23,7 +23,6 @@ from ringbalance.controller.liquid_ring.motion import Motion
 from ringbalance.controller.liquid_ring.records import WORKSPACE, X
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.measurements import Observations
-from ringbalance.reduced_model.chamber.range import mean_gravity
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -48,8 +47,6 @@ _LEAST_LEFT: Final = 0.1
 class Models:
     """Models that predictions of a scene and its neighbours take, by the scene's own tolerance."""
 
-    gravity: bool
-    """Whether the chamber's values hold gravity."""
     velocity: float
     """Of a primed tube at equal fills, m/s."""
     gas_pressure: float
@@ -60,13 +57,16 @@ class Models:
     @classmethod
     def of(cls, scene: Scene) -> Models:
         """The models that `calibrate` takes."""
-        gravity = mean_gravity(scene) > scene.tolerance
-        law = nominal_law(scene, gravity=gravity)
+        law = nominal_law(scene, gravity=scene.environment.gravity > 0)
         return cls(
-            gravity=gravity,
             velocity=_primed_velocity(law, scene),
             gas_pressure=scene.gas.pressure - scene.gas.gauge_correction,
         )
+
+    def with_gauge_correction(self, scene: Scene) -> Scene:
+        """A fitted scene that says by how much the gauge of the data is off."""
+        off = scene.gas.pressure - self.gas_pressure
+        return replace(scene, gas=replace(scene.gas, gauge_correction=off))
 
 
 def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
@@ -95,7 +95,7 @@ class Device:
         Which flows carry the gas out of the crest is decided by the scene that is fitted: what a faster one
         would tell of k by that rests on a Froude number that is not known so well.
         """
-        law = nominal_law(self.scene, gravity=self.models.gravity)
+        law = nominal_law(self.scene, gravity=self.scene.environment.gravity > 0)
         velocity = _primed_velocity(law, self.scene)
         if velocity > 0 and self.models.velocity > 0:
             froude = law.path.froude_velocity * velocity / self.models.velocity
@@ -110,8 +110,6 @@ class Device:
         dynamics = dynamics_of(
             scene=self.scene, model=BalancerModel.of(self.law), modelled=terms, checked=True
         )
-        if dynamics is None:
-            raise ValueError("the calibrated law has a column in the tube")
         return dynamics.plant(total=2 * self.scene.disc.initial_fill, relative_error=RELATIVE_ERROR)
 
     @cached_property

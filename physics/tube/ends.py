@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 from fluids.fittings import entrance_distance, entrance_rounded, entrance_sharp
+from scipy.interpolate import CubicSpline
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
-from ringbalance.physics.splines import CubicSpline
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.scene.arrays import FloatArray, clipped
 from ringbalance.scene.models import Tube
@@ -61,7 +61,7 @@ def end_table(end: str) -> _EndTable:
     power = 1 if end == "entrance" else 0
     nodes = [row for row in rows if row["kind"] == "node"]
     a, y = (np.array([float(row[name]) for row in nodes]) for name in ("a", "fine"))
-    spline = CubicSpline.through(a, y * np.exp(-power * a))
+    spline = CubicSpline(a, y * np.exp(-power * a))
     checks = [row for row in rows if row["kind"] == "check"]
     at, solved = (np.array([float(row[name]) for row in checks]) for name in ("a", "fine"))
     gaps = np.abs(spline(at) * np.exp(power * at) - solved) * np.exp(-at)

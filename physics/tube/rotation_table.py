@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import RectBivariateSpline
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
-from ringbalance.physics.splines import Surface
 from ringbalance.scene.arrays import BoolArray, FloatArray, clipped, distinct
 
 Rows = Sequence[Mapping[str, str]]
@@ -68,9 +68,9 @@ class Rectangle:
 
     table: str
     """"slow" or "fast"."""
-    difference: Surface
+    difference: RectBivariateSpline
     """Spline of ln F - ln F_base over (a, b)."""
-    numerical: Surface
+    numerical: RectBivariateSpline
     """Bilinear interpolant of the relative discretisation uncertainty."""
     a_limit: float
     b_limit: float
@@ -122,8 +122,8 @@ def _rectangle(table: str, rows: Rows) -> Rectangle:
     mirrored = np.concatenate([-nodes[3:0:-1], nodes])
     return Rectangle(
         table=table,
-        difference=Surface.bicubic(mirrored, second, np.concatenate([gap[3:0:-1], gap])),
-        numerical=Surface.bilinear(nodes, second, uncertainty_95),
+        difference=RectBivariateSpline(mirrored, second, np.concatenate([gap[3:0:-1], gap])),
+        numerical=RectBivariateSpline(nodes, second, uncertainty_95, kx=1, ky=1),
         a_limit=float(nodes[-1]),
         b_limit=float(second[-1]),
     )
@@ -132,13 +132,15 @@ def _rectangle(table: str, rows: Rows) -> Rectangle:
 def _logarithm(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> FloatArray:
     """ln F at the nearest point of the rectangle."""
     a, b = clipped(a, 0.0, rectangle.a_limit), clipped(b, 0.0, rectangle.b_limit)
-    logarithm = _base_at(rectangle.table, a, b) + rectangle.difference(a, b)
+    logarithm = _base_at(rectangle.table, a, b) + rectangle.difference.ev(a, b)
     return np.asarray(np.where(a > 0.0, logarithm, 0.0))
 
 
 def _discretisation(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> FloatArray:
     """Relative discretisation uncertainty there."""
-    return rectangle.numerical(clipped(a, 0.0, rectangle.a_limit), clipped(b, 0.0, rectangle.b_limit))
+    return np.asarray(
+        rectangle.numerical.ev(clipped(a, 0.0, rectangle.a_limit), clipped(b, 0.0, rectangle.b_limit))
+    )
 
 
 def _gap(rectangle: Rectangle, rows: Rows) -> FloatArray:

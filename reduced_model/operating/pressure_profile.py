@@ -9,10 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ringbalance.physics.gas import vented_pressure
 from ringbalance.physics.pressure.hydrostatics import column_radius
-from ringbalance.physics.roots import bracketed_root
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.physics.tube.uncertainty import corrected_state
 from ringbalance.reduced_model.law.building import column_pressure
@@ -236,7 +236,7 @@ def _full_again(at: Places, behind: Callable[[Places], FloatArray], cavity: floa
         inside = Places(share=np.array([share]), after=np.array([share < stop]))
         return float(behind(inside)[0] - cavity)
 
-    return bracketed_root(above, start, stop)
+    return float(brentq(above, start, stop))
 
 
 def _blocked(scene: Scene, law: CalibratedLaw, state: DirectedState, primed: bool, points: int) -> _Line:
@@ -328,7 +328,5 @@ def _trapped(ambient: float, ends: TubeEnds[float], filled: _Filled, crest_press
 
     if largest <= 0:
         return 0.0
-    root = (
-        largest if excess(largest) < 0 else 0.0 if excess(0.0) >= 0 else bracketed_root(excess, 0.0, largest)
-    )
+    root = largest if excess(largest) < 0 else 0.0 if excess(0.0) >= 0 else brentq(excess, 0.0, largest)
     return float(np.clip(max(root, near_pressure - crest_pressure), 0.0, largest))

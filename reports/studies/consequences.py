@@ -11,9 +11,9 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.ensemble.monte_carlo import Ensemble, ensemble_transfer, simulate_ensemble
+from ringbalance.controller.ensemble.monte_carlo import Ensemble, ensemble_dynamics, simulate_ensemble
 from ringbalance.controller.ensemble.run import MomentTable
-from ringbalance.controller.ensemble.transfer import PairTransfer
+from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.tuning.loop_factor import loop_factor
@@ -155,15 +155,15 @@ def find_consequences(
     """
     nominal = paper_model(scene) if paper is None else paper
     notes = _assumed(scene)
-    transfers = {m.name: _transfer(scene, m, notes) for m in (nominal, calibrated)}
+    moving = {m.name: _dynamics(scene, m, notes) for m in (nominal, calibrated)}
     gains = {m.name: _gain(scene, m, notes) for m in (nominal, calibrated)}
     tuned = recommended or _recommended(scene, calibrated)
     retuned = None if tuned is None else tuned.controller.proportional
     asked = [(scene, nominal), (scene, calibrated)] + ([(tuned, calibrated)] if tuned else [])
     ensembles = [
-        simulate_ensemble(own, model, members, scene.run.seed, transfer=transfer)
+        simulate_ensemble(own, model, members, scene.run.seed, dynamics=dynamics)
         for own, model in asked
-        if (transfer := _on(own, scene, model, transfers[model.name], notes)) is not None
+        if (dynamics := _on(own, scene, model, moving[model.name], notes)) is not None
     ]
     runs = _runs(scene, tuned, nominal, calibrated)
     return Consequences(
@@ -185,15 +185,15 @@ def _assumed(scene: Scene) -> list[str]:
 
 
 def _on(
-    own: Scene, scene: Scene, model: BalancerModel, transfer: PairTransfer | None, notes: list[str]
-) -> PairTransfer | None:
-    """The transfer of a scene, made again only where its gas is another one."""
-    return transfer if own.gas == scene.gas else _transfer(own, model, notes)
+    own: Scene, scene: Scene, model: BalancerModel, dynamics: Dynamics | None, notes: list[str]
+) -> Dynamics | None:
+    """The dynamics of a scene, made again only where its gas is another one."""
+    return dynamics if own.gas == scene.gas else _dynamics(own, model, notes)
 
 
-def _transfer(scene: Scene, model: BalancerModel, notes: list[str]) -> PairTransfer | None:
+def _dynamics(scene: Scene, model: BalancerModel, notes: list[str]) -> Dynamics | None:
     try:
-        return ensemble_transfer(scene, model)
+        return ensemble_dynamics(scene, model)
     except ValueError as cause:
         notes.append(f"{model.name}: no ensemble; {cause}")
         return None

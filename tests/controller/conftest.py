@@ -14,7 +14,7 @@ import pytest
 from ringbalance.controller.liquid_ring import compiled_column
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
 from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Switch
-from ringbalance.controller.liquid_ring.transfer import Drive
+from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
@@ -22,6 +22,7 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.verification.reference.transfers import Drive
 
 Velocity = Callable[[FloatArray, FloatArray, FloatArray, BoolArray], tuple[Any, Any]]
 
@@ -169,6 +170,18 @@ def drive_by(laws: Mapping[str, FunctionLaw]) -> Callable[..., Drive]:
 
 
 @pytest.fixture(scope="session")
+def ring_of(scene: models.Scene) -> Callable[..., LiquidRing]:
+    """A disc whose liquid moves by its flow law alone, under a gas pressure."""
+
+    def make(model: BalancerModel, *, gas_pressure: float = 0.7e6, chambers: int = 4) -> LiquidRing:
+        under = replace(scene, gas=replace(scene.gas, pressure=gas_pressure))
+        dynamics = dynamics_of(scene=under, model=model, modelled=())
+        return LiquidRing(model=model, chambers=chambers, dynamics=dynamics)
+
+    return make
+
+
+@pytest.fixture(scope="session")
 def calibrated(scene: models.Scene) -> BalancerModel:
     """The same disc by its calibrated law, with the crest at 31.5 mm."""
     return calibrate(scene).model
@@ -179,9 +192,7 @@ def plant_of() -> Callable[..., Dynamics]:
     """Terms of a plant for a scene and a balancer."""
 
     def make(scene: models.Scene, model: BalancerModel, *terms: str) -> Dynamics:
-        found = dynamics_of(scene=scene, model=model, modelled=terms)
-        assert found is not None
-        return found
+        return dynamics_of(scene=scene, model=model, modelled=terms)
 
     return make
 
@@ -193,9 +204,7 @@ def plant(scene: models.Scene) -> Callable[..., Dynamics]:
     def make(model: BalancerModel, *terms: str, length: float | None = None, **gas: Any) -> Dynamics:
         tube = replace(scene.tube, length=length or scene.tube.length)
         own = replace(scene, tube=tube, gas=replace(scene.gas, **gas))
-        found = dynamics_of(scene=own, model=model, modelled=terms)
-        assert found is not None
-        return found
+        return dynamics_of(scene=own, model=model, modelled=terms)
 
     return make
 

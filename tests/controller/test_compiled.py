@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from ringbalance.controller.compilation.compiled import compiled, compiled_sources
-from ringbalance.controller.ensemble import compiled_disc, compiled_noise, compiled_sample, transfer
+from ringbalance.controller.ensemble import compiled_disc, compiled_motion, compiled_noise, compiled_sample
 
 
 def _sum_of_sines(values: np.ndarray[Any, np.dtype[np.float64]], factor: float) -> float:
@@ -69,9 +69,9 @@ from numba.core import config
 from ringbalance.controller.compilation.compiled import compiled, compiled_sources
 from ringbalance.controller.ensemble import (
     compiled_disc,
+    compiled_motion,
     compiled_noise,
     compiled_sample,
-    transfer,
 )
 before = config.CACHE_DIR
 def twice(x):
@@ -98,7 +98,7 @@ def _run(tmp_path: Path, **more: str) -> str:
 
 
 def test_every_compiled_functions_source_tells_stale_code() -> None:
-    modules = (compiled_disc, compiled_noise, compiled_sample, transfer)
+    modules = (compiled_disc, compiled_motion, compiled_noise, compiled_sample)
     functions = [
         one.py_func for module in modules for one in vars(module).values() if hasattr(one, "py_func")
     ]

@@ -12,11 +12,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Column, Dynamics, PairState
+from ringbalance.controller.liquid_ring.motion import Dynamics, PairState
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -24,6 +23,8 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, Scene
+
+RingOf = Callable[..., LiquidRing]
 
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
@@ -36,10 +37,15 @@ PIPED = {"conductance": 1e-8, "critical_ratio": 0.3}
 
 @pytest.mark.parametrize("law", ["paper", "calibrated"])
 def test_a_lag_is_an_exact_delay(
-    law: str, model: BalancerModel, calibrated: BalancerModel, plant: Plant, scene: Scene
+    law: str,
+    model: BalancerModel,
+    calibrated: BalancerModel,
+    plant: Plant,
+    scene: Scene,
+    ring_of: RingOf,
 ) -> None:
     own = model if law == "paper" else calibrated
-    ring = LiquidRing(model=own, chambers=4, gas_pressure=0.7e6, integrator=quadrature)
+    ring = ring_of(own)
     start = DiscState.initial(disc=scene.disc)
     prompt = ring.advance(start, gas_times={0: 0.3}, duration=0.3, points=30)
     late = replace(ring, dynamics=plant(own, "valve lag", valve_lag=0.04))
@@ -369,7 +375,6 @@ def test_short_trials_settle_with_moving_liquid(scene: Scene, calibrated: Balanc
         run=replace(scene.run, time_limit=6.0),
     )
     run = simulate(trial, calibrated)
-    assert run.integrator == "runge_kutta"
     assert {t.term: t.model for t in run.models_used}["tube inertia"].startswith("rho L du/dt")
     assert run.status
     fills = np.array(list(run.fill_ratio.values()))
@@ -383,8 +388,3 @@ def test_energy_is_pressure_times_displaced_volume(scene: Scene, model: Balancer
         volume = (done.fill_before - done.fill_after) * model.chamber_volume
         assert done.energy == pytest.approx(0.7e6 * volume, rel=1e-12)
     assert run.energy == pytest.approx(math.fsum(i.operation.energy for i in run.injections))
-
-
-def test_a_column_is_only_made_for_laws_with_forces(scene: Scene, laws: Any) -> None:
-    assert Column.of(law=laws["constant"], tube=scene.tube) is None
-    assert isinstance(Column.of(law=calibrate(scene).flow_law, tube=scene.tube), Column)

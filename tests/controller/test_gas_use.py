@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.interval import Passage
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.transfer import Event
+from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import GasUse
 from ringbalance.mesh.geometry import surface_radius
@@ -32,6 +31,8 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.short_injection import Fills, short_injections
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.models import Scene
+
+RingOf = Callable[..., LiquidRing]
 
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
@@ -192,8 +193,8 @@ def test_a_pressure_on_the_axis_counts_with_its_column(
     assert forces(plants[1]).steady((0.25, 0.25), (0.7e6, 0.0), primed=True)[0] == pytest.approx(near_u)
 
 
-def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene) -> None:
-    ring = LiquidRing(model=model, chambers=4, gas_pressure=0.7e6, integrator=quadrature)
+def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene, ring_of: RingOf) -> None:
+    ring = ring_of(model)
     advance = ring.advance(DiscState.initial(disc=scene.disc), gas_times={0: 4.0}, duration=4.0, points=4000)
     (operation,) = advance.operations
     assert operation.event is Event.EMPTY
@@ -226,8 +227,6 @@ def test_with_a_line_the_chamber_runs_dry_too(calibrated: BalancerModel, plant: 
     ring = LiquidRing(
         model=calibrated,
         chambers=4,
-        gas_pressure=0.7e6,
-        integrator=quadrature,
         dynamics=plant(calibrated, "gas filling", "tube inertia", conductance=1e-8, critical_ratio=0.3),
     )
     begun = ring.advance(DiscState.initial(disc=scene.disc), gas_times={0: 2.0}, duration=2.0, points=4000)

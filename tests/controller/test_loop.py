@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ import pytest
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import MAX_SAMPLES, simulate
 from ringbalance.controller.simulation import Outcome, Simulation, Verdict
@@ -23,7 +22,8 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.transfers import adaptive_ode
+
+RingOf = Callable[..., LiquidRing]
 
 
 def with_controller(scene: Scene, **changes: Any) -> Scene:
@@ -100,16 +100,6 @@ def test_both_valves_open_together_and_the_wait_follows_the_longer_one(
     assert first[0].operation.duration == pytest.approx(0.8 * math.cos(math.radians(17)))
     assert first[1].operation.duration == pytest.approx(0.8 * math.sin(math.radians(17)))
     assert run.samples[1].time == pytest.approx(first[0].operation.duration + 0.5)
-
-
-def test_the_integrators_agree_over_a_whole_run(scene: Scene, model: BalancerModel) -> None:
-    exact = simulate(scene, model)
-    assert exact.integrator == "closed_form"
-    for integrator, tolerance in ((quadrature, 1e-10), (adaptive_ode(), 1e-7)):
-        other = simulate(scene, model, integrator=integrator)
-        assert other.time == pytest.approx(exact.time, abs=tolerance * 100)
-        for letter, fill in exact.fill_ratio.items():
-            assert other.fill_ratio[letter] == pytest.approx(fill, abs=tolerance)
 
 
 @pytest.mark.parametrize("chambers", [2, 6, 8])
@@ -349,11 +339,12 @@ def test_self_siphoning_loses_the_correction_and_is_reported(scene: Scene, sipho
     run = simulate(scene, siphoning)
     assert run.outcome is Outcome.DRIFTING
     assert "run back" in run.status
-    assert run.integrator == "quadrature"
 
 
-def test_levels_run_back_by_the_law_while_waiting(siphoning: BalancerModel, scene: Scene) -> None:
-    plant = LiquidRing(model=siphoning, chambers=4, gas_pressure=1e5, integrator=quadrature)
+def test_levels_run_back_by_the_law_while_waiting(
+    siphoning: BalancerModel, scene: Scene, ring_of: RingOf
+) -> None:
+    plant = ring_of(siphoning, gas_pressure=1e5)
     state = DiscState.initial(disc=scene.disc)
     driven = plant.advance(state, gas_times={2: 0.4}, duration=0.4, points=3)
     assert driven.state.pairs[0].primed
@@ -361,29 +352,29 @@ def test_levels_run_back_by_the_law_while_waiting(siphoning: BalancerModel, scen
     waited = plant.advance(driven.state, gas_times={}, duration=0.7, points=2)
     rate = 2 * 20 * siphoning.tube_area / siphoning.chamber_volume
     lost = (driven.state.pairs[0].fill - 0.25) * math.exp(-rate * 0.7)
-    assert waited.state.pairs[0].fill == pytest.approx(0.25 + lost, abs=1e-11)
+    assert waited.state.pairs[0].fill == pytest.approx(0.25 + lost, abs=1e-9)
     assert waited.state.pairs[1] == driven.state.pairs[1]
-    assert waited.drift == pytest.approx(driven.state.pairs[0].fill - 0.25 - lost, abs=1e-11)
+    assert waited.drift == pytest.approx(driven.state.pairs[0].fill - 0.25 - lost, abs=1e-9)
 
 
 def test_a_pair_whose_valve_closes_first_runs_back_during_the_other(
-    siphoning: BalancerModel, scene: Scene
+    siphoning: BalancerModel, scene: Scene, ring_of: RingOf
 ) -> None:
-    plant = LiquidRing(model=siphoning, chambers=4, gas_pressure=1e5, integrator=quadrature)
+    plant = ring_of(siphoning, gas_pressure=1e5)
     both = plant.advance(
         DiscState.initial(disc=scene.disc), gas_times={0: 0.2, 1: 0.9}, duration=0.9, points=3
     )
     assert sorted(both.instants) == pytest.approx([0.2, 0.3, 0.6, 0.9])
-    first = {o.chamber: o for o in both.operations}[0]
     rate = 2 * 20 * siphoning.tube_area / siphoning.chamber_volume
-    assert both.fill_ratio[0, 0] == first.fill_after
     assert both.fill_ratio[0, -1] - 0.25 == pytest.approx(
-        (first.fill_after - 0.25) * math.exp(-rate * 0.7), abs=1e-11
+        (both.fill_ratio[0, 0] - 0.25) * math.exp(-rate * 0.7), abs=1e-9
     )
 
 
-def test_gas_into_both_chambers_of_a_pair_is_refused(scene: Scene, model: BalancerModel) -> None:
-    plant = LiquidRing(model=model, chambers=4, gas_pressure=1e5, integrator=quadrature)
+def test_gas_into_both_chambers_of_a_pair_is_refused(
+    scene: Scene, model: BalancerModel, ring_of: RingOf
+) -> None:
+    plant = ring_of(model, gas_pressure=1e5)
     with pytest.raises(ValueError, match="one pair"):
         plant.advance(DiscState.initial(disc=scene.disc), gas_times={1: 0.2, 3: 0.2}, duration=0.2, points=1)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import starting_pressure
 from ringbalance.controller.rotor import chamber_directions, chamber_letters, disc_unbalance, wrapped
@@ -20,6 +20,9 @@ from ringbalance.scene.models import Scene
 # lambda rho V / 2 per fill difference, by hand: 72 mm, 1000 kg/m^3, V of Eq. 4.
 VOLUME = (math.pi / 4 * (44.5e-3**2 - 20.5e-3**2) - 2 * 2.777e-3 * 24e-3) * 62e-3
 PER_DIFFERENCE = 72e-3 * 1000 * VOLUME / 2
+
+
+RingOf = Callable[..., LiquidRing]
 
 
 def test_four_chambers_lie_on_the_axes() -> None:
@@ -88,10 +91,6 @@ def test_wrapping_ignores_whole_turns(turns: int) -> None:
     assert wrapped(1.2 + 2 * math.pi * turns) == pytest.approx(1.2, abs=1e-12)
 
 
-def plant_of(model: BalancerModel, chambers: int) -> LiquidRing:
-    return LiquidRing(model=model, chambers=chambers, gas_pressure=0.7e6, integrator=quadrature)
-
-
 def left_over(plant: LiquidRing, state: DiscState, rotor: Rotor, *, wanted: complex) -> float:
     """What the disc cannot form of a moment, kg m: of a rotor that vibrates 1 m per kg m, against it."""
     against = replace(
@@ -105,9 +104,11 @@ def left_over(plant: LiquidRing, state: DiscState, rotor: Rotor, *, wanted: comp
 
 
 @pytest.mark.parametrize("n", [4, 6, 8])
-def test_the_reach_is_the_polygon_of_full_pairs(scene: Scene, model: BalancerModel, n: int) -> None:
+def test_the_reach_is_the_polygon_of_full_pairs(
+    scene: Scene, model: BalancerModel, n: int, ring_of: RingOf
+) -> None:
     state = DiscState.initial(disc=replace(scene.disc, chambers=n))
-    plant = plant_of(model, n)
+    plant = ring_of(model, chambers=n)
     pair = plant.largest_pair_moment(state=state)
     assert pair == pytest.approx(PER_DIFFERENCE * 0.5, rel=1e-12)
     # All pairs full towards one corner: the side of the polygon is 2 M, its corners at M/sin(pi/n).
@@ -118,16 +119,16 @@ def test_the_reach_is_the_polygon_of_full_pairs(scene: Scene, model: BalancerMod
     )
 
 
-def test_four_chambers_reach_a_square(scene: Scene, model: BalancerModel) -> None:
-    state, plant = DiscState.initial(disc=scene.disc), plant_of(model, 4)
+def test_four_chambers_reach_a_square(scene: Scene, model: BalancerModel, ring_of: RingOf) -> None:
+    state, plant = DiscState.initial(disc=scene.disc), ring_of(model, chambers=4)
     pair = PER_DIFFERENCE * 0.5
     assert left_over(plant, state, scene.rotor, wanted=pair * (1.3 + 0.9j)) == pytest.approx(0.3 * pair)
     assert left_over(plant, state, scene.rotor, wanted=pair * (1.3 + 1.4j)) == pytest.approx(0.5 * pair)
 
 
-def test_two_chambers_reach_a_line(scene: Scene, model: BalancerModel) -> None:
+def test_two_chambers_reach_a_line(scene: Scene, model: BalancerModel, ring_of: RingOf) -> None:
     state = DiscState.initial(disc=replace(scene.disc, chambers=2))
-    plant, pair = plant_of(model, 2), PER_DIFFERENCE * 0.5
+    plant, pair = ring_of(model, chambers=2), PER_DIFFERENCE * 0.5
     assert left_over(plant, state, scene.rotor, wanted=0.7 * pair) == pytest.approx(0.0, abs=1e-18)
     assert left_over(plant, state, scene.rotor, wanted=(0.7 + 0.2j) * pair) == pytest.approx(0.2 * pair)
 

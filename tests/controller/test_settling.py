@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,6 @@ import pytest
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.liquid_ring.integrators import closed_form
 from ringbalance.controller.liquid_ring.motion import PairState
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
@@ -31,6 +31,8 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.scene.models import Scene
+
+RingOf = Callable[..., LiquidRing]
 
 STEPS = 200_000
 
@@ -53,11 +55,11 @@ def factor(scene: Scene, model: BalancerModel) -> LoopFactor:
 # --- the loop factor ---
 
 
-def test_the_rate_is_what_a_short_injection_does(scene: Scene, model: BalancerModel) -> None:
+def test_the_rate_is_what_a_short_injection_does(scene: Scene, model: BalancerModel, ring_of: RingOf) -> None:
     fills = balanced_fills(scene, model)
     pairs = tuple(PairState(fill=float(x), total=0.5) for x in fills)
     state = DiscState(pairs=pairs)
-    plant = LiquidRing(model=model, chambers=4, gas_pressure=scene.gas.pressure, integrator=closed_form)
+    plant = ring_of(model, gas_pressure=scene.gas.pressure)
 
     def seen(at: DiscState) -> complex:
         moment = disc_unbalance(moment=model.moment, fill_ratio=at.fills())

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import run_models
 from ringbalance.reduced_model.calibration import calibrate
@@ -30,8 +29,6 @@ def test_a_term_with_numbers_is_modelled_however_small(
     assert found["gas filling"].estimated_contribution is None
     assert found["gas filling"].model == "left out"
     assert found["loss of the tube"].model == "as in the law “paper”"
-    assert run.integrator == "runge_kutta"
-    assert simulate(scene, model).integrator == "closed_form"
 
 
 def test_the_papers_law_has_no_mass_in_the_tube(scene: Scene, model: BalancerModel) -> None:
@@ -57,13 +54,6 @@ def test_a_law_without_forces_carries_no_terms(
 def test_terms_without_numbers_are_refused(scene: Scene, model: BalancerModel, asked: list[str]) -> None:
     with pytest.raises(ValueError, match=asked[0]):
         simulate(scene, model, modelled=asked)
-
-
-def test_an_integrator_excludes_terms(scene: Scene, model: BalancerModel) -> None:
-    late = replace(scene, gas=replace(scene.gas, valve_lag=50e-3))
-    assert simulate(late, model, integrator=quadrature).integrator == "quadrature"
-    with pytest.raises(ValueError, match="integrator"):
-        simulate(late, model, integrator=quadrature, modelled=["valve lag"])
 
 
 def test_a_run_states_a_bound_on_what_it_neglects_and_the_status_of_its_models(scene: Scene) -> None:

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from ringbalance.cli import main
+from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.eccentric_mass.inputs import eccentric_value, eccentric_with
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
-from ringbalance.identification.balancers import _fitted_names
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
@@ -215,7 +215,7 @@ def test_friction_holds_a_small_voltage(scene: EccentricScene) -> None:
 
 
 def test_every_uncertain_quantity_can_be_changed(scene: EccentricScene) -> None:
-    for name in _fitted_names(scene):
+    for name in (each.path for each in balancer_of(scene).inputs()):
         changed = eccentric_with(scene, 0.125, name=name)
         assert eccentric_value(changed, name) == 0.125
         assert eccentric_with(changed, eccentric_value(scene, name), name=name) == scene

@@ -16,7 +16,7 @@ import pytest
 from ringbalance.cli import main
 from ringbalance.identification.balancers import informed
 from ringbalance.identification.criticism.law_comparison import LawComparison
-from ringbalance.identification.criticism.patterns import Criticism
+from ringbalance.identification.criticism.residual_tests import Criticism
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.kinds import KINDS, template
 from ringbalance.identification.data.reading import _observations_of, read_observations
@@ -170,7 +170,7 @@ def test_the_promised_keys_are_there(run: Run) -> None:
     promised = [name for line in section.splitlines() for name in re.findall(r"`([a-z0-9_]+)`", line)]
     assert len(promised) > 25
     missing = {name for name in promised if not has_key(document, name)}
-    assert missing <= {"identified", "pattern", "size", "runs"}  # values, and no keys
+    assert missing <= {"identified", "size", "runs"}  # values, and no keys
 
 
 def test_text_names_what_an_engineer_must_know(run: Run) -> None:
@@ -363,7 +363,7 @@ def test_a_disc_with_imported_chambers(run: Run) -> None:
 def test_data_that_tell_nothing_of_a_parameter(run: Run) -> None:
     """What an injection moves does not depend on lambda."""
     code, out, err = run(PAPER, EXAMPLES["transfer"], "--parameters", "lambda_factor", "--json")
-    assert code == 1, err
+    assert code == 0, err
     (found,) = json.loads(out)["parameters"]
     low, high = found["interval"]
     assert high > 100 * low

@@ -10,7 +10,6 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
-from ringbalance.controller.liquid_ring.integrators import quadrature
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
@@ -58,8 +57,6 @@ def test_injections_are_those_of_the_closed_loop(paper_scene: Scene) -> None:
     plant = LiquidRing(
         model=model,
         chambers=4,
-        gas_pressure=scene.gas.pressure,
-        integrator=quadrature,
         dynamics=dynamics_of(scene=scene, model=model, modelled=[INERTIA, HELD]),
     )
     state, before, expected = DiscState.initial(disc=scene.disc), 0j, []

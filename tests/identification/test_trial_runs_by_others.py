@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 from synthetic_rigs import observations
 
-from ringbalance.identification.criticism.review import ORDER, Review
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Verdict
@@ -89,9 +88,6 @@ def test_two_planes_are_balanced_by_what_the_fits_find(paper_scene: Scene) -> No
 def test_a_generator_that_does_not_repeat_itself(paper_scene: Scene, condition: str) -> None:
     """The same weight, 36.4 and 36.5 kg, was measured twice and differs by some 100 um: the noise that is
     estimated must be of that size, and K be that of a regression written out here.
-
-    What changed in between is no matter of the weights: where the criticism sees it, as it did in two of the
-    three conditions against what was expected, it is a pattern over the order of measurement.
     """
     weights, readings = np.array(WEIGHTS), np.array(RUNS[condition], dtype=np.float64)
     data = trial_runs(weights[:, 0], readings, angle=weights[:, 1])
@@ -107,5 +103,3 @@ def test_a_generator_that_does_not_repeat_itself(paper_scene: Scene, condition: 
     assert 0.2 < noise / (repeated / 2) < 2
     low, high = result.parameter("influence_coefficient").interval
     assert low < 1e-6 * abs(k) < high
-    failed = {each.against for each in Review.of(result).criticism.findings if each.fails}
-    assert failed == ({ORDER} if condition in ("no load", "excited") else set())

@@ -211,14 +211,14 @@ def test_jacobian_is_the_exact_derivative() -> None:
     c = Coefficients(inertia=1.3, viscosity=0.2, rotation=0.7)
     change = np.zeros_like(vector)
     change[system.free] = np.random.default_rng(1).normal(size=system.free.size)
-    linear = system.linear_entries(c)
+    linear = system.linear_matrix(c)
 
     def residual(x: np.ndarray) -> np.ndarray:
-        return np.asarray(system.full_matrix(linear) @ x) + c.inertia * system.convection_vector(x)
+        return np.asarray(linear @ x) + c.inertia * system.convection_vector(x)
 
     # The residual is quadratic, so its central difference is exact.
     difference = (residual(vector + change) - residual(vector - change))[system.free] / 2
-    matrix = system.free_matrix(linear + c.inertia * system.convection_entries(vector))
+    matrix = system.free_part(linear + c.inertia * system.convection_matrix(vector))
     np.testing.assert_allclose(matrix @ change[system.free], difference, rtol=1e-10, atol=1e-10)
 
 

@@ -7,12 +7,12 @@ Beyond the parameters that can be drawn, the flow at the nearest ones is given, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import spsolve
+from skfem import BilinearForm, LinearForm, condense, solve
+from skfem.helpers import dot, grad
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.arrays import FloatArray, IntArray
@@ -137,19 +137,23 @@ def _triangles(space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntAr
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def _potential(space: FlowSpace, gradient: FloatArray, known: IntArray, values: FloatArray) -> FloatArray:
-    """Nodal psi with known values at some nodes whose gradient is nearest to a given one."""
-    reference = np.einsum("eq,deq,kdeq->keq", space.weights, gradient, space.inverse, optimize=True)
-    local = np.einsum("keq,kiq->ei", reference, space.slope, optimize=True)
-    size = space.velocity_nodes
-    right = np.bincount(space.velocity.element_dofs.T.ravel(), weights=local.ravel(), minlength=size)
-    pattern = space.velocity_pattern
-    matrix = sparse.csc_matrix((space.stiffness_entries(), (pattern.rows, pattern.cols)), shape=(size, size))
-    psi = np.zeros(size)
+def _squared_slope(u: Any, v: Any, w: Any) -> Any:
+    return w.weight * dot(grad(u), grad(v))
+
+
+def _slope_along(v: Any, w: Any) -> Any:
+    return w.weight * (w.across[0] * grad(v)[0] + w.across[1] * grad(v)[1])
+
+
+def _potential(
+    space: FlowSpace, gradient: FloatArray, known: IntArray, values: FloatArray, weight: FloatArray
+) -> FloatArray:
+    """Nodal psi with known values at some nodes whose gradient is nearest to a given one, by a weight."""
+    matrix = BilinearForm(_squared_slope).assemble(space.velocity, weight=weight)
+    right = LinearForm(_slope_along).assemble(space.velocity, weight=weight, across=gradient)
+    psi = np.zeros(space.velocity_nodes)
     psi[known] = values
-    free = np.setdiff1d(np.arange(size), known)
-    psi[free] = spsolve(matrix[free][:, free], (right - matrix @ psi)[free])
-    return psi
+    return np.asarray(solve(*condense(matrix, right, x=psi, D=known)), dtype=np.float64)
 
 
 def _section_status(clipped: bool) -> Status:
@@ -166,7 +170,8 @@ def _in_plane_stream_function(system: FlowSystem, flow: FlowSolution) -> FloatAr
     space = system.space
     u, v = space.at_points(flow.velocity)[0][:2]
     edge = np.concatenate([space.boundary_nodes(name) for name in ("wall", "symmetry")])
-    return _potential(space, np.stack([-v, u]), np.unique(edge).astype(np.int64), np.zeros(1))
+    known = np.unique(edge).astype(np.int64)
+    return _potential(space, np.stack([-v, u]), known, np.zeros(1), space.measure)
 
 
 def _whole_section(
@@ -234,11 +239,11 @@ def _end_flow(end: End, system: FlowSystem, reynolds: float, first: float) -> En
     re = min(reynolds, LARGEST_END_REYNOLDS)
     settings = NewtonSettings(max_iterations=10, tolerance=1e-5)
 
-    def solve(a: float, start: FlowSolution | None) -> FlowSolution:
+    def flow_from(a: float, start: FlowSolution | None) -> FlowSolution:
         at = _END_SCALE * float(np.expm1(a))
         return solve_end(system=system, reynolds=at, start=start, settings=settings)
 
-    flow = flow_at(solve=solve, parameter=float(np.log1p(re / _END_SCALE)), first=first)
+    flow = flow_at(solve=flow_from, parameter=float(np.log1p(re / _END_SCALE)), first=first)
     status = Status()
     if re < reynolds:
         text = f"drawn at Re = {re:.0f}: beyond, steady laminar flow is not to be expected"
@@ -253,8 +258,7 @@ def _meridional_stream_function(system: FlowSystem, flow: FlowSolution) -> Float
     values = np.concatenate([np.zeros(axis.size), np.full(wall.size, _FLOW_THROUGH)])
     r = space.points[1]
     # Weighted so that the fit is of the velocity, whose every component is a derivative of psi over r.
-    fitted = replace(space, weights=space.weights / r**2)
-    return _potential(fitted, np.stack([-r * v, r * u]), np.concatenate([axis, wall]), values)
+    return _potential(space, np.stack([-r * v, r * u]), np.concatenate([axis, wall]), values, 1 / r)
 
 
 def _nodal_pressure(*, space: FlowSpace, pressure: FloatArray) -> FloatArray:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -62,9 +63,9 @@ class _Iteration:
     progress: Callable[[str], None] | None = None
 
 
-def _residual(system: FlowSystem, c: Coefficients, entries: FloatArray, state: _Iteration) -> FloatArray:
-    residual = np.asarray(system.full_matrix(entries) @ state.vector, dtype=np.float64)
-    residual -= system.load + state.gradient * system.flow_load
+def _residual(system: FlowSystem, c: Coefficients, linear: Any, state: _Iteration) -> FloatArray:
+    residual = np.asarray(linear @ state.vector, dtype=np.float64)
+    residual -= system.source + state.gradient * system.flow_load
     if c.inertia != 0.0:
         residual += c.inertia * system.convection_vector(state.vector)
     if system.enclosed:
@@ -75,13 +76,13 @@ def _residual(system: FlowSystem, c: Coefficients, entries: FloatArray, state: _
     return residual
 
 
-def _factorize(system: FlowSystem, c: Coefficients, entries: FloatArray, state: _Iteration) -> Factors:
-    jacobian = entries
+def _factorize(system: FlowSystem, c: Coefficients, linear: Any, state: _Iteration) -> Factors:
+    jacobian = linear
     if c.inertia != 0.0:
-        jacobian = entries + c.inertia * system.convection_entries(state.vector)
+        jacobian = linear + c.inertia * system.convection_matrix(state.vector)
     quads = system.space.mesh.refdom.__name__ == "RefQuad"
     layers = None if system.layers is None else system.layers[system.free]
-    factors = Factors.of(matrix=system.free_matrix(jacobian), along_diagonal=quads, layers=layers)
+    factors = Factors.of(matrix=system.free_part(jacobian), along_diagonal=quads, layers=layers)
     state.factorizations += 1
     if system.flow_component is not None:
         state.bordering = factors.solve(system.flow_load[system.free])
@@ -114,13 +115,13 @@ def _iterate(
     system: FlowSystem, c: Coefficients, flow_rate: float, settings: NewtonSettings, state: _Iteration
 ) -> str:
     """Newton steps; returns an empty text on convergence, else what went wrong."""
-    entries = system.linear_entries(c)
+    linear = system.linear_matrix(c)
     for _ in range(settings.max_iterations):
-        residual = _residual(system, c, entries, state)
+        residual = _residual(system, c, linear, state)
         keep = c.inertia == 0.0 or (state.update < settings.keep_factors_below and state.contracting)
         try:
             if state.factors is None or not keep:
-                state.factors = _factorize(system, c, entries, state)
+                state.factors = _factorize(system, c, linear, state)
             _step(system, state.factors, residual, flow_rate, state)
         except RuntimeError as error:
             return f"the matrix could not be factorized ({error})"
@@ -152,7 +153,7 @@ def _solution(
     finite = np.all(np.isfinite(state.vector))
     vector = np.where(np.isfinite(state.vector), state.vector, 0.0)
     state.vector = _centred(system, vector) if system.enclosed else vector
-    residual = _residual(system, c, system.linear_entries(c), state)
+    residual = _residual(system, c, system.linear_matrix(c), state)
     reaction = residual.copy()
     reaction[system.free] = 0.0
     scale = float(np.abs(reaction).max()) or 1.0

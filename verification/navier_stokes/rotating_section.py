@@ -240,15 +240,12 @@ class _March:
 
 
 def _mass(system: FlowSystem) -> Any:
-    space = system.space
-    entries, pattern = space.mass_entries(np.ones_like(space.weights)), space.velocity_pattern
-    one = sparse.csr_matrix((entries, (pattern.rows, pattern.cols)), shape=(space.velocity_nodes,) * 2)
-    nothing = sparse.csr_matrix((space.pressure_nodes,) * 2)
-    return sparse.block_diag([one] * space.components + [nothing], format="csr")
+    nothing = sparse.csr_matrix((system.space.pressure_nodes,) * 2)
+    return sparse.block_diag([system.mass] * system.space.components + [nothing], format="csr")
 
 
 def _factors(system: FlowSystem, coefficients: Coefficients, mass: Any, step: float) -> Factors:
-    steady = system.free_matrix(system.linear_entries(coefficients))
+    steady = system.free_part(system.linear_matrix(coefficients))
     matrix = (steady + 1.5 / step * mass[:, system.free]).tocsc()
     quads = system.space.mesh.refdom.__name__ == "RefQuad"
     return Factors.of(matrix=matrix, along_diagonal=quads)

@@ -1,4 +1,4 @@
-"""The discrete equations of a steady laminar flow on a Taylor-Hood space with fixed boundary conditions.
+"""The discrete equations of a steady laminar flow with fixed boundary conditions, by scikit-fem's forms.
 
     inertia (u . grad) u + rotation C u = -grad p + viscosity lap u + f + G e,    div u = 0
 
@@ -16,10 +16,24 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
+from skfem import BilinearForm
+from skfem.helpers import dot, grad
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.verification.navier_stokes.linear import layers_of
 from ringbalance.verification.navier_stokes.space import FlowSpace
+
+
+def _stiffness(u: Any, v: Any, w: Any) -> Any:
+    return w.measure * dot(grad(u), grad(v))
+
+
+def _transposed(u: Any, v: Any, w: Any) -> Any:
+    return w.measure * grad(v)[w.column] * grad(u)[w.row]
+
+
+def _slope(u: Any, q: Any, w: Any) -> Any:
+    return w.measure * grad(u)[w.direction] * q
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,25 +69,18 @@ class FlowSystem:
     """Unknowns that are solved for."""
     fixed_values: FloatArray
     """Full vector with the boundary values, zero elsewhere."""
-    load: FloatArray
+    source: FloatArray
     """Body force, full vector."""
     flow_load: FloatArray
     """Integral of every shape function of the flow component, full vector."""
     mean_load: FloatArray
     """Integral of every pressure shape function, shape (pressure nodes,)."""
-    viscous: FloatArray
+    viscous: Sequence[Sequence[Any]]
+    """Velocity blocks of the viscous term; None where it has none."""
+    mass: Any
+    gradient: Any
+    """Velocity rows of the pressure's term; its transpose is continuity."""
     coriolis: FloatArray
-    coupling: FloatArray
-    """Entries of the constant operators in the order of `blocks`."""
-    blocks: tuple[tuple[int, int], ...]
-    """Velocity blocks (row component, column component) in the order of their entries."""
-    full_pattern: Any
-    """CSR matrix of all rows whose data are entry numbers."""
-    free_pattern: Any
-    """CSC matrix of the free rows and columns whose data are entry numbers."""
-    mass: FloatArray
-    convection: FloatArray
-    """Contracted quadrature tables."""
     layers: IntArray | None = None
     """Layers of all unknowns along a long, thin mesh, for factors slab by slab."""
 
@@ -93,7 +100,6 @@ class FlowSystem:
         """Operators and numbering of a flow problem, to be solved for any coefficients.
 
         Args:
-            space: Taylor-Hood space.
             conditions: velocity boundary values; a boundary without them is free: zero traction in the stress
                 form, viscosity du/dn = p n otherwise.
             enclosed: true when no boundary is free in its normal direction: pressure up to a constant.
@@ -104,136 +110,109 @@ class FlowSystem:
             slab: number of every element's slab along a long, thin mesh, which is then solved slab by slab.
         Raises: ValueError: an unknown boundary, a Coriolis matrix of another shape, stress form in (x, r).
         """
-        matrix = (
-            np.zeros((space.components,) * 2) if coriolis is None else np.asarray(coriolis, dtype=np.float64)
-        )
-        if matrix.shape != (space.components,) * 2:
-            raise ValueError(f"coriolis must have shape {(space.components,) * 2}, not {matrix.shape}")
+        count = space.components
+        matrix = np.zeros((count, count)) if coriolis is None else np.asarray(coriolis, dtype=np.float64)
+        if matrix.shape != (count, count):
+            raise ValueError(f"coriolis must have shape {(count, count)}, not {matrix.shape}")
         if stress_form and space.axisymmetric:
             raise ValueError("the stress form is not available in axisymmetric coordinates")
         values, fixed = _boundary_data(space, conditions)
         if enclosed:
-            fixed[space.components * space.velocity_nodes] = True
-        free = np.flatnonzero(~fixed)
-        blocks = _block_list(space, matrix)
-        viscous, rotating, coupling = _constant_entries(space, blocks, matrix, stress_form)
-        full, part = _patterns(space, *_indices(space, blocks), free)
-        flow = np.zeros(space.unknowns)
-        if flow_component is not None:
-            where = slice(flow_component * space.velocity_nodes, (flow_component + 1) * space.velocity_nodes)
-            flow[where] = space.load_vector(np.ones_like(space.weights))
+            fixed[count * space.velocity_nodes] = True
+        force = np.zeros((count, 1, 1)) if body_force is None else np.asarray(body_force(space.points))
+        flow = [1.0 if component == flow_component else 0.0 for component in range(count)]
         return cls(
             space=space,
             enclosed=enclosed,
             flow_component=flow_component,
-            free=free,
+            free=np.flatnonzero(~fixed),
             fixed_values=values,
-            load=_force_vector(space, body_force),
-            flow_load=flow,
+            source=_loads(space, force),
+            flow_load=_loads(space, flow),
             mean_load=space.pressure_load(),
-            viscous=viscous,
-            coriolis=rotating,
-            coupling=coupling,
-            blocks=blocks,
-            full_pattern=full,
-            free_pattern=part,
-            mass=space.mass_table(),
-            convection=space.convection_table(),
+            viscous=_viscous_blocks(space, stress_form),
+            mass=space.mass(),
+            gradient=_gradient(space),
+            coriolis=matrix,
             layers=None if slab is None else _layers(space, slab),
         )
 
-    def linear_entries(self, coefficients: Coefficients) -> FloatArray:
-        """Entries of the linear part of the equations."""
+    def linear_matrix(self, coefficients: Coefficients) -> Any:
+        """CSR matrix of the linear part of the equations, all rows and columns."""
         count = self.space.components
         factors = np.broadcast_to(np.asarray(coefficients.rotation, dtype=np.float64), (count, count))
-        turning = np.array([factors[block] for block in self.blocks])
-        rotating = np.repeat(turning, self.space.velocity_pattern.rows.size) * self.coriolis
-        return np.concatenate([coefficients.viscosity * self.viscous + rotating, self.coupling])
+        turning = factors * self.coriolis
+        blocks = [
+            [_sum(coefficients.viscosity, self.viscous[c][d], turning[c, d], self.mass) for d in range(count)]
+            for c in range(count)
+        ]
+        velocity = sparse.bmat(blocks, format="csr")
+        return sparse.bmat([[velocity, self.gradient], [self.gradient.T, None]], format="csr")
 
     def convection_vector(self, vector: FloatArray) -> FloatArray:
         """Integral of (u . grad) u against every velocity shape function."""
-        space = self.space
-        u, gradient = space.at_points(space.split(vector)[0])
-        carried = np.einsum("deq,cdeq->ceq", u[: space.dimension], gradient, optimize=True)
-        out = np.zeros(space.unknowns)
-        parts = [space.load_vector(component) for component in carried]
-        out[: space.components * space.velocity_nodes] = np.concatenate(parts)
-        return out
+        u, slopes = self.space.at_points(self.space.split(vector)[0])
+        return _loads(self.space, np.einsum("deq,cdeq->ceq", u[: self.space.dimension], slopes))
 
-    def convection_entries(self, vector: FloatArray) -> FloatArray:
+    def convection_matrix(self, vector: FloatArray) -> Any:
         """Exact derivative of `convection_vector`: u . grad(du) + du . grad(u)."""
-        space, dim = self.space, self.space.dimension
-        u, gradient = space.at_points(space.split(vector)[0])
-        reference = np.einsum("eq,deq,kdeq->eqk", space.weights, u[:dim], space.inverse, optimize=True)
-        along = reference.reshape(reference.shape[0], -1) @ self.convection
-        parts = []
-        for c, d in self.blocks:
-            entry = along if c == d else np.zeros_like(along)
-            if d < dim:
-                entry = entry + (space.weights * gradient[c, d]) @ self.mass
-            parts.append(space.velocity_pattern.assemble(entry))
-        return np.concatenate([*parts, np.zeros(self.coupling.size)])
+        space, count = self.space, self.space.components
+        u, slopes = space.at_points(space.split(vector)[0])
+        along = space.convection(u[: space.dimension])
+        blocks = [[along if c == d else None for d in range(count)] for c in range(count)]
+        for c in range(count):
+            for d in range(space.dimension):
+                turned = space.mass(slopes[c, d])
+                blocks[c][d] = turned if blocks[c][d] is None else blocks[c][d] + turned
+        nothing = sparse.csr_matrix((space.pressure_nodes,) * 2)
+        return sparse.block_diag([sparse.bmat(blocks), nothing], format="csr")
 
-    def full_matrix(self, entries: FloatArray) -> Any:
-        """CSR matrix of all rows and columns, those of given unknowns included."""
-        return _filled(self.full_pattern, entries)
-
-    def free_matrix(self, entries: FloatArray) -> Any:
+    def free_part(self, matrix: Any) -> Any:
         """CSC matrix of the free rows and columns."""
-        return _filled(self.free_pattern, entries)
+        return matrix[self.free][:, self.free].tocsc()
 
 
-def _block_list(space: FlowSpace, coriolis: FloatArray) -> tuple[tuple[int, int], ...]:
-    count, dim = space.components, space.dimension
-    return tuple(
-        (c, d) for c in range(count) for d in range(count) if d < dim or c == d or coriolis[c, d] != 0.0
-    )
+def _sum(viscosity: float, viscous: Any, turning: float, mass: Any) -> Any:
+    """Sum of two blocks; None for nothing."""
+    block = None if viscous is None else viscosity * viscous
+    if turning == 0.0:
+        return block
+    return turning * mass if block is None else block + turning * mass
 
 
-def _constant_entries(
-    space: FlowSpace, blocks: Sequence[tuple[int, int]], coriolis: FloatArray, stress_form: bool
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    stiffness, mass = space.stiffness_entries(), space.mass_entries(np.ones_like(space.weights))
-    viscous, rotating = [], []
-    for c, d in blocks:
-        entry = stiffness if c == d else np.zeros_like(stiffness)
-        if stress_form and max(c, d) < space.dimension:
-            entry = entry + space.cross_entries(c, d)
-        if space.axisymmetric and (c, d) == (1, 1):
-            entry = entry + space.mass_entries(1 / space.points[1] ** 2)
-        viscous.append(entry)
-        rotating.append(coriolis[c, d] * mass)
-    divergence = [-space.divergence_entries(d) for d in range(space.dimension)]
-    return np.concatenate(viscous), np.concatenate(rotating), np.concatenate(divergence + divergence)
+def _viscous_blocks(space: FlowSpace, stress_form: bool) -> list[list[Any]]:
+    count, basis = space.components, space.velocity
+    stiffness = BilinearForm(_stiffness).assemble(basis, measure=space.measure)
+    blocks: list[list[Any]] = [[stiffness if c == d else None for d in range(count)] for c in range(count)]
+    if space.axisymmetric:
+        blocks[1][1] = stiffness + space.mass(1 / space.points[1] ** 2)
+    if stress_form:
+        for c in range(space.dimension):
+            for d in range(space.dimension):
+                turned = BilinearForm(_transposed).assemble(basis, measure=space.measure, row=c, column=d)
+                blocks[c][d] = turned if blocks[c][d] is None else blocks[c][d] + turned
+    return blocks
 
 
-def _indices(space: FlowSpace, blocks: Sequence[tuple[int, int]]) -> tuple[IntArray, IntArray]:
-    n = space.velocity_nodes
-    v, b, first = space.velocity_pattern, space.coupling_pattern, space.components * n
-    rows = [c * n + v.rows for c, _ in blocks]
-    cols = [d * n + v.cols for _, d in blocks]
-    rows += [first + b.rows for _ in range(space.dimension)] + [
-        d * n + b.cols for d in range(space.dimension)
-    ]
-    cols += [d * n + b.cols for d in range(space.dimension)] + [
-        first + b.rows for _ in range(space.dimension)
-    ]
-    return np.concatenate(rows), np.concatenate(cols)
+def _gradient(space: FlowSpace) -> Any:
+    """Integral of -psi_j div(N_i e_c), rows of velocity, columns of pressure."""
+    parts = []
+    for direction in range(space.components):
+        if direction >= space.dimension:
+            parts.append(sparse.csr_matrix((space.pressure_nodes, space.velocity_nodes)))
+            continue
+        part = BilinearForm(_slope).assemble(
+            space.velocity, space.pressure, measure=space.measure, direction=direction
+        )
+        if space.axisymmetric and direction == 1:
+            part = part + space.pressure_mass(1 / space.measure)
+        parts.append(part)
+    return -sparse.hstack(parts, format="csr").T.tocsr()
 
 
-def _patterns(space: FlowSpace, rows: IntArray, cols: IntArray, free: IntArray) -> tuple[Any, Any]:
-    """Full CSR and free CSC matrices holding entry numbers; one-based inside scipy, which drops zeros."""
-    size = space.unknowns
-    number = np.arange(1, rows.size + 1, dtype=np.float64)
-    full = sparse.csr_matrix((number, (rows, cols)), shape=(size, size))
-    local = np.full(size, -1, dtype=np.int64)
-    local[free] = np.arange(free.size)
-    keep = (local[rows] >= 0) & (local[cols] >= 0)
-    part = sparse.csc_matrix(
-        (number[keep], (local[rows[keep]], local[cols[keep]])), shape=(free.size, free.size)
-    )
-    part.sort_indices()
-    return full, part
+def _loads(space: FlowSpace, values: Sequence[float] | FloatArray) -> FloatArray:
+    """Full vector of the integrals of each component's values against the velocity shape functions."""
+    return np.concatenate([*(space.load(value) for value in values), np.zeros(space.pressure_nodes)])
 
 
 def _boundary_data(space: FlowSpace, conditions: Sequence[Dirichlet]) -> tuple[FloatArray, BoolArray]:
@@ -247,24 +226,9 @@ def _boundary_data(space: FlowSpace, conditions: Sequence[Dirichlet]) -> tuple[F
     return values, fixed
 
 
-def _force_vector(space: FlowSpace, force: Callable[[FloatArray], FloatArray] | None) -> FloatArray:
-    load = np.zeros(space.unknowns)
-    if force is not None:
-        values = np.asarray(force(space.points), dtype=np.float64)
-        parts = [space.load_vector(values[c]) for c in range(space.components)]
-        load[: space.components * space.velocity_nodes] = np.concatenate(parts)
-    return load
-
-
 def _layers(space: FlowSpace, slab: IntArray) -> IntArray:
     velocity, pressure = (
         layers_of(slab=slab, element_dofs=basis.element_dofs, size=basis.N)
         for basis in (space.velocity, space.pressure)
     )
     return np.concatenate([np.tile(velocity, space.components), pressure])
-
-
-def _filled(pattern: Any, entries: FloatArray) -> Any:
-    """The matrix of a pattern whose data are numbers of entries, from one."""
-    data = entries[pattern.data.astype(np.int64) - 1]
-    return type(pattern)((data, pattern.indices, pattern.indptr), shape=pattern.shape)

@@ -160,10 +160,7 @@ def _swept_pressure(tube: SweptTube, developed: FlowSolution, reynolds: float) -
 
 def _outlet_load(tube: SweptTube, space: FlowSpace, section: FlowSpace, pressure: FloatArray) -> FloatArray:
     """Integral over the outlet of minus the section's pressure times normal and shape functions."""
-    values = pressure[section.pressure.element_dofs].T @ section.pressure_shape
-    local = (section.weights * values) @ section.shape.T
-    dofs = section.velocity.element_dofs.T.ravel()
-    normal_force = np.bincount(dofs, weights=local.ravel(), minlength=section.velocity_nodes)
+    normal_force = section.load(np.asarray(section.pressure.interpolate(pressure)))
     at_outlet = np.flatnonzero(tube.half_station == tube.half_station.max())
     load = np.zeros((3, space.velocity_nodes))
     load[:2, at_outlet] = -tube.direction[:, -1:] * normal_force[tube.section_node[at_outlet]]
@@ -180,7 +177,7 @@ def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reyno
     fixed = np.concatenate([velocity.ravel(), np.zeros(space.pressure_nodes)])
     fixed[system.free] = 0.0
     load = _outlet_load(tube, space, section.space, developed.pressure / reynolds)
-    return replace(system, fixed_values=fixed, load=load)
+    return replace(system, fixed_values=fixed, source=load)
 
 
 def _guess(tube: SweptTube, system: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSolution:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.integrators import closed_form
-from ringbalance.controller.liquid_ring.transfer import Drive
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
@@ -23,7 +21,7 @@ from ringbalance.verification.evidence import (
     from_half_width,
 )
 from ringbalance.verification.orders import OrderStudy
-from ringbalance.verification.reference.transfers import explicit_segments, paper_drive
+from ringbalance.verification.reference.transfers import Drive, closed_form, explicit_segments, paper_drive
 
 _COUNTS = (4, 8, 16, 32, 64, 128, 256, 512)
 _SHARE = 0.9

@@ -35,7 +35,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.space import FlowSpace
 from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 
 _CREEPING: Final = 2 * (4.46629832 + 1.46746761j)
@@ -179,30 +178,21 @@ def _pencil(
 def _matrices(system: FlowSystem, flow: FlowSolution, c: Coefficients, along: float) -> tuple[Any, Any, Any]:
     """A0, A1 and A2; `along` is the factor of pressure and diffusion along the tube."""
     space = system.space
-    entries = system.linear_entries(c)
+    zero = system.linear_matrix(c)
     if c.inertia != 0.0:
-        entries = entries + c.inertia * system.convection_entries(flow.vector)
-    n, v, b = space.velocity_nodes, space.velocity_pattern, space.coupling_pattern
-    axial = space.at_points(flow.velocity)[0][2]
-    carried = c.inertia * space.mass_entries(axial)
-    diffused = -along * space.mass_entries(np.ones_like(axial))
-    coupling = space.pressure_mass_entries()
-    first = 3 * n
-    blocks = [(k * n + v.rows, k * n + v.cols) for k in range(3)]
-    rows = [r for r, _ in blocks] + [2 * n + b.cols, first + b.rows]
-    cols = [q for _, q in blocks] + [first + b.rows, 2 * n + b.cols]
-    one = _sparse(space, rows, cols, [carried] * 3 + [along * coupling, -coupling])
-    two = _sparse(space, rows[:3], cols[:3], [diffused] * 3)
+        zero = zero + c.inertia * system.convection_matrix(flow.vector)
+    carried = c.inertia * space.mass(space.at_points(flow.velocity)[0][2])
+    coupling = space.pressure_mass()
+    nothing = sparse.csr_matrix((space.pressure_nodes,) * 2)
+    one = sparse.block_diag([*[carried] * 3, nothing], format="lil")
+    first = 3 * space.velocity_nodes
+    axial, pressure = slice(first - space.velocity_nodes, first), slice(first, None)
+    one[axial, pressure], one[pressure, axial] = along * coupling.T, -coupling
+    two = sparse.block_diag([*[-along * system.mass] * 3, nothing], format="csr")
     # The pressure's level, pinned in the section's own problem, is a part of what varies along the tube.
     free = np.union1d(system.free, [first])
-    zero, one, two = (m[free][:, free].tocsc() for m in (system.full_matrix(entries), one, two))
+    zero, one, two = (matrix.tocsr()[free][:, free].tocsc() for matrix in (zero, one, two))
     return zero, one, two
-
-
-def _sparse(space: FlowSpace, rows: list[Any], cols: list[Any], values: list[FloatArray]) -> Any:
-    size = space.unknowns
-    where = (np.concatenate(rows), np.concatenate(cols))
-    return sparse.csr_matrix((np.concatenate(values), where), shape=(size, size))
 
 
 def _modes(matrices: tuple[Any, Any, Any], shift: float, count: int) -> tuple[ComplexArray, FloatArray]:

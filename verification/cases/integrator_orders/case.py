@@ -21,8 +21,6 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.integrators import closed_form, quadrature
-from ringbalance.controller.liquid_ring.transfer import Drive, Integrator
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.paper import stall_pressure
@@ -30,7 +28,15 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, Table, as_found, figure
 from ringbalance.verification.orders import OrderStudy
-from ringbalance.verification.reference.transfers import adaptive_ode, explicit_segments, paper_drive
+from ringbalance.verification.reference.marched import marched
+from ringbalance.verification.reference.transfers import (
+    Drive,
+    Integrator,
+    adaptive_ode,
+    closed_form,
+    explicit_segments,
+    paper_drive,
+)
 
 _COUNTS: Final = (8, 16, 32, 64, 128, 256)
 _INSTANTS: Final = 200
@@ -42,7 +48,6 @@ _KINK: Final = 0.6
 """Fill, in units of the largest, below which the kinked law slows down."""
 _WAYS: Final[Mapping[str, Integrator]] = {
     "closed form": closed_form,
-    "quadrature": quadrature,
     "adaptive, 1e-5": adaptive_ode(tolerance=1e-5),
     "adaptive, 1e-8": adaptive_ode(tolerance=1e-8),
     "adaptive, 1e-11": adaptive_ode(tolerance=1e-11),
@@ -73,18 +78,19 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         paper_drive(law, gas_pressure=above * empties, fill=full, total=full)
         for above in (_ABOVE_STALL, _BELOW_STALL)
     )
+    march = marched(scene.tube)
     spoiled = 1.001 if defect == "exchange_rate_off" else 1.0
     duration = _SHARE * _end(long)
     study = _explicit(long, duration, frozen=defect == "frozen_velocity")
     stalled, longest, drawn = _stall_study(low, law, spoiled=defect == "stall_rate_off")
     t = np.linspace(0, duration, 21)[1:]
     found = {
-        "quadrature_error": _quadrature_error(long, duration, spoiled),
-        "stall_error": _stall_error(low, spoiled),
-        "moved_error": _moved_error(long, duration),
+        "march_error": _march_error(march, long, duration, spoiled),
+        "stall_error": _stall_error(march, low, spoiled),
+        "moved_error": _moved_error(march, long, duration),
         "explicit_order": study.settled_order,
-        "kinked_difference": _kinked_difference(law, long, duration),
-        "tapered_quadrature": _tapered_error(long, law, t, quadrature),
+        "kinked_difference": _kinked_difference(march, law, long, duration),
+        "tapered_march": _tapered_error(long, law, t, march),
         "tapered_adaptive": _tapered_error(long, law, t, adaptive_ode(tolerance=1e-10)),
         **stalled,
     }
@@ -92,7 +98,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         found=as_found(**found),
         numbers={"longest_for_per_mille": longest, "time_to_stall": _end(low)},
         series=(drawn,),
-        tables=(_side_by_side(long, law, duration),),
+        tables=(_side_by_side(march, long, law, duration),),
         convergence=(study.table("fill by explicit segments, relative error", 1.0),),
     )
 
@@ -103,24 +109,24 @@ def _end(drive: Drive) -> float:
     return math.nan if end is None else end
 
 
-def _quadrature_error(drive: Drive, duration: float, spoiled: float) -> float:
+def _march_error(march: Integrator, drive: Drive, duration: float, spoiled: float) -> float:
     t = np.linspace(0, duration, _INSTANTS + 1)[1:]
     used = replace(drive, exchange_rate=drive.exchange_rate * spoiled)
-    return float(np.max(np.abs(quadrature(used, t).fill - closed_form(drive, t).fill)))
+    return float(np.max(np.abs(march(used, t).fill - closed_form(drive, t).fill)))
 
 
-def _stall_error(drive: Drive, spoiled: float) -> float:
+def _stall_error(march: Integrator, drive: Drive, spoiled: float) -> float:
     exact = _end(drive)
     used = replace(drive, exchange_rate=drive.exchange_rate * spoiled)
-    found = quadrature(used, np.array([2 * exact])).event_time
+    found = march(used, np.array([2 * exact])).event_time
     return 1.0 if found is None else abs(found / exact - 1)
 
 
-def _moved_error(drive: Drive, duration: float) -> float:
-    """S times the integral of u along the quadrature's own path, by Gauss's rule in time."""
+def _moved_error(march: Integrator, drive: Drive, duration: float) -> float:
+    """S times the integral of u along the march's own path, by Gauss's rule in time."""
     abscissa, weight = np.polynomial.legendre.leggauss(20)
     t = duration * (1 + abscissa) / 2
-    path = quadrature(drive, np.append(t, duration))
+    path = march(drive, np.append(t, duration))
     velocity = drive.flow(path.fill[:-1]).velocity
     passed = drive.exchange_rate * duration / 2 * float(weight @ velocity)
     return abs(passed / (drive.fill - float(path.fill[-1])) - 1)
@@ -138,10 +144,10 @@ def _explicit(drive: Drive, duration: float, *, frozen: bool) -> OrderStudy:
     return OrderStudy.of(size=[_COUNTS[0] / count for count in _COUNTS], error=error)
 
 
-def _kinked_difference(law: PaperLaw, drive: Drive, duration: float) -> float:
+def _kinked_difference(march: Integrator, law: PaperLaw, drive: Drive, duration: float) -> float:
     kinked = replace(drive, law=_SlowedLaw(name="kinked", base=law, share=_kinked))
     t = np.linspace(0, duration, 21)[1:]
-    return float(np.max(np.abs(quadrature(kinked, t).fill - adaptive_ode(tolerance=1e-11)(kinked, t).fill)))
+    return float(np.max(np.abs(march(kinked, t).fill - adaptive_ode(tolerance=1e-11)(kinked, t).fill)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,12 +219,12 @@ def _tapered_error(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrato
     return float(np.max(np.abs(found - _tapered_fill(drive, law, time))))
 
 
-def _side_by_side(drive: Drive, law: PaperLaw, duration: float) -> Table:
+def _side_by_side(march: Integrator, drive: Drive, law: PaperLaw, duration: float) -> Table:
     """Error at the end of a long operation, and what it costs; the closed form is the reference."""
     t = np.array([duration])
     exact = float(closed_form(drive, t).fill[-1])
     rows = []
-    for name, way in _WAYS.items():
+    for name, way in {"march": march, **_WAYS}.items():
         done, count = way(drive, t), _velocities_taken(drive, law, t, way)
         tapered = math.nan if way is closed_form else _tapered_error(drive, law, t, way)
         error = abs(float(done.fill[-1]) - exact)

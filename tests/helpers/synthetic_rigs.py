@@ -1,7 +1,7 @@
 """Draw test rigs from the priors of bundled scenes, let them measure, fit the measurements, count coverage.
 
-python tools/synthetic_rigs.py 1000 [first]     rigs `first` (0) to `first` + 999: coverage of each parameter
-python tools/synthetic_rigs.py speed            processor time of about 200 measurements, five parameters
+python tests/helpers/synthetic_rigs.py 1000 [first]  rigs `first` (0) to `first` + 999: coverage of parameters
+python tests/helpers/synthetic_rigs.py speed         processor time of some 200 measurements, five parameters
 """
 
 from __future__ import annotations

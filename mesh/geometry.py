@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.cut.table import ChamberTable, chamber_table
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.keys.derivations import swept_area
 from ringbalance.scene.models import Disc
 
@@ -113,7 +113,8 @@ def chamber_volume(*, disc: Disc) -> float:
     """Volume of one chamber between its plates, V = B A(R1), m^3: Eq. 4 with the exact area."""
     if (table := imported_table(disc)) is not None:
         return table.volume
-    return float(disc.axial_width * liquid_area(disc=disc, surface_radius=disc.inner_radius))
+    volume: float = plain(disc.axial_width * liquid_area(disc=disc, surface_radius=disc.inner_radius))
+    return volume
 
 
 def surface_radius(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.models import Gas, GasProcess, Scene
 from ringbalance.scene.rules.validity import AIR_CONSTANT
 
@@ -152,8 +152,10 @@ def pressure_factor(scene: Scene) -> float:
     """
     if scene.gas.measured_at == "chamber":
         return 1.0
-    surface = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))
-    return math.exp((scene.rotor.speed * surface) ** 2 / (2 * AIR_CONSTANT * scene.gas.temperature))
+    surface = surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2)
+    turns = (scene.rotor.speed * surface) ** 2
+    factor: float = plain(np.exp(turns / (2 * AIR_CONSTANT * scene.gas.temperature)))
+    return factor
 
 
 def vented_pressure(scene: Scene) -> float:

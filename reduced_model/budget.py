@@ -11,13 +11,14 @@ import numpy as np
 
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
 from ringbalance.reduced_model.chamber.values import drawing_shares
-from ringbalance.reduced_model.device import HEAD_INPUTS, Device, device_of
+from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.operating.crest_margin import DirectedState
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
-from ringbalance.scene.joint import combined, input_sides
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
@@ -36,6 +37,8 @@ UNITS: Final = {
     "priming_pressure_trapped": "Pa",
     "stall_pressure": "Pa",
 }
+_ANSWERS: Final = {"lambda": "moment_per_mass"}
+"""Names in `Answers` that differ."""
 UNSTATED: Final = (
     "The scene states no uncertainty of its inputs, so no ± here holds what they would add; a value without "
     "± is known no better than the inputs."
@@ -93,12 +96,12 @@ class _Calibrated(Protocol):
 def budgets(*, scene: Scene, calibration: _Calibrated) -> Mapping[str, Budget]:
     """Budget of each of `UNITS`; wall pressure and moment at the largest fill, flow at the operating point.
 
-    Every uncertain input is moved by its half-width to both sides, with the chamber and the tube solved
-    again, and the larger change counts. An operating point without any velocity has no drag coefficient, and
-    one without a flow over a crest neither crest pressure nor margin.
+    Inputs count by `input_effects`, k's with what its velocity does when an input moves it. An operating
+    point without any velocity has no drag coefficient, and one without a flow over a crest neither crest
+    pressure nor margin.
     """
     parts = _chamber_parts(scene, calibration.chamber) | _flow_parts(scene, calibration)
-    effects = _input_effects(scene, calibration)
+    effects = _input_effects(scene)
     return {
         name: Budget(
             quantity=name,
@@ -108,10 +111,8 @@ def budgets(*, scene: Scene, calibration: _Calibrated) -> Mapping[str, Budget]:
             model=model,
             inputs={
                 path: change
-                for path, change in combined(
-                    {path: each[name] for path, each in effects.items() if name in each}
-                ).items()
-                if change > _NEGLIGIBLE * abs(value)
+                for path, each in effects.items()
+                if (change := each[name]) > _NEGLIGIBLE * abs(value)
             },
         )
         for name, (value, numerical, model) in parts.items()
@@ -215,25 +216,16 @@ def _law_without_inputs(scene: Scene, calibration: _Calibrated) -> CalibratedLaw
     )
 
 
-def _input_effects(scene: Scene, calibration: _Calibrated) -> dict[str, dict[str, float]]:
-    """Larger change of every quantity to either side, by the input's path in the scene, or by direction."""
-    near = calibration.operating_point.loss_velocity or 1.0
-    here = device_of(scene, near=near, near_fill=calibration.residual.fill_ratio)
-    values, found = here.values(), {}
-    for name, both in input_sides(scene).items():
-        sides = [_moved(here, name, side).values() for side in both]
+def _input_effects(scene: Scene) -> dict[str, dict[str, float]]:
+    """Effects on all of `UNITS`, by the input's path in the scene, or "fitted"."""
+    found = {}
+    for name, effects in input_effects(scene, _quantities)[1].items():
         table = UNCERTAIN_QUANTITIES.get(name)
-        found[name if table is None else f"{table}.{name}"] = {
-            quantity: max(abs(side[quantity] - value) for side in sides if quantity in side)
-            for quantity, value in values.items()
-            if any(quantity in side for side in sides)
-        }
+        path = name if table is None else f"{table}.{name}"
+        found[path] = dict(zip(UNITS, effects.tolist(), strict=True))
     return found
 
 
-def _moved(device: Device, name: str, scene: Scene) -> Device:
-    """The device of a scene that one input, or a direction of fitted ones, makes differ."""
-    fixed = name in UNCERTAIN_QUANTITIES and name not in HEAD_INPUTS
-    return device_of(
-        scene, near=device.near, near_fill=device.near_fill, heads=device.heads if fixed else None
-    )
+def _quantities(designs: Designs) -> FloatArray:
+    answers = Answers.of(designs)
+    return np.array([getattr(answers, _ANSWERS.get(name, name)) for name in UNITS])

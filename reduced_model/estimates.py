@@ -19,7 +19,7 @@ from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.state import TubeState, tube_state, tube_state_at
-from ringbalance.reduced_model.chamber.inputs import chamber_pressure
+from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
 from ringbalance.reduced_model.chamber.range import (
     chamber_fills,
     mean_gravity,
@@ -37,7 +37,6 @@ from ringbalance.reduced_model.chamber.terms import (
 from ringbalance.reduced_model.chamber.values import by_closed_form
 from ringbalance.reduced_model.contribution import Contribution, percent
 from ringbalance.reduced_model.gas_line import line_ends
-from ringbalance.reduced_model.law.building import tube_path
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.time_scales import (
     deciding_gas_time,
@@ -45,6 +44,7 @@ from ringbalance.reduced_model.time_scales import (
     start_up_loss,
     start_up_time,
 )
+from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads, crest_head, velocity_of
 from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
 from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow, column_flow

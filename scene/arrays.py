@@ -38,6 +38,12 @@ def stretches(values: Sequence[Any]) -> list[tuple[Any, slice]]:
     return found
 
 
+def plain(values: npt.ArrayLike) -> Any:
+    """A float for a single number, else the array: of one scene or of many whose numbers are arrays."""
+    array = np.asarray(values, dtype=np.float64)
+    return float(array) if array.ndim == 0 else array
+
+
 def finite(value: float | None) -> float | None:
     """A number as JSON can hold it: None for one that is not finite."""
     return value if value is not None and math.isfinite(value) else None

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
+from functools import partial
 from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reduced_model.chamber.inputs import measured_closed_forms
-from ringbalance.reduced_model.chamber.range import mean_gravity
-from ringbalance.reduced_model.law.building import nominal_law
+from ringbalance.reduced_model.chamber.closed_forms import measured_closed_forms
+from ringbalance.reduced_model.core import Answers
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs, in_batches
 from ringbalance.scene.joint import direction_sides
 from ringbalance.scene.models import Scene
 
@@ -28,33 +27,31 @@ def fitted_effects(scene: Scene, *, of_flow: bool) -> FloatArray:
     Returns: Shape (8, directions): of ln S u/V, the rate at which a chamber empties at equal fills; of ln U,
         the moment; of ln kappa; of the lag angle, rad; and of the logarithms of `LINE_KEYS`.
     """
-    gravity = mean_gravity(scene) > scene.tolerance
-    sides = direction_sides(scene).values()
-    ends = np.array(
-        [[_values(side, gravity=gravity, of_flow=of_flow) for side in both] for both in sides]
-    ).reshape(-1, 2, LAG + 1 + len(LINE_KEYS))
-    return np.asarray(((ends[:, 1] - ends[:, 0]) / 2).T)
+    sides = [side for both in direction_sides(scene).values() for side in both]
+    if not sides:
+        return np.zeros((LAG + 1 + len(LINE_KEYS), 0))
+    values = in_batches(sides, partial(_values, of_flow=of_flow))
+    return np.asarray((values[:, 1::2] - values[:, ::2]) / 2)
 
 
-def _values(scene: Scene, *, gravity: bool, of_flow: bool) -> list[float]:
-    fill = np.array([scene.disc.max_fill_ratio])
-    moment = float(measured_closed_forms(scene=scene, fill_ratio=fill)[1][0])
-    line = (getattr(scene.gas, key) for key in LINE_KEYS)
-    return [
-        _log_rate(scene, gravity=gravity) if of_flow else 0.0,
-        math.log(moment),
-        math.log(scene.rotor.influence_coefficient),
+def _values(designs: Designs, *, of_flow: bool) -> FloatArray:
+    scene, whole = designs.scene, np.ones(designs.size)
+    moment = measured_closed_forms(scene=scene, fill_ratio=scene.disc.max_fill_ratio)[1]
+    line = [getattr(scene.gas, key) for key in LINE_KEYS]
+    rows = [
+        _log_rate(designs) if of_flow else 0.0,
+        np.log(moment),
+        np.log(scene.rotor.influence_coefficient),
         scene.rotor.lag_angle,
-        *(math.log(value) if value else 0.0 for value in line),
+        # A dead volume of zero has no logarithm, and no effect.
+        *(0.0 if value is None else np.log(np.where(np.asarray(value) > 0, value, 1.0)) for value in line),
     ]
+    return np.array([row * whole for row in rows])
 
 
-def _log_rate(scene: Scene, *, gravity: bool) -> float:
-    """ln(S u/V); zero where nothing flows."""
-    fill = scene.disc.initial_fill
-    law = nominal_law(scene, gravity=gravity)
-    flow = law.evaluate(
-        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True
-    )
-    u = abs(float(flow.velocity))
-    return math.log(scene.tube.area * u / chamber_volume(disc=scene.disc)) if u > 0 else 0.0
+def _log_rate(designs: Designs) -> FloatArray:
+    """ln(S u/V) of a primed tube; zero where nothing flows."""
+    answers = Answers.of(designs)
+    u = answers.primed_velocity
+    rate = designs.scene.tube.area * np.where(u > 0, u, 1.0) / answers.chamber_volume
+    return np.where(u > 0, np.log(rate), 0.0)

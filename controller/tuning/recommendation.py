@@ -7,7 +7,6 @@ lambda rho S u, and by the influence coefficient.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -15,14 +14,15 @@ import numpy as np
 
 from ringbalance.controller.ensemble.samples import MemberUncertainty, starting_flow
 from ringbalance.controller.tuning.loop_factor import LoopFactor, vibration_rates
-from ringbalance.reduced_model.device import HEAD_INPUTS, device_of
+from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
-from ringbalance.scene.joint import FITTED, independent_half_widths
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs, input_effects
+from ringbalance.scene.joint import FITTED, independent_half_widths, input_sides
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import shifted
 
 _ELSEWHERE: Final = frozenset({"influence_coefficient", "lag_angle", "density"})
 """Inputs with a part of their own; the density is in that of the moment, and the velocity makes up for some
@@ -114,30 +114,26 @@ def _velocity(scene: Scene, model: BalancerModel) -> float:
 
 def _input_effects(scene: Scene, model: BalancerModel) -> dict[str, float]:
     """Larger relative change of lambda rho S u to either side, by input; none under another's law."""
-    rate_of = _rate_by_inputs(scene, model)
-    nominal = rate_of(scene, "") if rate_of else 0.0
-    if rate_of is None or nominal == 0.0:
+    widths = independent_half_widths(scene)
+    among = [name for name in widths if name not in _ELSEWHERE]
+    if isinstance(model.flow, CalibratedLaw):
+        here, changes = input_effects(scene, _rates, among=among, errors=False)
+        changes.pop(FITTED, None)
+    elif isinstance(model.flow, PaperLaw):
+        here = _paper_rate(scene)
+        sides = input_sides(scene, among=among, errors=False)
+        changes = {name: np.max([abs(_paper_rate(side) - here) for side in sides[name]]) for name in among}
+    else:
         return {}
-    found = {}
-    for quantity, width in independent_half_widths(scene).items():
-        if quantity in _ELSEWHERE:
-            continue
-        moved = (shifted(scene=scene, quantity=quantity, change=side * width) for side in (-1, 1))
-        found[quantity] = max(abs(rate_of(other, quantity) / nominal - 1.0) for other in moved)
-    return {quantity: effect for quantity, effect in found.items() if effect > _NO_EFFECT}
+    effects = {name: float(change / here) for name, change in changes.items()} if here > 0 else {}
+    return {name: effect for name, effect in effects.items() if effect > _NO_EFFECT}
 
 
-def _rate_by_inputs(scene: Scene, model: BalancerModel) -> Callable[[Scene, str], float] | None:
-    """Something in proportion to the rate of a scene, one input of which has been moved."""
-    if isinstance(model.flow, PaperLaw):
-        return lambda asked, _: float(np.max(np.mean(vibration_rates(asked, paper_model(asked)), axis=1)))
-    if not isinstance(model.flow, CalibratedLaw):
-        return None
-    here = device_of(scene, near=_velocity(scene, model) or 1.0)
+def _rates(designs: Designs) -> FloatArray:
+    """Of the vibration at equal fills where the tube is dry beforehand, in proportion."""
+    answers, scene = Answers.of(designs), designs.scene
+    return np.asarray(answers.moment_per_mass * scene.liquid.density * scene.tube.area * answers.velocity)
 
-    def rate(asked: Scene, quantity: str) -> float:
-        heads = None if quantity in HEAD_INPUTS else here.heads
-        values = device_of(asked, near=here.near, heads=heads).values()
-        return values["lambda"] * asked.liquid.density * asked.tube.bore**2 * values["velocity"]
 
-    return rate
+def _paper_rate(scene: Scene) -> FloatArray:
+    return np.asarray(np.max(np.mean(vibration_rates(scene, paper_model(scene)), axis=1)))

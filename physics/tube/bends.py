@@ -15,11 +15,10 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from fluids.fittings import bend_rounded
 
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.rotation_table import laminar_ratio
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.models import Bend, Tube
 
 BEND_UNCERTAINTY: Final = 0.25
@@ -42,8 +41,8 @@ def bend_loss(
     reynolds: npt.ArrayLike,
     rotation_reynolds: npt.ArrayLike = 0.0,
     critical_ratio: npt.ArrayLike = 1.0,
-) -> tuple[FloatArray, FloatArray]:
-    """Loss coefficient of one bend, with the friction of its own arc in it, and its half-width.
+) -> FloatArray:
+    """Loss coefficient of one bend, with the friction of its own arc in it.
 
     K = f phi r/d + (1 - w) K_lam + w (K_tur - f phi r/d), w from laminar to turbulent;
     K_lam = K_0 (phi/90 deg) 2 sqrt(d/2r) De^2/(De^2 + De_0^2) s^2/(s^2 + R^2).
@@ -51,8 +50,6 @@ def bend_loss(
         bend: angle phi and centre-line radius r.
         friction_factor: f (Darcy) of the straight tube at rest at the same Re, any shape.
         critical_ratio: critical Re over the straight tube's, broadcasts.
-    Returns: K and its expanded uncertainty (95 %), of the broadcast shape; the friction of the arc counts as
-        known.
     Range: computed for r = 2 d and 90 degrees up to Re 200 at rest, and at Re 200, R 118; elsewhere scaled.
     Source: finite elements, see the head of this module; `turbulent_bend_loss`.
     """
@@ -61,25 +58,40 @@ def bend_loss(
     )
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
     arc = f * bend.angle * bend.radius / bore
-    added, uncertainty_95 = _laminar_excess(bend, bore, re, rotation)
+    rest, shift = _laminar_excess(bend, bore, re)
+    added = rest * shift**2 / (shift**2 + rotation**2)
     turbulent = turbulent_bend_loss(bend=bend, bore=bore, friction_factor=f)
-    value = arc + (1 - turned) * added + turned * (turbulent - arc)
-    return np.asarray(value), np.asarray(
-        (1 - turned) * uncertainty_95 + turned * BEND_UNCERTAINTY * turbulent
+    return np.asarray(arc + (1 - turned) * added + turned * (turbulent - arc))
+
+
+def bend_uncertainty(
+    *,
+    bend: Bend,
+    bore: float,
+    friction_factor: npt.ArrayLike,
+    reynolds: npt.ArrayLike,
+    rotation_reynolds: npt.ArrayLike = 0.0,
+    critical_ratio: npt.ArrayLike = 1.0,
+) -> FloatArray:
+    """Expanded uncertainty (95 %) of `bend_loss`; the friction of the arc counts as known."""
+    f, re, rotation = np.broadcast_arrays(
+        *(np.asarray(v, dtype=np.float64) for v in (friction_factor, reynolds, rotation_reynolds))
     )
-
-
-def _laminar_excess(
-    bend: Bend, bore: float, re: FloatArray, rotation: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """What a laminar bend adds to the friction of its arc, mean over its senses of turning; half-width."""
-    tight = bore / (2 * bend.radius)
-    dean, shift = re * math.sqrt(tight), MOMENTUM_FACTOR * re * tight
-    shape = bend.angle / (math.pi / 2) * math.sqrt(tight) / 0.5
-    rest = LARGEST_EXCESS * shape * dean**2 / (dean**2 + HALF_WAY_DEAN**2)
+    turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
+    rest, shift = _laminar_excess(bend, bore, re)
     more, less = laminar_ratio(reynolds=re, rotation_reynolds=np.abs([rotation + shift, rotation - shift]))
     turning = 64 / re * bend.angle * bend.radius / bore * (more - less) / 2
-    return rest * shift**2 / (shift**2 + rotation**2), np.hypot(LAMINAR_BEND_UNCERTAINTY * rest, turning)
+    laminar = np.hypot(LAMINAR_BEND_UNCERTAINTY * rest, turning)
+    turbulent = turbulent_bend_loss(bend=bend, bore=bore, friction_factor=f)
+    return np.asarray((1 - turned) * laminar + turned * BEND_UNCERTAINTY * turbulent)
+
+
+def _laminar_excess(bend: Bend, bore: float, re: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What a laminar bend at rest adds to the friction of its arc, and s, its curvature as a rotation."""
+    tight = bore / (2 * bend.radius)
+    dean, shift = re * np.sqrt(tight), MOMENTUM_FACTOR * re * tight
+    shape = bend.angle / (math.pi / 2) * np.sqrt(tight) / 0.5
+    return LARGEST_EXCESS * shape * dean**2 / (dean**2 + HALF_WAY_DEAN**2), shift
 
 
 def turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayLike) -> FloatArray:
@@ -89,16 +101,12 @@ def turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayLi
     Args: `bend`: angle phi and centre-line radius r. `friction_factor`: f (Darcy) of the straight tube at the
         same Re, any shape.
     Range: turbulent flow in smooth tubes, phi up to 180 degrees, r/d of at least 0.5.
-    Source: Rennels and Hudson, Pipe Flow (2012), through `fluids.fittings.bend_rounded`.
+    Source: Rennels and Hudson, Pipe Flow (2012), as in `fluids.fittings.bend_rounded`, which takes no arrays.
     """
-    f = np.asarray(friction_factor, dtype=np.float64)
-    # K is affine in f, so two scalar calls serve any array.  The friction factor is always passed: left to
-    # itself the library calls a turbulent formula at laminar Re.
-    smooth, unit = (
-        bend_rounded(Di=bore, angle=math.degrees(bend.angle), rc=bend.radius, fd=fd, method="Rennels")
-        for fd in (0.0, 1.0)
-    )
-    return np.asarray(smooth + (unit - smooth) * f, dtype=np.float64)
+    f, sine = np.asarray(friction_factor, dtype=np.float64), np.sin(bend.angle / 2)
+    tight = (bore / bend.radius) ** (4 * bend.angle / math.pi)
+    turning = (0.10 + 2.4 * f) * sine + 6.6 * f * (np.sqrt(sine) + sine) * tight
+    return np.asarray(f * bend.angle * bend.radius / bore + turning, dtype=np.float64)
 
 
 def bend_in_range(*, bend: Bend, bore: float) -> bool:
@@ -112,6 +120,7 @@ def straight_length(*, tube: Tube) -> float:
     Raises: ValueError: arcs longer than the tube.
     """
     straight = tube.length - sum(b.angle * b.radius for b in tube.bends)
-    if straight < -1e-9 * tube.length:
+    if np.any(straight < -1e-9 * tube.length):
         raise ValueError("the bends' arcs are longer than the tube: lengthen tube.length or take a bend away")
-    return max(straight, 0.0)
+    longest: float = plain(np.maximum(straight, 0.0))
+    return longest

@@ -44,7 +44,7 @@ def rim_depth(*, flow_rate: npt.ArrayLike, acceleration: float, bore: float) -> 
         follows from the flow alone, and that such a model bounds the level over one that runs full: abstract
         of Proc. IMechE 198 (1984), doi:10.1243/PIME_PROC_1984_198_016_02.
     """
-    width = np.asarray(flow_rate, dtype=np.float64) / (math.pi * bore * math.sqrt(acceleration))
+    width = np.asarray(flow_rate, dtype=np.float64) / (math.pi * bore * np.sqrt(acceleration))
     return np.asarray(1.5 * width ** (2 / 3))
 
 
@@ -72,14 +72,14 @@ def draw_down_depth(
         can form, friction is larger and its share of the depth still below a hundredth.
     Source: derived: lubrication theory for the layer.
     """
-    if not (acceleration > 0 and math.isfinite(acceleration)):
+    if not np.all((np.asarray(acceleration) > 0) & np.isfinite(acceleration)):
         raise ValueError("acceleration must be positive and finite: a disc at rest holds no liquid")
     rate = np.asarray(flow_rate, dtype=np.float64)
     h = np.minimum(
         point_sink_depth(flow_rate=rate, acceleration=acceleration),
         rim_depth(flow_rate=rate, acceleration=acceleration, bore=bore),
     )
-    if kinematic_viscosity == 0:
+    if np.all(np.asarray(kinematic_viscosity) == 0):
         return h
     way = np.maximum(np.log(feed_radius / np.maximum(h, bore / 2)) - _MEAN_OF_LAYER, 0.0)
     feed = 6 * kinematic_viscosity * rate * way / (math.pi * acceleration)
@@ -100,7 +100,7 @@ def port_depth(scene: Scene, *, flow_rate: npt.ArrayLike) -> FloatArray:
             acceleration=scene.rotor.speed**2 * tube.port_radius,
             bore=tube.bore,
             kinematic_viscosity=scene.liquid.kinematic_viscosity,
-            feed_radius=math.sqrt(wall / math.pi),
-            below=max(disc.outer_radius - tube.port_radius, 0.0),
+            feed_radius=np.sqrt(wall / math.pi),
+            below=np.maximum(disc.outer_radius - tube.port_radius, 0.0),
         )
     )

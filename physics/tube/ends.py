@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.physics.tube.friction import turbulent_share
-from ringbalance.scene.arrays import FloatArray, clipped
+from ringbalance.scene.arrays import FloatArray, clipped, plain
 from ringbalance.scene.models import Tube
 
 LAMINAR_ENTRY_LENGTH: Final = 0.056
@@ -145,6 +145,13 @@ def _laminar_kinetic_factor(friction_ratio: FloatArray) -> FloatArray:
     return np.asarray(1.2 + 0.8 * friction_ratio**-1.5)
 
 
+def _rounded(bore: float, radius: float) -> float:
+    return float(entrance_rounded(Di=bore, rc=radius, method="Rennels"))
+
+
+_ROUNDED: Final = np.vectorize(_rounded, otypes=[np.float64])
+
+
 def turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:
     """Loss coefficient of the entrance at high Re, and its expanded uncertainty (95 %).
 
@@ -157,7 +164,7 @@ def turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:
     if tube.entrance == "sharp":
         return float(entrance_sharp(method="Rennels")), 0.08
     if tube.entrance == "rounded":
-        loss = float(entrance_rounded(Di=tube.bore, rc=tube.entrance_radius, method="Rennels"))
+        loss: float = plain(_ROUNDED(tube.bore, tube.entrance_radius))
         return loss, 0.03 + 0.2 * loss
     return float(entrance_distance(Di=tube.bore, method="Crane")), 0.3
 

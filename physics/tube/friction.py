@@ -33,7 +33,7 @@ def friction_factor(
     re = np.asarray(reynolds, dtype=np.float64)
     # Below Re = 1e-6 and above 1e12 only the powers would overflow: there one branch rules alone.
     bounded = clipped(re, 1e-6, 1e12)
-    b = (37530 / bounded) ** 16 * np.asarray(critical_ratio, dtype=np.float64) ** 16
+    b = _sixteenth_power(37530 / bounded * np.asarray(critical_ratio, dtype=np.float64))
     laminar = 8 * np.asarray(laminar_ratio, dtype=np.float64) / re
     a = _log_power(bounded, relative_roughness) / np.asarray(turbulent_ratio, dtype=np.float64) ** 8
     turbulent = (a + b) ** -0.125
@@ -42,7 +42,13 @@ def friction_factor(
 
 
 def _log_power(re: FloatArray, relative_roughness: float) -> FloatArray:
-    return np.asarray((2.457 * np.log((7 / re) ** 0.9 + 0.27 * relative_roughness)) ** 16)
+    return _sixteenth_power(2.457 * np.log((7 / re) ** 0.9 + 0.27 * relative_roughness))
+
+
+def _sixteenth_power(x: FloatArray) -> FloatArray:
+    for _ in range(4):
+        x = x * x
+    return x
 
 
 def friction_uncertainty(

@@ -39,8 +39,6 @@ class TubeState:
     """f with rotation."""
     bends: tuple[FloatArray, ...]
     """K of each bend, in order along the path."""
-    bend_half_width: FloatArray
-    """Expanded uncertainty (95 %) of their sum: one cause, so theirs add up."""
     kinetic_factor: FloatArray
     """alpha."""
     terms: Mapping[str, FloatArray]
@@ -109,7 +107,7 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
             "entrance": entrance_loss(tube=tube, reynolds=re, critical_ratio=critical)[0],
             "friction": straight_length(tube=tube) / tube.bore * straight,
             "rotation": tube.length / tube.bore * (turning - straight),
-            "bends": np.asarray(sum((k for k, _ in bends), start=np.zeros(re.shape)), dtype=np.float64),
+            "bends": np.asarray(sum(bends, start=np.zeros(re.shape)), dtype=np.float64),
             "exit": exit_loss(tube=tube, reynolds=re, critical_ratio=critical, friction_ratio=laminar)[0],
             "extra": np.full(re.shape, tube.extra_loss),
         }
@@ -118,8 +116,7 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
         rotation_reynolds=rotation,
         critical_ratio=critical,
         rotating_friction=turning,
-        bends=tuple(k for k, _ in bends),
-        bend_half_width=np.asarray(sum((w for _, w in bends), start=np.zeros(re.shape))),
+        bends=bends,
         kinetic_factor=kinetic_factor(reynolds=re, critical_ratio=critical, friction_ratio=laminar),
         terms=terms,
     )
@@ -143,10 +140,10 @@ def _rotation(
 
 def _bends(
     tube: Tube, re: FloatArray, rotation: FloatArray, critical: FloatArray, straight: FloatArray
-) -> list[tuple[FloatArray, FloatArray]]:
-    """K and half-width of each bend; bends of one shape are evaluated once."""
+) -> tuple[FloatArray, ...]:
+    """K of each bend; bends of one shape are evaluated once."""
 
-    def loss(bend: Bend) -> tuple[FloatArray, FloatArray]:
+    def loss(bend: Bend) -> FloatArray:
         return bend_loss(
             bend=bend,
             bore=tube.bore,
@@ -156,5 +153,7 @@ def _bends(
             critical_ratio=critical,
         )
 
-    known = {bend: loss(bend) for bend in set(tube.bends)}
-    return [known[bend] for bend in tube.bends]
+    # Numbers of many designs are arrays, which have no hash.
+    shapes = [(np.asarray(b.angle).tobytes(), np.asarray(b.radius).tobytes()) for b in tube.bends]
+    known = {shape: loss(bend) for shape, bend in dict(zip(shapes, tube.bends, strict=True)).items()}
+    return tuple(known[shape] for shape in shapes)

@@ -9,14 +9,15 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.bends import straight_length
+from ringbalance.physics.tube.bends import bend_uncertainty, straight_length
 from ringbalance.physics.tube.ends import entrance_loss, exit_loss
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty, turbulent_share
 from ringbalance.physics.tube.rotation import turbulent_friction_ratio
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.joint import FITTED, combined, fitted_causes, input_sides
+from ringbalance.scene.designs import Designs, input_effects
+from ringbalance.scene.joint import FITTED, fitted_causes
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.scene.uncertain import NORMAL_95
 
@@ -79,8 +80,7 @@ def uncertainty_parts(
     Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
     """
-    right = with_errors(tube=scene.tube, state=state)
-    by_input = input_parts(scene, k_of=lambda moved: corrected_state(moved, velocity).k, k=right.k)
+    by_input = input_parts(scene, k_of=lambda designs: corrected_state(designs.scene, velocity[..., None]).k)
     together = f"{INPUT_PART}{FITTED}"
     return unfitted_parts(scene, model_parts(tube=scene.tube, state=state)) | {
         name: part for name, part in by_input.items() if fitted or name != together
@@ -128,8 +128,25 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
         "rotation entry": _development_part(tube, state, lam.value),
         "ends": np.sqrt(sum(e**2 for e in ends)),
-        "bends": state.bend_half_width,
+        "bends": _bends_part(tube, state),
     }
+
+
+def _bends_part(tube: Tube, state: TubeState) -> FloatArray:
+    """One cause, so those of all bends add up."""
+    straight = friction_factor(reynolds=state.reynolds, relative_roughness=tube.roughness / tube.bore)
+    parts = (
+        bend_uncertainty(
+            bend=bend,
+            bore=tube.bore,
+            friction_factor=straight,
+            reynolds=state.reynolds,
+            rotation_reynolds=state.rotation_reynolds,
+            critical_ratio=state.critical_ratio,
+        )
+        for bend in tube.bends
+    )
+    return np.asarray(sum(parts, start=np.zeros(state.reynolds.shape)))
 
 
 def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
@@ -193,18 +210,14 @@ def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) 
     )
 
 
-def input_parts(scene: Scene, *, k_of: Callable[[Scene], FloatArray], k: FloatArray) -> dict[str, FloatArray]:
+def input_parts(scene: Scene, *, k_of: Callable[[Designs], FloatArray]) -> dict[str, FloatArray]:
     """Expanded uncertainties (95 %) of k by what the scene leaves uncertain.
 
-    Args: `k_of`: k for the scene with another value.
-    Returns: Half-width of k by input, each the shape of `k`; "input: fitted" of all fitted together.
-    Source: ASME V&V 20-2009, input uncertainty by sensitivity.
+    Args: `k_of`: k of designs at given velocities, which are held; the last axis runs over the designs.
+    Returns: Half-width of k by input, each without that axis; "input: fitted" of all fitted together.
     """
-    effects = {
-        name: np.max(np.abs([k_of(side) - k for side in sides]), axis=0)
-        for name, sides in input_sides(scene, among=TUBE_INPUTS).items()
-    }
-    return {f"{INPUT_PART}{name}": effect for name, effect in combined(effects).items()}
+    effects = input_effects(scene, k_of, among=TUBE_INPUTS)[1]
+    return {f"{INPUT_PART}{name}": effect for name, effect in effects.items()}
 
 
 def developing_length(

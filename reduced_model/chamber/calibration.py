@@ -11,14 +11,15 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.results import Estimate, Statistics, Status
+from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
-from ringbalance.reduced_model.chamber.inputs import InputEffect, input_effects
 from ringbalance.reduced_model.chamber.pressure_table import even_table, pressure_table
 from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
 from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.reduced_model.tables import HermiteTable, level_table
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import Scene
 
 FILL_STEP: Final = 0.05
@@ -64,6 +65,32 @@ class Curve:
         squares = (self.uncertainty**2 + inputs**2)[:count] + self.interpolation**2
         # Errors step from node to node: where walls do, and where waves may become resonant.
         return level_table(start=float(nodes[0]), stop=float(nodes[-1]), value=np.sqrt(squares))
+
+
+CHAMBER_INPUTS: Final = (
+    "outer_radius",
+    "inner_radius",
+    "axial_width",
+    "central_angle",
+    "plate_thickness",
+    "density",
+    "speed",
+    "lambda_factor",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputEffect:
+    """Expanded uncertainties (95 %) by one input at a fixed fill ratio; arrays along the fill ratio."""
+
+    wall_pressure: FloatArray
+    """Pa."""
+    hydrostatic_pressure: FloatArray
+    """Pa."""
+    moment: FloatArray
+    """kg m."""
+    moment_per_mass: float
+    """lambda at equal fills, m."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -131,7 +158,7 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     compared = ring if held else RingValues.of(scene, fill_ratio=fills, gravity=False)
     check = ElementCheck.of(scene, values=compared, gravity=held)
     unmodelled = unmodelled_fractions(scene, fills)
-    effects = input_effects(scene=scene, fill_ratio=fills)
+    effects = _input_effects(scene, fills)
     ring = _as_measured(scene, ring)
     waves = chamber_status(scene)
 
@@ -174,6 +201,27 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         status=_first(ring.status, check.status, waves),
         statistics=check.elements.statistics,
     )
+
+
+def _input_effects(scene: Scene, fills: FloatArray) -> dict[str, InputEffect]:
+    """By quantity, "fitted" for those that were fitted together; by closed forms."""
+    places = np.append(fills, scene.disc.max_fill_ratio / 2)[:, None]
+
+    def values(designs: Designs) -> FloatArray:
+        wall, moment, ratio = measured_closed_forms(scene=designs.scene, fill_ratio=places)
+        level = chamber_pressure(scene=designs.scene, fill_ratio=places)
+        return np.array(np.broadcast_arrays(wall, level, moment, ratio))
+
+    effects = input_effects(scene, values, among=CHAMBER_INPUTS, errors=False)[1]
+    return {
+        name: InputEffect(
+            wall_pressure=each[0, :-1],
+            hydrostatic_pressure=each[1, :-1],
+            moment=each[2, :-1],
+            moment_per_mass=float(each[3, -1]),
+        )
+        for name, each in effects.items()
+    }
 
 
 def _first(*statuses: Status) -> Status:

@@ -14,7 +14,7 @@ from ringbalance.mesh.geometry import half_angle, head_square, surface_radius
 from ringbalance.physics.pressure.hydrostatics import displaced_by_gravity
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.chamber.inputs import chamber_closed_forms, chamber_pressure
+from ringbalance.reduced_model.chamber.closed_forms import chamber_closed_forms, chamber_pressure
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, turn_samples
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Disc, Scene

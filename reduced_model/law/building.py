@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
-from ringbalance.physics.gas import pressure_factor, vented_pressure
-from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
+from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
 from ringbalance.reduced_model.chamber.pressure_table import pressure_table
 from ringbalance.reduced_model.chamber.range import mean_gravity
@@ -18,13 +17,11 @@ from ringbalance.reduced_model.chamber.values import RingValues, share_across
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
+from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.reduced_model.tube.regime import CLEARING_UNCERTAINTY, RELEASED, TubePath
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.joint import FITTED, direction_sides, fitted_causes, independent_half_widths
-from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR
+from ringbalance.scene.joint import FITTED, direction_sides, independent_half_widths
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import NORMAL_95
 
 # Density and speed act on both chambers and on the tube at once, so the law handles them separately.
 _SHARED: Final = ("density", "speed")
@@ -141,43 +138,6 @@ def _put_together(
         inputs=inputs,
         gas_factor=pressure_factor(scene),
         moment=moment,
-    )
-
-
-def tube_path(scene: Scene) -> TubePath:
-    """Radii of the tube as pressures of a column that reaches from there to the outer radius R2.
-
-    Source: p(r) = rho omega^2 r^2/2 of liquid at rest in the rotating frame.
-    """
-    hump, error = scene.tube.hump_radius, scene.tube.model_error
-    froude = 1 + CLEARING_UNCERTAINTY * error(CLEARING_ERROR) / NORMAL_95
-    # With dissolved gas both ends of what the cavity's pressure may be are in its uncertainty.
-    released = min(max(RELEASED * (1 + error(CAVITY_ERROR) / NORMAL_95), 0.0), 1.0)
-    fitted = fitted_causes(scene)
-    return TubePath(
-        density=scene.liquid.density,
-        port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
-        hump_pressure=None if hump is None else column_pressure(scene=scene, radius=hump),
-        trapped=scene.tube.hump_gas == "trapped",
-        vapour_pressure=scene.liquid.vapour_pressure - vented_pressure(scene),
-        released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
-        froude_velocity=froude * abs(scene.rotor.speed) * math.sqrt((hump or 0.0) * scene.tube.bore),
-        cavity_fitted=CAVITY_ERROR in fitted,
-        clearing_fitted=CLEARING_ERROR in fitted,
-    )
-
-
-def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
-    """Pressure of a liquid column from a radius to the outer radius R2.
-
-    Returns: Pa, the shape of `radius`.
-    Source: Eq. 11 of the liquid-ring paper, integrated.
-    """
-    return hydrostatic_pressure(
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        inner=radius,
-        outer=scene.disc.outer_radius,
     )
 
 

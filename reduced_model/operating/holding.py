@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.law.building import column_pressure, tube_path
+from ringbalance.reduced_model.tube.flow import column_pressure, tube_path
 from ringbalance.results.findings import Finding
 from ringbalance.scene.models import Scene
 

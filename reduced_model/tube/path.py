@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState
-from ringbalance.scene.arrays import BoolArray, FloatArray, distinct
+from ringbalance.scene.arrays import BoolArray, FloatArray, distinct, plain
 from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Tube
 
@@ -92,8 +92,9 @@ def crest_middle(tube: Tube) -> float:
 def _arc_fraction(tube: Tube) -> float:
     if tube.hump_radius is None or tube.hump_shape == "point":
         return 0.0
-    arc = tube.hump_radius * (math.pi - 2 * math.acos(tube.hump_radius / tube.port_radius))
-    return arc / _shortest(tube)
+    touch = np.arccos(np.minimum(tube.hump_radius / tube.port_radius, 1.0))
+    share: float = plain(tube.hump_radius * (math.pi - 2 * touch) / _shortest(tube))
+    return share
 
 
 def _shortest(tube: Tube) -> float:
@@ -107,10 +108,11 @@ def crest_end_uncertainty(tube: Tube, position: float) -> float:
     Source: by how much the tube is longer than its shortest path, all of it before the arc's end or behind.
     """
     arc, end = _arc_fraction(tube), crest_span(tube)[1]
-    if arc == 0:
+    if np.all(arc == 0):
         return position
-    slack = max(1 - _shortest(tube) / tube.length, 0.0)
-    return math.hypot((1 - arc) * position, slack * max(end, 1 - end))
+    slack = np.maximum(1 - _shortest(tube) / tube.length, 0.0)
+    width: float = plain(np.hypot((1 - arc) * position, slack * np.maximum(end, 1 - end)))
+    return width
 
 
 def head_behind_crest(*, tube: Tube, along: FloatArray, square: float | FloatArray) -> FloatArray:

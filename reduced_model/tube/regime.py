@@ -15,7 +15,7 @@ from typing import Any, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, plain
 
 CLEARING: Final = (0.6, 1.1)
 """Froude numbers u/sqrt(g_c d), g_c = omega^2 r_m, below which gas stays over the crest, and above which the
@@ -141,7 +141,7 @@ class SiphonCrest(Generic[Pressure]):
         """
         gas = ends.downstream_gas
         low = _choose(ends.downstream_open(), gas, self.vapour_pressure)
-        return low, low if self.released == 0 else _larger(gas, low)
+        return low, low if np.all(np.asarray(self.released) == 0) else _larger(gas, low)
 
     def resting_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
         """Crest pressure of a column at rest, p_A + P_A - D_m, Pa."""
@@ -165,7 +165,7 @@ class SiphonCrest(Generic[Pressure]):
 
         Zero below and one above `CLEARING`, smooth between: which of both holds there is not known.
         """
-        if self.froude_velocity == 0:
+        if np.all(np.asarray(self.froude_velocity) == 0):
             return velocity * 0 + 1
         low, high = CLEARING
         part = (velocity / self.froude_velocity - low) / (high - low)
@@ -240,7 +240,8 @@ class TubePath:
             downstream_hydrostatic=self.port_pressure,
             port_pressure=self.port_pressure,
         )
-        return -float(self.crest.separation_margin(still))
+        highest: float = plain(-self.crest.separation_margin(still))
+        return highest
 
     def holds(self, level: float) -> bool:
         """Whether a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off."""
@@ -348,7 +349,7 @@ def column_flow(
 
 def _larger(first: Pressure, second: Pressure | float) -> Pressure:
     """The larger of two, without the cost of an array for plain numbers."""
-    if isinstance(first, float):
+    if isinstance(first, float) and not isinstance(second, np.ndarray):
         return max(first, second)
     return np.asarray(np.maximum(first, second), dtype=np.float64)
 

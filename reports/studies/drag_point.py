@@ -264,18 +264,23 @@ def _parts(
     stated = tuple(i for i in scene.uncertainty if i.quantity not in {"bore", "kinematic_viscosity"})
     parts = model_parts(tube=tube, state=state)
 
-    def k_of(t: Tube, nu: FloatArray, speed: float) -> FloatArray:
+    def k_of(t: Tube, nu: FloatArray, speed: float, at: FloatArray) -> FloatArray:
         return tube_state_at(
-            tube=t, reynolds=velocity * t.bore / nu, rotation_reynolds=abs(speed) * t.bore**2 / nu
+            tube=t, reynolds=at * t.bore / nu, rotation_reynolds=abs(speed) * t.bore**2 / nu
         ).k
 
     nu = batch.kinematic_viscosity
 
     at_hand = without_fitted(replace(scene, tube=tube, uncertainty=(*stated, _EXACT_VISCOSITY)))
-    parts |= input_parts(at_hand, k_of=lambda moved: k_of(moved.tube, nu, moved.rotor.speed), k=state.k)
+    parts |= input_parts(
+        at_hand,
+        k_of=lambda moved: k_of(
+            moved.scene.tube, nu[..., None], moved.scene.rotor.speed, velocity[..., None]
+        ),
+    )
     if np.any(batch.relative_viscosity > 0):
         factors = (np.maximum(1 - batch.relative_viscosity, 0.1), 1 + batch.relative_viscosity)
-        sides = [k_of(tube, nu * factor, scene.rotor.speed) for factor in factors]
+        sides = [k_of(tube, nu * factor, scene.rotor.speed, velocity) for factor in factors]
         parts["input: kinematic_viscosity"] = np.max(np.abs(np.array(sides) - state.k), axis=0)
     return parts
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.keys.fields import LEAST_CHAMBERS, LETTERS
 
 _NEARLY_WHOLE = 1e-3
@@ -58,11 +58,13 @@ def shortest_path(*, port_radius: float, hump_radius: float | None, separation: 
     Range: the last case is a bound that is not reached; the others are lengths of actual paths.
     Source: elementary geometry (shortest path around a circle).
     """
-    chord = 2 * port_radius * math.sin(separation / 2)
+    chord = 2 * port_radius * np.sin(separation / 2)
     if hump_radius is None:
-        return chord
-    if port_radius * math.cos(separation / 2) < hump_radius:
-        wrapped = separation - 2 * math.acos(hump_radius / port_radius)
-        straight = math.sqrt((port_radius - hump_radius) * (port_radius + hump_radius))
-        return 2 * straight + hump_radius * wrapped
-    return max(chord, 2 * (port_radius - hump_radius))
+        whole: float = plain(chord)
+        return whole
+    wrapped = separation - 2 * np.arccos(np.minimum(hump_radius / port_radius, 1.0))
+    straight = np.sqrt(np.maximum((port_radius - hump_radius) * (port_radius + hump_radius), 0.0))
+    around = 2 * straight + hump_radius * wrapped
+    past = np.maximum(chord, 2 * (port_radius - hump_radius))
+    length: float = plain(np.where(port_radius * np.cos(separation / 2) < hump_radius, around, past))
+    return length

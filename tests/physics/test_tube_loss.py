@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ringbalance
-from ringbalance.physics.tube.bends import bend_loss
+from ringbalance.physics.tube.bends import bend_loss, bend_uncertainty
 from ringbalance.physics.tube.friction import reynolds_number, rotation_reynolds_number
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.scene.models import Bend, Liquid, Scene, Tube
@@ -121,9 +121,13 @@ def test_arc_friction_is_counted_once() -> None:
     assert float(found.terms["bends"][0]) == pytest.approx(arc + excess, rel=1e-6)
 
 
+def _bend(**numbers: Any) -> tuple[float, float]:
+    return float(bend_loss(**numbers)), float(bend_uncertainty(**numbers))
+
+
 def test_a_turbulent_bend_is_the_librarys() -> None:
     bend = Bend(angle=math.pi / 2, radius=3e-3)
-    k, width = bend_loss(bend=bend, bore=1.5e-3, friction_factor=0.02, reynolds=1e5)
+    k, width = _bend(bend=bend, bore=1.5e-3, friction_factor=0.02, reynolds=1e5)
     expected = bend_rounded(Di=1.5e-3, angle=90.0, rc=3e-3, fd=0.02)
     assert float(k) == pytest.approx(expected, rel=1e-3)
     assert float(width) == pytest.approx(0.25 * expected, rel=1e-3)
@@ -135,7 +139,7 @@ def test_a_laminar_bend_at_rest_is_that_of_the_three_dimensional_solution(
 ) -> None:
     f = 64 / reynolds
     bend = Bend(angle=math.pi / 2, radius=2.0)
-    k, width = bend_loss(bend=bend, bore=1.0, friction_factor=f, reynolds=reynolds)
+    k, width = _bend(bend=bend, bore=1.0, friction_factor=f, reynolds=reynolds)
     assert float(k) - f * math.pi == pytest.approx(excess, abs=0.05)
     assert float(width) > 0.05
 
@@ -144,7 +148,7 @@ def test_a_laminar_bend_at_rest_is_that_of_the_three_dimensional_solution(
 def test_the_half_width_of_a_turning_bend_holds_both_senses(found: float) -> None:
     """Re 200, R 118, by the three-dimensional solution, against and with the rotation."""
     bend = Bend(angle=math.pi / 2, radius=2.0)
-    k, width = bend_loss(bend=bend, bore=1.0, friction_factor=0.32, reynolds=200.0, rotation_reynolds=118.0)
+    k, width = _bend(bend=bend, bore=1.0, friction_factor=0.32, reynolds=200.0, rotation_reynolds=118.0)
     assert abs(float(k) - 0.32 * math.pi - found) < float(width)
 
 

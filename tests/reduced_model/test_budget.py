@@ -17,10 +17,11 @@ from scipy.stats import binom
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.budget import UNITS, Budget, budgets
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.device import device_of
+from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.tube.heads import log_heads
 from ringbalance.reduced_model.tube.regime import CLEARING, RELEASED
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths, nominal_value, with_value
@@ -224,19 +225,32 @@ def test_the_intervals_hold_between_93_and_99_percent_of_a_thousand(
         {"hump_position": 0.2, "port_radius": 44e-3},
     ],
 )
-def test_a_device_is_what_the_calibration_tabulates(table_1_scene: Scene, changes: dict[str, float]) -> None:
+def test_the_core_answers_what_a_calibration_tabulates(
+    table_1_scene: Scene, changes: dict[str, float]
+) -> None:
     scene = table_1_scene
     for quantity, value in changes.items():
         scene = with_value(scene=scene, quantity=quantity, value=value)
     calibration = calibrate(scene)
     scene, told = calibration.scene, calibration.budgets
-    near = calibration.operating_point.loss_velocity or 1.0
-    found = device_of(scene, near=near, near_fill=calibration.residual.fill_ratio).values()
-    assert set(told) == set(found)
+    answers = Answers.of(Designs.stacked([scene]))
     for name, budget in told.items():
-        # Of the device's tables: heads every 0.06 in ln u.
-        allowed = 1e-3 * abs(budget.value) + (10.0 if budget.unit == "Pa" else 0.0)
-        assert found[name] == pytest.approx(budget.value, abs=allowed), name
+        found = getattr(answers, "moment_per_mass" if name == "lambda" else name)
+        # By tables, whose errors are below 1e-6 of what they tabulate.
+        allowed = 2e-6 * abs(budget.value) + (1.0 if budget.unit == "Pa" else 0.0)
+        assert float(found[0]) == pytest.approx(budget.value, abs=allowed), name
+
+
+def test_the_core_answers_drawn_devices_as_quadrature_and_root_finding_do(table_1_scene: Scene) -> None:
+    generator = np.random.default_rng(7)
+    wide = _uncertain(table_1_scene, {name: 4 * width for name, width in STATED.items()})
+    scenes = [_drawn(wide, generator) for _ in range(12)]
+    answers = Answers.of(Designs.stacked(scenes))
+    for place, scene in enumerate(scenes):
+        for name, value in _Exact(scene).values().items():
+            found = getattr(answers, "moment_per_mass" if name == "lambda" else name)[place]
+            # Crest pressures are differences of some 1e6 Pa, by heads that are interpolated.
+            assert found == pytest.approx(value, rel=2e-6, abs=2.0 if "crest" in name else 0.0), name
 
 
 def test_inputs_are_named_by_their_place_in_the_scene(table_1_scene: Scene) -> None:

@@ -1,0 +1,257 @@
+"""Flow through the tubes of one scene or of many designs at once, each velocity found on the loss itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from ringbalance.physics.gas import pressure_factor, vented_pressure
+from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
+from ringbalance.physics.tube.uncertainty import corrected_state
+from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
+from ringbalance.reduced_model.tube.heads import crest_head
+from ringbalance.reduced_model.tube.regime import (
+    CLEARING_UNCERTAINTY,
+    RELEASED,
+    ColumnFlow,
+    TubeEnds,
+    TubePath,
+    column_flow,
+)
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, plain
+from ringbalance.scene.designs import Designs
+from ringbalance.scene.joint import fitted_causes
+from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import NORMAL_95
+
+_LEAST, _MOST = np.log(1e-9), np.log(1e6)
+"""ln u between which velocities are looked for, u in m/s."""
+_NODES: Final = np.linspace(-8.0, 0.2, 22)
+"""ln u of the nodes from which roots start, from that of a loss of all the pressure in one velocity head."""
+_SLOPES: Final = (0.3, 5.0)
+"""d ln(head)/d ln u, between which steps are taken."""
+_ENOUGH: Final = 1e-8
+"""Relative error of a head that belongs to a velocity, of which the last step leaves a hundredth."""
+_TINY: Final = 1e-14
+_STEPS: Final = 80
+
+
+def tube_path(scene: Scene) -> TubePath:
+    """Radii of the tube as pressures of a column that reaches from there to the outer radius R2.
+
+    Source: p(r) = rho omega^2 r^2/2 of liquid at rest in the rotating frame.
+    """
+    hump, error = scene.tube.hump_radius, scene.tube.model_error
+    crest = 0.0 if hump is None else hump
+    froude = 1 + CLEARING_UNCERTAINTY * error(CLEARING_ERROR) / NORMAL_95
+    # With dissolved gas both ends of what the cavity's pressure may be are in its uncertainty.
+    released = plain(np.clip(RELEASED * (1 + error(CAVITY_ERROR) / NORMAL_95), 0.0, 1.0))
+    fitted = fitted_causes(scene)
+    return TubePath(
+        density=scene.liquid.density,
+        port_pressure=column_pressure(scene=scene, radius=scene.tube.port_radius),
+        hump_pressure=None if hump is None else column_pressure(scene=scene, radius=hump),
+        trapped=scene.tube.hump_gas == "trapped",
+        vapour_pressure=scene.liquid.vapour_pressure - vented_pressure(scene),
+        released=released if scene.liquid.dissolved_gas == "saturated" else 0.0,
+        froude_velocity=froude * abs(scene.rotor.speed) * plain(np.sqrt(crest * scene.tube.bore)),
+        cavity_fitted=CAVITY_ERROR in fitted,
+        clearing_fitted=CLEARING_ERROR in fitted,
+    )
+
+
+def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
+    """Pressure of a liquid column from a radius to the outer radius R2.
+
+    Returns: Pa, the shape of `radius`.
+    Source: Eq. 11 of the liquid-ring paper, integrated.
+    """
+    return hydrostatic_pressure(
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        inner=radius,
+        outer=scene.disc.outer_radius,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Inverse:
+    """ln u over ln of a head, in cubic pieces between nodes, for a start near a root; shape (nodes, n)."""
+
+    log_velocity: FloatArray
+    log_head: FloatArray
+    slope: FloatArray
+    """d ln(head)/d ln u."""
+
+    @classmethod
+    def through(cls, log_velocity: FloatArray, log_head: FloatArray) -> _Inverse:
+        chord = np.diff(log_head, axis=0) / np.diff(log_velocity, axis=0)
+        inner = (chord[1:] + chord[:-1]) / 2
+        slope = np.clip(np.concatenate([chord[:1], inner, chord[-1:]]), *_SLOPES)
+        return cls(log_velocity=log_velocity, log_head=log_head, slope=slope)
+
+    def take(self, rows: IntArray) -> _Inverse:
+        return _Inverse(**{name: table[:, rows] for name, table in vars(self).items()})
+
+    def __call__(self, log_head: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """ln u, and the slope of ln of the head there."""
+        last = self.log_head.shape[0] - 2
+        cell = np.clip(np.count_nonzero(self.log_head < log_head, axis=0) - 1, 0, last)
+        column = np.arange(log_head.size)
+        y0, y1, x0, x1, m0, m1 = (
+            table[at, column]
+            for table in (self.log_head, self.log_velocity, self.slope)
+            for at in (cell, cell + 1)
+        )
+        width = y1 - y0
+        t = (log_head - y0) / width
+        inside = np.clip(t, 0.0, 1.0)
+        back = 1 - inside
+        x = back**2 * ((1 + 2 * inside) * x0 + inside * width / m0)
+        x = x + inside**2 * ((1 + 2 * back) * x1 - back * width / m1)
+        slope = m0 * back + m1 * inside
+        return x + (t - inside) * width / slope, slope
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TubeFlow:
+    """The tubes of designs; arrays of shape (n,)."""
+
+    designs: Designs
+    path: TubePath
+    gas_factor: FloatArray | float
+    between: _Inverse
+    """Of the head between the chambers."""
+    to_crest: _Inverse | None
+    """Of that from the driven chamber to the lowest pressure at the crest; None without one."""
+
+    @classmethod
+    def of(cls, designs: Designs) -> TubeFlow:
+        """Those of designs, with the nodes that roots start from."""
+        scene, path, factor = designs.scene, tube_path(designs.scene), pressure_factor(designs.scene)
+        highest = factor * np.abs(scene.gas.pressure) + chamber_pressure(
+            scene=scene, fill_ratio=scene.disc.max_fill_ratio
+        )
+        fastest = np.log(2 * np.maximum(highest, 1.0) / path.density * np.ones(designs.size)) / 2
+        log_velocity = fastest + _NODES[:, None]
+        state, u = corrected_state(scene, np.exp(log_velocity)), np.exp(log_velocity)
+        to_crest = None
+        if path.crest is not None:
+            head = crest_head(scene=scene, tube=scene.tube, state=state, velocity=u)
+            to_crest = _Inverse.through(log_velocity, np.log(head))
+        between = _Inverse.through(log_velocity, np.log((state.k + 1) / 2) + 2 * log_velocity)
+        return cls(designs=designs, path=path, gas_factor=factor, between=between, to_crest=to_crest)
+
+    def take(self, rows: IntArray) -> TubeFlow:
+        """Those of some of the designs."""
+        part = self.designs.take(rows)
+        return TubeFlow(
+            designs=part,
+            path=tube_path(part.scene),
+            gas_factor=pressure_factor(part.scene),
+            between=self.between.take(rows),
+            to_crest=None if self.to_crest is None else self.to_crest.take(rows),
+        )
+
+    def ends(self, own: FloatArray, other: FloatArray, *, driven: bool = True) -> TubeEnds[FloatArray]:
+        """For levels of the two chambers, Pa. Args: `driven`: with the gas on."""
+        gas = self.gas_factor * self.designs.scene.gas.pressure if driven else 0.0
+        return TubeEnds(
+            upstream_gas=gas + 0 * own,
+            downstream_gas=0 * own,
+            upstream_hydrostatic=own,
+            downstream_hydrostatic=other,
+            port_pressure=self.path.port_pressure,
+        )
+
+    def flow(
+        self, ends: TubeEnds[FloatArray], *, primed: bool | BoolArray, exactly: bool = True
+    ) -> ColumnFlow[FloatArray]:
+        """Flow out of the driven chambers. Args: `exactly`: to 1e-10 of a head, else to about a hundredth."""
+        return column_flow(
+            ends=ends,
+            crest=self.path.crest,
+            primed=primed,
+            siphon=partial(self.velocity, to_crest=False, exactly=exactly),
+            separation=partial(self.velocity, to_crest=True, exactly=exactly),
+        )
+
+    def velocity(
+        self, pressure: FloatArray, where: BoolArray, *, to_crest: bool, exactly: bool = True
+    ) -> FloatArray:
+        """Velocity that belongs to a fall of pressure, zero where the second argument is false, m/s."""
+        flows, inverse = where & (pressure > 0), self.to_crest if to_crest else self.between
+        assert inverse is not None
+        wanted = np.log(np.where(flows, pressure, 1.0) / self.path.density)
+        found, slope = inverse(wanted)
+        if exactly:
+            found = growing_root(partial(self.log_head, to_crest=to_crest), wanted, found, slope, flows)
+        return np.where(flows, np.exp(found), 0.0)
+
+    def log_head(
+        self, rows: IntArray, *, to_crest: bool, lowest: bool = True
+    ) -> Callable[[FloatArray], FloatArray]:
+        """ln of the head, m^2/s^2, over ln u, of some designs: between the chambers, or up to the crest."""
+        scene = self.designs.scene if rows.size == self.designs.size else self.designs.take(rows).scene
+
+        def head(log_velocity: FloatArray) -> FloatArray:
+            u = np.exp(log_velocity)
+            state = corrected_state(scene, u)
+            if to_crest:
+                return np.log(
+                    crest_head(scene=scene, tube=scene.tube, state=state, velocity=u, lowest=lowest)
+                )
+            return np.asarray(np.log((state.k + 1) / 2) + 2 * log_velocity)
+
+        return head
+
+    def drag_coefficient(self, velocity: FloatArray) -> FloatArray:
+        """k at velocities; NaN where these are zero."""
+        state = corrected_state(self.designs.scene, np.where(velocity > 0, velocity, 1.0))
+        return np.where(velocity > 0, state.k, np.nan)
+
+
+def growing_root(
+    function_of: Callable[[IntArray], Callable[[FloatArray], FloatArray]],
+    wanted: FloatArray,
+    start: FloatArray,
+    slope: FloatArray,
+    where: BoolArray,
+) -> FloatArray:
+    """Where growing functions reach values, by safeguarded secant steps.
+
+    Args: `function_of`: y(x) of some rows, by number. `slope`: dy/dx about `start`. `where`: rows that count.
+    Returns: x, of y to 1e-10, each row by itself; elsewhere `start`.
+    """
+    x, rows = start.copy(), np.flatnonzero(where)
+    low, high = np.full(start.shape, _LEAST), np.full(start.shape, _MOST)
+    slope, before, missed = slope.copy(), start.copy(), np.full(start.shape, np.nan)
+    done = np.zeros(start.shape, dtype=np.bool_)
+    function = function_of(rows)
+    for _ in range(_STEPS):
+        if rows.size == 0:
+            break
+        here = x[rows]
+        miss = function(here) - wanted[rows]
+        low[rows], high[rows] = np.where(miss < 0, here, low[rows]), np.where(miss > 0, here, high[rows])
+        step = here - before[rows]
+        chord = (miss - missed[rows]) / np.where(np.abs(step) > _TINY, step, np.nan)
+        slope[rows] = np.where(np.isfinite(chord), np.clip(chord, *_SLOPES), slope[rows])
+        then = here - miss / slope[rows]
+        inside = (then > low[rows]) & (then < high[rows])
+        left = (np.abs(miss) > _ENOUGH) & (high[rows] - low[rows] > _TINY)
+        before[rows], missed[rows] = here, miss
+        then = np.where(inside, then, np.where(left, (low[rows] + high[rows]) / 2, here))
+        # A row that has arrived stays, whatever others still do.
+        x[rows] = np.where(done[rows], here, then)
+        done[rows] |= ~left
+        left = ~done[rows]
+        if np.count_nonzero(left) <= rows.size / 2:
+            rows = rows[left]
+            function = function_of(rows)
+    return x

@@ -1,0 +1,169 @@
+"""Many designs of one kind at once: a scene whose numbers are arrays, and both sides of every input.
+
+Leaves of geometry, tube and regime take a scene's records and broadcast, so such a scene goes through them as
+one with plain numbers does; arrays that run along something else, as the fill does, have the designs last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.joint import combined, input_sides
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Designs:
+    """Designs that differ in numbers alone: shapes, kinds and which terms there are, are common to all."""
+
+    scene: Scene
+    """Numbers that differ are arrays of shape (n,)."""
+    size: int
+    """n."""
+
+    @classmethod
+    def of(cls, scene: Scene, values: Mapping[str, FloatArray]) -> Designs:
+        """Designs that differ from a scene in some of its numbers; nothing is checked.
+
+        Args: `values`: SI, by path such as "tube.bore", arrays of one shape (n,).
+        """
+        (size,) = {np.shape(value) for value in values.values()} or {(1,)}
+        tables: dict[str, dict[str, Any]] = {}
+        for path, value in values.items():
+            table, key = path.split(".")
+            tables.setdefault(table, {})[key] = np.asarray(value)
+        changed = {table: replace(getattr(scene, table), **keys) for table, keys in tables.items()}
+        return cls(scene=replace(scene, **changed), size=size[0])
+
+    @classmethod
+    def stacked(cls, scenes: Sequence[Scene]) -> Designs:
+        """The designs of scenes that differ in numbers alone."""
+        return cls(scene=_stacked(scenes), size=len(scenes))
+
+    def take(self, rows: IntArray) -> Designs:
+        """Some of the designs, by number."""
+        tables = {
+            table: replace(record, **{key: _taken(getattr(record, key), rows) for key in keys})
+            for table, keys in self.varied.items()
+            for record in (getattr(self.scene, table),)
+        }
+        part = Designs(scene=replace(self.scene, **tables), size=rows.size)
+        part.__dict__["varied"] = self.varied
+        return part
+
+    @cached_property
+    def varied(self) -> Mapping[str, tuple[str, ...]]:
+        """Keys whose numbers differ between the designs, by table."""
+        tables = {
+            f.name: tuple(key.name for key in fields(table) if _varies(getattr(table, key.name)))
+            for f in fields(self.scene)
+            if is_dataclass(table := getattr(self.scene, f.name))
+        }
+        return {table: keys for table, keys in tables.items() if keys}
+
+
+def _stacked(values: Sequence[Any]) -> Any:
+    first = values[0]
+    if all(value is first for value in values):
+        return first
+    if isinstance(first, ChamberGeometry):
+        return first
+    if is_dataclass(first):
+        each = {f.name: _stacked([getattr(value, f.name) for value in values]) for f in fields(first)}
+        return replace(first, **each)  # type: ignore[type-var]
+    if isinstance(first, tuple):
+        return tuple(_stacked(parts) for parts in zip(*values, strict=True))
+    if isinstance(first, float):
+        return first if all(value == first for value in values) else np.array(values, dtype=np.float64)
+    return first
+
+
+def _varies(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return True
+    if isinstance(value, tuple):
+        return any(map(_varies, value))
+    if not is_dataclass(value) or isinstance(value, ChamberGeometry):
+        return False
+    return any(_varies(getattr(value, f.name)) for f in fields(value))
+
+
+def _taken(value: Any, rows: IntArray) -> Any:
+    """Entries of a value's arrays."""
+    if isinstance(value, np.ndarray):
+        return value[rows]
+    if isinstance(value, tuple):
+        return tuple(_taken(part, rows) for part in value)
+    if not is_dataclass(value) or isinstance(value, type):
+        return value
+    return replace(value, **{f.name: _taken(getattr(value, f.name), rows) for f in fields(value)})
+
+
+def _alike(first: Any, second: Any) -> bool:
+    """Whether two records differ in numbers alone."""
+    if first is second:
+        return True
+    if type(first) is not type(second):
+        return False
+    if isinstance(first, float):
+        return True
+    if is_dataclass(first) and not isinstance(first, ChamberGeometry):
+        return all(_alike(getattr(first, f.name), getattr(second, f.name)) for f in fields(first))
+    if isinstance(first, tuple):
+        return len(first) == len(second) and all(map(_alike, first, second))
+    return bool(np.all(first == second))
+
+
+def in_batches(scenes: Sequence[Scene], function: Callable[[Designs], FloatArray]) -> FloatArray:
+    """Values of a function of designs for scenes that may differ in more than numbers, kind by kind.
+
+    Args: `function`: returns an array whose last axis runs over the designs.
+    Returns: The same over the scenes, in their order.
+    """
+    batches: list[list[int]] = []
+    for place, scene in enumerate(scenes):
+        same = next((rows for rows in batches if _alike(scenes[rows[0]], scene)), None)
+        if same is None:
+            batches.append([place])
+        else:
+            same.append(place)
+    parts = []
+    for rows in batches:
+        value = function(Designs.stacked([scenes[i] for i in rows]))
+        # Where no number of the batch differs, or none that the function knows, one value is that of all.
+        parts.append(np.broadcast_to(value, (*value.shape[:-1], len(rows))))
+    order = np.argsort(np.concatenate(batches))
+    return np.concatenate(parts, axis=-1)[..., order]
+
+
+def input_effects(
+    scene: Scene,
+    function: Callable[[Designs], FloatArray],
+    *,
+    among: Collection[str] = UNCERTAIN_QUANTITIES,
+    errors: bool = True,
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Values of a scene, and what each uncertain input does to them: all sides in one batch of 2 m + 1 rows.
+
+    Every input moves by its expanded uncertainty (95 %) to both sides, and the larger change counts, because
+    a sensitivity at the value itself misses what bends within the interval.  All that follows from an input
+    follows, such as the velocity at which k is asked for, unless the function holds it.
+    Args: `function`: as for `in_batches`. `among`: inputs that count. `errors`: whether fitted errors of
+        models count too.
+    Returns: The scene's values, and expanded uncertainties (95 %) by input, "fitted" for all that were fitted
+        together; NaN where neither side has the quantity.
+    Source: ASME V&V 20-2009, one input at a time.
+    """
+    sides = input_sides(scene, among=among, errors=errors)
+    values = in_batches([scene, *(side for both in sides.values() for side in both)], function)
+    here, moved = values[..., 0], np.abs(values[..., 1:] - values[..., :1])
+    larger = np.fmax(moved[..., ::2], moved[..., 1::2])
+    return here, combined({name: larger[..., place] for place, name in enumerate(sides)})

@@ -218,8 +218,8 @@ def run_amplitude(run: Record) -> Drawing:
     line = {"color": style.FOUND, "linewidth": 1.2, "label": "true"}
 
     def paint(axes: Axes) -> None:
-        curves = [(run["time_s"], np.asarray(run["amplitude_m"]), line), (time, measured, dots)]
-        style.amplitudes(axes, curves, run["limit_m"])
+        true = (run["time_s"], np.asarray(run["amplitude_m"]), line)
+        style.amplitudes(axes, [true, (time, measured, dots)] if seen else [true], run["limit_m"])
 
     end = shown(run["amplitude_m"][-1], "m", digits=2)
     return draw(

@@ -39,7 +39,7 @@ def _collect(work: Work) -> Record | None:
         # Without folders: the evidence is the same wherever the files stand.
         faults = (replace(fault, file=PurePath(fault.file).name) for fault in error.faults)
         return {"compared": None, "text": "\n".join(map(str, faults))}
-    return {"compared": found.document(), "text": ""}
+    return {"compared": found.to_dict(), "text": ""}
 
 
 def _view(found: Record, evidence: Record) -> Record | None:

@@ -116,13 +116,13 @@ def test_what_the_loop_rests_on_and_nobody_gave_is_named(scene: Scene, model: Ba
         assert all(path in note for path, note in zip(told, named, strict=True))
 
 
-def test_a_law_that_no_ensemble_can_follow_is_noted(
+def test_a_law_whose_flow_jumps_is_followed(
     noisy: Scene, model: BalancerModel, laws: Mapping[str, Any]
 ) -> None:
     strange = replace(model, name="restless", flow=laws["restless"])
     record = find_consequences(noisy, strange, paper=model, members=20)
     assert [gain.law for gain in record.gains] == ["paper", "restless"]
-    assert any("one by one" in note for note in record.notes)
+    assert len(record.ensembles) >= 2
     assert {run.name for run in record.runs} >= {"paper", "calibrated", "law_based"}
 
 

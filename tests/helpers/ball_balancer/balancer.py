@@ -1,0 +1,262 @@
+"""Two balls in a race as every command knows them."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from ball_balancer.scene_keys import BallScene
+from ringbalance.controller.balancer import (
+    CommonRotor,
+    Draws,
+    Input,
+    Outcomes,
+    Progress,
+    Run,
+    Setting,
+    inputs_of,
+    outcomes_of,
+    rotor_fault,
+    vibrating,
+    with_settings,
+)
+from ringbalance.controller.tuning.settling import SettlingTimes, summary
+from ringbalance.results.findings import Finding
+from ringbalance.results.result import Rows
+from ringbalance.results.rows import Quantity
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.uncertain import NORMAL_95
+
+INSTANTS = 2001
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BallRun:
+    """One run of the balls from where they lie."""
+
+    scene: BallScene
+    time: FloatArray
+    amplitude: FloatArray
+    settling_time: float | None
+
+    @property
+    def settled(self) -> bool:
+        """Whether the amplitude ends and stays below the limit."""
+        return self.settling_time is not None
+
+    @property
+    def status(self) -> str:
+        """How it ended."""
+        end = f"{self.amplitude[-1] * 1e6:.3g} um"
+        return f"settled at {end}" if self.settled else f"not settled: {end} remain, take heavier balls"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As a JSON document in SI."""
+        return {
+            "balancer": self.scene.balancer,
+            "settled": self.settled,
+            "settling_time_s": self.settling_time,
+            "status": self.status,
+            "limit_m": self.scene.vibration.limit,
+            "time_s": self.time.tolist(),
+            "amplitude_m": self.amplitude.tolist(),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallTuning:
+    """The drag under which most devices settle, the fastest first."""
+
+    scene: BallScene
+    times: SettlingTimes
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether 95 % of the runs settle."""
+        return self.times.quantiles["p95"] is not None
+
+    @property
+    def status(self) -> str:
+        """The drag and what it comes to."""
+        drag = f"balls.drag {self.scene.balls.drag:.3g} N*s/m"
+        return f"{drag}: {self.times.told(self.times.settled.value)} settle"
+
+    @property
+    def recommended_scene(self) -> BallScene:
+        """With that drag."""
+        return self.scene
+
+    def rows(self) -> Rows:
+        """Its status."""
+        return _rows(self.status, self.succeeded)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As a JSON document in SI."""
+        return {
+            "balancer": self.scene.balancer,
+            "status": self.status,
+            "drag_N_s_per_m": self.scene.balls.drag,
+            "settling_time_s": self.times.quantiles,
+            "fraction_settled": self.times.settled.value,
+        }
+
+
+class BallBalancer:
+    """Two balls of mass m at radius r in oil of drag c, under the rotor's whirl x at speed w.
+
+    c r phi' = m w^2 Re(x conj(j exp(j phi))), x = alpha (U_0 + m r sum exp(j phi)): the tangential force of
+    the race's acceleration, averaged over a turn, against the drag; the balls' own inertia is left out.
+    """
+
+    options = frozenset[str]()
+    models_used: tuple[Any, ...] = ()
+
+    def __init__(self, scene: BallScene) -> None:
+        self.scene = scene
+
+    def inputs(self) -> tuple[Input, ...]:
+        """Those of the scene."""
+        values = {each.path: each.value for each in inputs_of(self.scene, {})}
+        widths = {each.quantity: each.absolute(values[each.quantity]) for each in self.scene.uncertainty}
+        return inputs_of(self.scene, widths)
+
+    def settings(self) -> tuple[Setting, ...]:
+        """The drag, by the choice of the oil."""
+        drag = self.scene.balls.drag
+        return (Setting(path="balls.drag", value=drag, lowest=drag / 30, highest=drag * 30),)
+
+    def run(
+        self,
+        settings: Mapping[str, float],
+        draws: Draws,
+        *,
+        trace: bool = False,
+        progress: Progress | None = None,
+    ) -> Outcomes:
+        """One run a draw; a drawn device starts with its balls anywhere."""
+        scene = with_settings(self.scene, settings)
+        rows: list[tuple[Run, float | None, float, float, float]] = []
+        for place, number in enumerate(draws.numbers):
+            if progress is not None:
+                progress(place * scene.run.time_limit, len(draws.numbers) * scene.run.time_limit)
+            run = _rolled(self._drawn(scene, number) if draws.devices else scene)
+            worst = float(np.max(run.amplitude))
+            rows.append((run, run.settling_time, float(run.amplitude[-1]), 0.0, worst))
+        found = outcomes_of(rows)
+        return found if trace else replace(found, runs=())
+
+    def _drawn(self, scene: BallScene, number: int) -> BallScene:
+        random = np.random.default_rng([scene.run.seed, number])
+        inputs = BallBalancer(scene).inputs()
+        parts = random.standard_normal(len(inputs)) / NORMAL_95
+        values = {
+            each.path: each.value + each.half_width * part for each, part in zip(inputs, parts, strict=True)
+        }
+        one, other = random.uniform(-math.pi, math.pi, 2).tolist()
+        balls = replace(scene.balls, initial_angle=(one, other))
+        return with_settings(replace(scene, balls=balls), values)
+
+    def rotor(self) -> CommonRotor:
+        """The scene's."""
+        rotor = self.scene.rotor
+        return vibrating(
+            self.scene,
+            CommonRotor(
+                source=self.scene.source,
+                speed=rotor.speed,
+                influence=cmath.rect(rotor.influence_coefficient, -rotor.lag_angle),
+                unbalance=cmath.rect(rotor.unbalance, rotor.phase),
+                mass=None,
+                noise=0.0,
+                limit=self.scene.vibration.limit,
+            ),
+        )
+
+    def on_rotor(self, rotor: CommonRotor | None) -> BallBalancer:
+        """Raises: SceneError: below the critical speed the balls would roll to the heavy side."""
+        if rotor is None:
+            return self
+        if rotor.influence.real >= 0:
+            problem = "below the critical speed balls roll to the heavy side"
+            raise rotor_fault(self.scene, "rotor.speed", problem, "a lag angle beyond 90 deg")
+        return BallBalancer(
+            replace(
+                self.scene,
+                rotor=replace(
+                    self.scene.rotor,
+                    speed=rotor.speed,
+                    influence_coefficient=abs(rotor.influence),
+                    lag_angle=-cmath.phase(rotor.influence),
+                    unbalance=abs(rotor.unbalance),
+                    phase=cmath.phase(rotor.unbalance),
+                ),
+                vibration=replace(self.scene.vibration, limit=rotor.limit),
+            )
+        )
+
+    def span(self) -> float:
+        """The time limit, s."""
+        return self.scene.run.time_limit
+
+    def lasting(self, span: float) -> BallBalancer:
+        """The same for so long."""
+        return BallBalancer(replace(self.scene, run=replace(self.scene.run, time_limit=span)))
+
+    def advised(self) -> tuple[BallBalancer, Mapping[str, float]]:
+        """No formula recommends anything."""
+        return self, {}
+
+    def recommend(self, *, progress: Callable[[str], None] | None = None) -> BallTuning:
+        """The drag of five between its bounds that settles most devices."""
+        (drag,) = self.settings()
+        found = []
+        for value in np.geomspace(drag.lowest, drag.highest, 5).tolist():
+            if progress is not None:
+                progress(f"drag {value:.3g} N*s/m")
+            outcomes = self.run({drag.path: value}, Draws.first(8))
+            scene = with_settings(self.scene, {drag.path: value})
+            found.append(BallTuning(scene=scene, times=summary(outcomes.settling_time.tolist())))
+        return max(
+            found, key=lambda each: (each.times.settled.value, -(each.times.quantiles["p50"] or math.inf))
+        )
+
+    def rows(self, run: BallRun) -> Rows:
+        """Its amplitude and how it ended."""
+        return _rows(run.status, run.settled, float(run.amplitude[-1]))
+
+    def history(self, run: BallRun) -> Mapping[str, Sequence[Any]]:
+        """Amplitude over time."""
+        return {"time_s": run.time.tolist(), "amplitude_m": run.amplitude.tolist()}
+
+
+def _rows(status: str, settled: bool, amplitude: float | None = None) -> Rows:
+    found = Finding(code="tuned" if settled else "not_tuned", values={"text": status})
+    last = Quantity(key="final_amplitude", name="amplitude at the end", unit="m", value=amplitude)
+    return Rows(title="Two balls", quantities=(last,), findings=(found,))
+
+
+def _rolled(scene: BallScene) -> BallRun:
+    rotor, balls = scene.rotor, scene.balls
+    influence = cmath.rect(rotor.influence_coefficient, -rotor.lag_angle)
+    unbalance = cmath.rect(rotor.unbalance, rotor.phase)
+    rate = balls.mass * rotor.speed**2 / (balls.drag * balls.race_radius)
+
+    def whirl(angles: FloatArray) -> Any:
+        return influence * (unbalance + balls.mass * balls.race_radius * np.exp(1j * angles).sum(axis=0))
+
+    def slope(_: float, angles: FloatArray) -> FloatArray:
+        return np.asarray(rate * (whirl(angles) * np.conj(1j * np.exp(1j * angles))).real)
+
+    time = np.linspace(0.0, scene.run.time_limit, INSTANTS)
+    found = solve_ivp(slope, (0.0, time[-1]), balls.initial_angle, method="LSODA", t_eval=time, rtol=1e-6)
+    amplitude = np.abs(whirl(found.y))
+    above = np.flatnonzero(amplitude > scene.vibration.limit)
+    last = int(above[-1]) + 1 if above.size else 0
+    settled = None if last == time.size else float(time[last])
+    return BallRun(scene=scene, time=time, amplitude=amplitude, settling_time=settled)

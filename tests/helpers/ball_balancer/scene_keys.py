@@ -1,0 +1,100 @@
+"""The scene of two balls in a race: its records, its keys and its kind."""
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from ringbalance.scene.keys.declaration import UNCERTAIN, needed, standard
+from ringbalance.scene.keys.fields import (
+    POSITIVE,
+    Angles,
+    Influence,
+    PositiveLength,
+    PositiveMass,
+    PositiveRate,
+    PositiveUnbalance,
+    Turn,
+    quantity,
+)
+from ringbalance.scene.keys.schema import Schema, Table
+from ringbalance.scene.kinds import SceneKind
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.rules.check import reader_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rotor:
+    """At constant speed, in steady vibration."""
+
+    speed: Annotated[PositiveRate, needed("of the rotor")]
+    influence_coefficient: Annotated[Influence, needed("vibration per unbalance"), UNCERTAIN]
+    lag_angle: Annotated[Turn, needed("of the vibration behind the unbalance"), UNCERTAIN]
+    unbalance: Annotated[PositiveUnbalance, needed("to be balanced"), UNCERTAIN]
+    phase: Annotated[Turn, standard("0 deg", "of the unbalance in the rotor's frame")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Balls:
+    """Two equal balls in one race."""
+
+    mass: Annotated[PositiveMass, needed("of each"), UNCERTAIN]
+    race_radius: Annotated[PositiveLength, needed("of their centres")]
+    drag: Annotated[
+        float, quantity("damping", POSITIVE), needed("of the oil, per velocity of a ball"), UNCERTAIN
+    ]
+    initial_angle: Annotated[Angles, standard(["60 deg", "200 deg"], "of each at the start")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vibration:
+    """What counts as balanced."""
+
+    limit: Annotated[PositiveLength, needed("amplitude to come below")]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BallScene(SceneFile):
+    """All that a run needs, in SI units."""
+
+    rotor: Rotor
+    balls: Balls
+    vibration: Vibration
+    balancer: ClassVar[str] = "ball"
+
+
+_SCHEMA = Schema.of(
+    {
+        "rotor": Table.of(Rotor, "the rotor"),
+        "balls": Table.of(Balls, "the balls in their race"),
+        "vibration": Table.of(Vibration, "what is required"),
+    },
+    balancer=needed('"ball"'),
+    scene=BallScene,
+)
+KIND = SceneKind(schema=_SCHEMA, read=reader_of(_SCHEMA, ()), main=(("balls.mass", "balls.race_radius"),))
+EXAMPLE = b"""
+name = "Two balls in oil"
+balancer = "ball"
+
+[rotor]
+speed = "3000 rpm"
+influence_coefficient = "0.5 um/(g*mm)"
+lag_angle = "175 deg"
+unbalance = "80 g*mm"
+
+[balls]
+mass = "1 g"
+race_radius = "50 mm"
+drag = "0.05 N*s/m"
+
+[vibration]
+limit = "2 um"
+
+[run]
+time_limit = "20 s"
+
+[uncertainty.balls]
+mass = "1 %"
+drag = "20 %"
+[uncertainty.rotor]
+influence_coefficient = "10 %"
+"""

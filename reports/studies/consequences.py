@@ -12,7 +12,6 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble.monte_carlo import Ensemble, ensemble_dynamics, simulate_ensemble
-from ringbalance.controller.ensemble.run import MomentTable
 from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
@@ -80,8 +79,9 @@ class LoopGain:
         u = float(flow.velocity)
         if u <= 0 or pressure <= 0:
             return None
-        ends = MomentTable.of(model=model, total=2 * x).at(np.array([x - _SMALL_FILL, x + _SMALL_FILL]))
-        per_fill = float(abs(ends[1] - ends[0])) / (2 * _SMALL_FILL)
+        ends = np.array([x - _SMALL_FILL, x + _SMALL_FILL])
+        moments = model.moment.pair_vector(fill_ratio=ends, opposite_fill_ratio=2 * x - ends)
+        per_fill = float(abs(moments[1] - moments[0])) / (2 * _SMALL_FILL)
         slope = scene.rotor.influence_coefficient * per_fill * u * model.tube_area / model.chamber_volume
         return cls(
             law=model.name,

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.rotation_table import laminar_ratio
-from ringbalance.scene.arrays import FloatArray, plain
+from ringbalance.scene.arrays import BoolArray, FloatArray, plain
 from ringbalance.scene.models import Bend, Tube
 
 BEND_UNCERTAINTY: Final = 0.25

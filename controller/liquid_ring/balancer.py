@@ -40,8 +40,7 @@ from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.completing import completed_model, lacking
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.model import BalancerModel, completed_model, lacking
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
 from ringbalance.results.findings import Finding

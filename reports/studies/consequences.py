@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -19,6 +18,7 @@ from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reports.studies.consequences_gain import LoopGain, loop_gain
 from ringbalance.scene.models import Scene
 from ringbalance.verification.assumptions import KNOWN
 
@@ -27,70 +27,6 @@ MEMBERS: Final = 2000
 _DECIDING: Final = ("tube.bore", "tube.length", "tube.hump_radius", "rotor.influence_coefficient")
 POINTS: Final = 50
 """Most entries of any array in the document."""
-_SMALL_FILL: Final = 1e-3
-"""Change of fill over which a loop counts as linear."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LoopGain:
-    """The proportional loop about level chambers under one law."""
-
-    law: str
-    velocity: float
-    """u at equal fills, m/s."""
-    drag_coefficient: float
-    """k that Eq. 18 reads out of that velocity, 2p/(rho u^2) - 1."""
-    moment_per_transferred_mass: float
-    """lambda at equal fills, m."""
-    slope: float
-    """Vibration taken away per second of gas, m/s."""
-    gain: float
-    """controller.proportional, s/m."""
-
-    @property
-    def per_operation(self) -> float:
-        """h = Kc slope: share of the residual that an operation takes away."""
-        return self.gain * self.slope
-
-    @property
-    def lag_margin(self) -> float:
-        """Error of the assumed lag angle from which the residual grows, acos(h/2), rad; 0 if h >= 2."""
-        return math.acos(min(self.per_operation / 2, 1.0))
-
-    @property
-    def overshoot_gain(self) -> float:
-        """Kc from which a small residual turns round, 1/slope, s/m."""
-        return 1 / self.slope
-
-    @property
-    def instability_gain(self) -> float:
-        """Kc from which a small residual grows, 2/slope, s/m."""
-        return 2 / self.slope
-
-    @classmethod
-    def of(cls, scene: Scene, model: BalancerModel) -> LoopGain | None:
-        """Linearise the loop about level chambers; None when the gas does not drive a flow at equal fills.
-
-        e_(n+1) = (1 - h) e_n with h = Kc dA/dt and dA/dt = kappa |dM/dx| u S/V.
-        Source: sections 4.2 and 5 of the liquid-ring paper; a discrete first-order loop.
-        """
-        x, pressure = scene.disc.initial_fill, scene.gas.pressure
-        flow = model.flow.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
-        u = float(flow.velocity)
-        if u <= 0 or pressure <= 0:
-            return None
-        ends = np.array([x - _SMALL_FILL, x + _SMALL_FILL])
-        moments = model.moment.pair_vector(fill_ratio=ends, opposite_fill_ratio=2 * x - ends)
-        per_fill = float(abs(moments[1] - moments[0])) / (2 * _SMALL_FILL)
-        slope = scene.rotor.influence_coefficient * per_fill * u * model.tube_area / model.chamber_volume
-        return cls(
-            law=model.name,
-            velocity=u,
-            drag_coefficient=2 * pressure / (model.density * u**2) - 1,
-            moment_per_transferred_mass=per_fill / (model.density * model.chamber_volume),
-            slope=slope,
-            gain=scene.controller.proportional,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +82,7 @@ def find_consequences(
     recommended: Scene | None = None,
     members: int = MEMBERS,
 ) -> Consequences:
-    """Run a scene's target-vector controller under both laws, re-tuned, and law-based.
+    """Run a scene's target-vector controller under both laws, with its margins, re-tuned, and law-based.
 
     Args: `scene`: the scene; its controller's `kind` is not looked at. `paper`: by the paper's law; default
     `paper_model(scene)`. `recommended`: the scene as tuned; default with `recommended_gain`.
@@ -156,7 +92,7 @@ def find_consequences(
     nominal = paper_model(scene) if paper is None else paper
     notes = _assumed(scene)
     moving = {m.name: _dynamics(scene, m, notes) for m in (nominal, calibrated)}
-    gains = {m.name: _gain(scene, m, notes) for m in (nominal, calibrated)}
+    gains = {m.name: _gain(scene, m, moving[m.name], notes) for m in (nominal, calibrated)}
     tuned = recommended or _recommended(scene, calibrated)
     retuned = None if tuned is None else tuned.controller.proportional
     asked = [(scene, nominal), (scene, calibrated)] + ([(tuned, calibrated)] if tuned else [])
@@ -195,15 +131,15 @@ def _dynamics(scene: Scene, model: BalancerModel, notes: list[str]) -> Dynamics 
     try:
         return ensemble_dynamics(scene, model)
     except ValueError as cause:
-        notes.append(f"{model.name}: no ensemble; {cause}")
+        notes.append(f"{model.name}: no margins and no ensemble; {cause}")
         return None
 
 
-def _gain(scene: Scene, model: BalancerModel, notes: list[str]) -> LoopGain | None:
-    gain = LoopGain.of(scene, model)
-    if gain is None:
+def _gain(scene: Scene, model: BalancerModel, dynamics: Dynamics | None, notes: list[str]) -> LoopGain | None:
+    found = None if dynamics is None else loop_gain(scene, model)
+    if found is None and dynamics is not None:
         notes.append(f"{model.name}: the gas drives no flow at equal fills, so the loop has no gain")
-    return gain
+    return found
 
 
 def _recommended(scene: Scene, model: BalancerModel) -> Scene | None:
@@ -316,6 +252,10 @@ def _run_document(run: Run) -> dict[str, Any]:
 
 
 def _gain_document(gain: LoopGain) -> dict[str, Any]:
+    curve = {
+        name: [float(v) if np.isfinite(v) else None for v in values]
+        for name, values in vars(gain.over_drag).items()
+    }
     return {
         "law": gain.law,
         "velocity_m_s": gain.velocity,
@@ -329,4 +269,5 @@ def _gain_document(gain: LoopGain) -> dict[str, Any]:
         "margin_to_overshoot": 1 / gain.per_operation,
         "margin_to_instability": 2 / gain.per_operation,
         "lag_margin_rad": gain.lag_margin,
+        "over_drag_coefficient": curve,
     }

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.algorithms.target_vector import components
+from ringbalance.controller.formulas import vector_shares
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.models import Scene
@@ -166,12 +166,13 @@ def _gas(
     settings, half, longest = scene.controller, len(fills), 0.0
     length = min(max(wanted, 0.0), settings.maximum_gas_time)
     angle = phase + settings.assumed_lag_angle
-    for chamber, share in components(chambers=2 * half, angle=angle, length=length):
+    first, near, second, far = vector_shares(2 * half, angle, length, (False,) * 2 * half)
+    for chamber, share in ((first, near), (second, far)):
         duration = min(share, remaining)
         if share < settings.minimum_gas_time or duration <= 0:
             continue
-        pair, first = chamber % half, chamber < half
-        driven = plain.operate(fills[pair] if first else plain.total - fills[pair], duration)
-        fills[pair] = driven if first else plain.total - driven
+        pair, positive = chamber % half, chamber < half
+        driven = plain.operate(fills[pair] if positive else plain.total - fills[pair], duration)
+        fills[pair] = driven if positive else plain.total - driven
         longest = max(longest, duration)
     return longest

@@ -22,13 +22,13 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.compilation.compiled import in_place
-from ringbalance.controller.ensemble.compiled_motion import begin
 from ringbalance.controller.ensemble.run import RELATIVE_ERROR
 from ringbalance.controller.formulas import flow_shape
 from ringbalance.controller.liquid_ring.compiled_events import command
 from ringbalance.controller.liquid_ring.compiled_march import advance
-from ringbalance.controller.liquid_ring.motion import Dynamics, Lift
-from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
+from ringbalance.controller.liquid_ring.interval import packed
+from ringbalance.controller.liquid_ring.motion import Dynamics, Lift, Motion
+from ringbalance.controller.liquid_ring.records import WORKSPACE
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -196,10 +196,11 @@ class Rival:
 
 @in_place
 def _inject(  # type: ignore[no-untyped-def]
-    plant, motion, fill: float, duration: float, tail: float, count: int, w
+    plant, motions, duration: float, tail: float, count: int, w
 ) -> float:
+    motion = motions[0]
     for _ in range(count):
-        begin(plant, motion, fill, 1.0, 0.0)
+        motions[0] = motions[1]
         command(plant, motion, 0, duration)
         advance(plant, motion, duration + tail, w, 0, 0, w)
     return motion.state[0]  # type: ignore[no-any-return]
@@ -207,8 +208,9 @@ def _inject(  # type: ignore[no-untyped-def]
 
 def ours(dynamics: Dynamics, duration: float, *, error: float, count: int, fill: float = 0.25) -> float:
     """Fill after the same, `count` times over."""
-    plant, motion = dynamics.plant(total=0.5, relative_error=error), np.zeros(1, dtype=MOTION)
-    return float(_inject(plant[0], motion[0], fill, duration, TAIL, count, np.zeros(WORKSPACE)))
+    plant = dynamics.plant(total=0.5, relative_error=error)
+    motions = np.repeat(packed(plant, fill=fill, primed=False, motion=Motion()), 2)
+    return float(_inject(plant[0], motions, duration, TAIL, count, np.zeros(WORKSPACE)))
 
 
 def least(function: Callable[[], object], repeats: int) -> float:

@@ -14,6 +14,7 @@ from typing import Any, Final, Protocol, Self, TypeVar
 
 import numpy as np
 
+from ringbalance.results.result import Rows
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.keys.fields import Reader
@@ -116,6 +117,10 @@ class Recommendation(Protocol):
         """Whether 95 % of the runs settle."""
         ...
 
+    def rows(self) -> Rows:
+        """What was recommended, for every output."""
+        ...
+
     @property
     def recommended_scene(self) -> SceneFile:
         """The scene with the recommended settings, checked."""
@@ -194,12 +199,8 @@ class Balancer(Protocol):
         """Settings, judged by runs over the draws."""
         ...
 
-    def show(self, run: Any, console: Any) -> None:
-        """Print one of its traced runs for a person on a `rich.console.Console`."""
-        ...
-
-    def show_recommendation(self, recommendation: Any, console: Any) -> None:
-        """The same of what `recommend` answers with."""
+    def rows(self, run: Any) -> Rows:
+        """One of its traced runs as `simulate` prints it."""
         ...
 
     def history(self, run: Any) -> Mapping[str, Sequence[Any]]:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller import deferred
 from ringbalance.controller.balancer import Balancer, CommonRotor, Draws
+from ringbalance.controller.tuning.dead_time import offset_text
 from ringbalance.reduced_model.terms import ModelUsed
-from ringbalance.results.result import CommandResult
+from ringbalance.results.findings import Finding, Value
+from ringbalance.results.result import Result, Rows
+from ringbalance.results.rows import Quantity
+from ringbalance.results.table import Table
 from ringbalance.scene.arrays import finite
+from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.origins import SceneFile
 
@@ -22,7 +27,7 @@ RUNS: Final = 5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Result:
+class RunResult:
     """What one run of a balancer comes to, over the common span."""
 
     time: float
@@ -45,7 +50,7 @@ class Side:
     """As it was run, on the common rotor and tuned, with the seed of the first run."""
     tuned: Mapping[str, float]
     """Scene keys that tuning has changed, with their values, SI."""
-    results: tuple[Result, ...]
+    results: tuple[RunResult, ...]
     """One for each seed."""
     models_used: tuple[ModelUsed, ...] = ()
     """Of a liquid ring: every physical term, with its model and its estimated contribution."""
@@ -65,12 +70,50 @@ class Side:
         """Of the first run that did not settle, else of the first."""
         return next((r for r in self.results if math.isinf(r.time)), self.results[0]).status
 
+    @property
+    def finding(self) -> Finding:
+        """How its runs ended."""
+        done = sum(math.isfinite(each.time) for each in self.results)
+        numbers: dict[str, Value] = {"source": self.scene.source, "text": self.status}
+        numbers |= {"settled": done, "runs": len(self.results)}
+        return Finding(code="side_settled" if self.settled else "side_not_settled", values=numbers)
+
+    @property
+    def tuned_text(self) -> str:
+        """What tuning has changed, as a scene file has it."""
+        changes = [_written(key, value) for key, value in self.tuned.items() if not key.startswith(_OFFSETS)]
+        if offsets := [value for key, value in self.tuned.items() if key.startswith(_OFFSETS)]:
+            changes.append(offset_text(offsets))
+        return ", ".join(changes) or "as it is"
+
+    def quantities(self, prefix: str) -> tuple[Quantity, ...]:
+        """Medians over its runs, from the smallest to the largest. Args: `prefix`: of the keys."""
+        rows = []
+        for name, (words, unit) in _WORDS.items():
+            low, high = (finite(end) for end in self.ends(name))
+            value = finite(self.middle(name))
+            status = "ok" if value is not None else "not_settled"
+            ends = (low, high) if low != high else (None, None)
+            rows.append(
+                Quantity(
+                    key=prefix + name,
+                    name=words,
+                    unit=unit,
+                    value=value,
+                    lower=ends[0],
+                    upper=ends[1],
+                    origin="simulated",
+                    status=status,
+                )
+            )
+        return tuple(rows)
+
     def middle(self, name: str) -> float:
-        """Median of one number of `Result` over the runs."""
+        """Median of one number of `RunResult` over the runs."""
         return float(np.quantile(self._values(name), 0.5, method="inverted_cdf"))
 
     def ends(self, name: str) -> tuple[float, float]:
-        """Smallest and largest of one number of `Result` over the runs."""
+        """Smallest and largest of one number of `RunResult` over the runs."""
         values = self._values(name)
         return min(values), max(values)
 
@@ -79,11 +122,8 @@ class Side:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Comparison(CommandResult):
+class Comparison(Result):
     """Two balancers on one rotor."""
-
-    _deferred: ClassVar[Any] = deferred
-    _summary: ClassVar[str] = "comparison_lines"
 
     rotor: CommonRotor
     """That of the first scene."""
@@ -93,10 +133,6 @@ class Comparison(CommandResult):
     """In the order of the scenes."""
 
     def to_dict(self) -> dict[str, Any]:
-        """See `document`."""
-        return self.document()
-
-    def document(self) -> dict[str, Any]:
         """All as a JSON document in SI; lists run along `scenes`; null: not settled."""
         sides, rotor = self.sides, self.rotor
         return {
@@ -129,7 +165,33 @@ class Comparison(CommandResult):
                 "noise_m": rotor.noise,
                 "limit_m": rotor.limit,
             },
+            **self.rows().document(),
         }
+
+    def rows(self) -> Rows:
+        """What both come to: medians over the runs, with the smallest and the largest."""
+        rotor, sides = self.rotor, self.sides
+        of_rotor = (
+            ("speed", "speed", "rad/s", rotor.speed),
+            ("influence", "influence coefficient", "m/(kg m)", abs(rotor.influence)),
+            ("lag_angle", "lag angle", "rad", -cmath.phase(rotor.influence)),
+            ("initial_amplitude", "amplitude before balancing", "m", rotor.amplitude),
+            ("limit", "limit", "m", rotor.limit),
+            ("span", "time of each run", "s", self.span),
+        )
+        both = [side.quantities(f"{place}.") for place, side in enumerate(sides, start=1)]
+        facts = ({"balancer": s.scene.balancer.replace("_", " "), "tuned": s.tuned_text} for s in sides)
+        return Rows(
+            title=f"Two balancers on the rotor of {rotor.source}",
+            quantities=(
+                *(Quantity(key=k, name=n, unit=u, value=v, origin="given") for k, n, u, v in of_rotor),
+                *both[0],
+                *both[1],
+            ),
+            listed=len(of_rotor),
+            findings=tuple(side.finding for side in sides),
+            tables=(_table(sides, both, tuple(facts)),),
+        )
 
 
 def compare(first: Balancer, second: Balancer, *, runs: int = RUNS) -> Comparison:
@@ -160,7 +222,7 @@ def _side(rotor: CommonRotor, balancer: Balancer, *, span: float, runs: int) -> 
     ready = advised.lasting(span)
     found = ready.run({}, Draws.first(runs, devices=False), trace=True)
     results = tuple(
-        Result(
+        RunResult(
             time=float(time),
             residual_ratio=float(final) / rotor.amplitude,
             energy=energy,
@@ -180,4 +242,38 @@ _NUMBERS: Final = {
     "energy_J": "energy",
     "worst_amplitude_m": "worst_amplitude",
 }
-"""Keys of the document, each with its number of `Result`."""
+"""Keys of the document, each with its number of `RunResult`."""
+_WORDS: Final = {
+    "time": ("time to the limit", "s"),
+    "residual_ratio": ("left over, ratio", "1"),
+    "energy": ("energy", "J"),
+    "worst_amplitude": ("largest amplitude on the way", "m"),
+}
+_NOTE: Final = "medians of the runs; -/+: to the smallest and the largest"
+_OFFSETS: Final = "controller.gas_time_offset."
+_UNITS: Final = {
+    "controller.proportional": ("s/um", 1e-6),
+    "friction_filter.drive_speed": ("rpm", 30 / math.pi),
+    "friction_filter.pair_gain": ("V/rad", 1.0),
+    "friction_filter.speed_gain": ("V*s/rad", 1.0),
+    "lqr.state_weight": ("", 1.0),
+}
+"""Of the keys that tuning may change: the usual unit in scene files, and how many of it one in SI is."""
+
+
+def _written(key: str, value: float) -> str:
+    unit, factor = _UNITS.get(key) or (usual_unit(key), in_usual_unit(key, 1.0))
+    return f'{key} = "{factor * value:.4g} {unit}"' if unit else f"{key} = {value:.4g}"
+
+
+def _table(
+    sides: Sequence[Side], both: Sequence[Sequence[Quantity]], facts: Sequence[Mapping[str, str]]
+) -> Table:
+    """One column a balancer; medians with the smallest and the largest of the runs."""
+    names = [side.scene.name for side in sides]
+    heads = names if len(set(names)) > 1 else [side.scene.source for side in sides]
+    rows = [(name, *(each[name] for each in facts)) for name in facts[0]]
+    rows += [(one.name, one.text, other.text) for one, other in zip(*both, strict=True)]
+    return Table(
+        heads=("", *heads), rows=rows, note="medians of the runs; -/+: to the smallest and the largest"
+    )

@@ -12,14 +12,13 @@ from typing import Any, Final
 _HOME: Final = MappingProxyType(
     {
         "command_document": "ringbalance.controller.line_runs",
-        "comparison_lines": "ringbalance.controller.summary",
         "eccentric_document": "ringbalance.controller.eccentric_mass.document",
-        "eccentric_lines": "ringbalance.controller.summary",
+        "eccentric_rows": "ringbalance.controller.eccentric_mass.document",
         "eccentric_tuning_document": "ringbalance.controller.eccentric_mass.tuning",
-        "eccentric_tuning_lines": "ringbalance.controller.summary",
+        "eccentric_tuning_rows": "ringbalance.controller.eccentric_mass.tuning",
         "simulation_rows": "ringbalance.controller.document",
         "tuning_document": "ringbalance.controller.tuning.tune",
-        "tuning_lines": "ringbalance.controller.summary",
+        "tuning_rows": "ringbalance.controller.tuning.view",
     }
 )
 

@@ -8,8 +8,6 @@ from dataclasses import asdict
 from typing import Any, Final
 
 import numpy as np
-from rich.console import Console
-from rich.text import Text
 
 from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.simulation import Injection, Sample, Simulation
@@ -126,7 +124,7 @@ def _samples(samples: tuple[Sample, ...]) -> dict[str, Any]:
 
 
 _BARS: Final = "▁▂▃▄▅▆▇█"
-_SPARK_WIDTH: Final = 48
+_SPARK_WIDTH: Final = 32
 _MOST_INJECTIONS: Final = 40
 _DECADES: Final = 3.0
 """Depth of the sparkline below the largest amplitude."""
@@ -137,6 +135,9 @@ def simulation_rows(simulation: Simulation) -> Rows:
     gas = simulation.gas.finding
     scene, line = simulation.scene, line_warning(simulation.gas_line)
     model = simulation.model_status
+    closed = [i.time + i.operation.duration for i in simulation.injections]
+    # Until shortly after the last valve has closed.
+    end = min(float(simulation.time[-1]), 1.2 * max(closed, default=math.inf))
     return Rows(
         title=f"Run of {scene.name} ({scene.source}), {simulation.law} law, {simulation.controller}",
         quantities=_quantities(simulation),
@@ -150,6 +151,7 @@ def simulation_rows(simulation: Simulation) -> Rows:
             ("flow law", simulation.law),
             ("gas line", line_text(simulation.gas_line)),
             ("neglected", neglected_in_injections(simulation.models_used).text),
+            ("amplitude (log)", amplitude_line(simulation.time, simulation.amplitude, end=end)),
         ),
         tables=(_injection_table(simulation.injections), models_table(simulation.models_used)),
     )
@@ -214,20 +216,9 @@ def _regime(injection: Injection) -> str:
     return " to ".join(names) + event
 
 
-def show(simulation: Simulation, *, console: Console) -> None:
-    """Print a run: how it ended, its numbers, its amplitude over time, injections and terms."""
-    closed = [i.time + i.operation.duration for i in simulation.injections]
-    # Until shortly after the last valve has closed.
-    end = min(float(simulation.time[-1]), 1.2 * max(closed, default=math.inf))
-    console.print(
-        simulation_rows(simulation).view(amplitude_line(simulation.time, simulation.amplitude, end=end))
-    )
-
-
-def amplitude_line(time: FloatArray, amplitude: FloatArray, *, end: float) -> Text:
-    """An amplitude at equal steps of time up to `end`, s, by straight lines."""
-    line = _sparkline(np.interp(np.linspace(0.0, end, _SPARK_WIDTH), time, amplitude))
-    return Text.assemble(("amplitude (log) ", "dim"), line, (f"  0 to {end:.3g} s", "dim"))
+def amplitude_line(time: FloatArray, amplitude: FloatArray, *, end: float) -> str:
+    """An amplitude at equal steps of time up to `end`, s, by straight lines; logarithmic."""
+    return f"{_sparkline(np.interp(np.linspace(0.0, end, _SPARK_WIDTH), time, amplitude))} to {end:.3g} s"
 
 
 def _sparkline(values: FloatArray) -> str:

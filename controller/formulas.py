@@ -145,6 +145,7 @@ RISING: Final = int(Cause.RISING)
 IDLE: Final = int(Cause.IDLE)
 AT_REST: Final = int(Cause.AT_REST)
 TIME: Final = int(Cause.TIME)
+SAMPLES: Final = int(Cause.SAMPLES)
 HELD: Final = int(Cause.HELD)
 """The same as whole numbers, which is what compiled code knows."""
 

@@ -14,6 +14,8 @@ from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
+from ringbalance.results.numbers import given
+from ringbalance.results.table import Table
 from ringbalance.scene.models import Scene
 
 
@@ -65,18 +67,21 @@ def command_document(simulation: Simulation, at_ends: Sequence[_LineRun] | None 
     return simulation_document(simulation) | {"gas_line_runs": line_runs_document(at_ends)}
 
 
-def line_runs_text(runs: Sequence[_LineRun]) -> str:
-    """How the runs end, in one sentence; empty without any."""
-    if not runs:
-        return ""
-    each = "; ".join(f"{run.end} line: {_end(run.run)}" for run in runs)
-    return f"the scene gives no gas line; with both ends of its default range modelled, {each}"
-
-
-def _end(run: Simulation) -> str:
-    if run.settling_time is not None:
-        return f"settled in {run.settling_time:.3g} s"
-    return f"{run.verdict.value}, {1e6 * run.amplitude[-1]:.3g} um at the end"
+def line_runs_table(runs: Sequence[_LineRun]) -> Table:
+    """How the runs end."""
+    return Table(
+        caption="The scene gives no gas line; with both ends of its default range",
+        heads=("line", "run", "settling time", "amplitude at the end"),
+        rows=[
+            (
+                each.end,
+                each.run.verdict.value,
+                given(each.run.settling_time, "s", digits=3),
+                given(float(each.run.amplitude[-1]), "m", digits=3),
+            )
+            for each in runs
+        ],
+    )
 
 
 def line_runs_document(runs: Sequence[_LineRun]) -> list[dict[str, Any]]:

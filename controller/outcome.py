@@ -3,60 +3,75 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.algorithms.built_in import BELOW_MINIMUM, NO_SAMPLE
 from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.records import Event
+from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.simulation import (
     NOISE_DEVIATIONS,
     Injection,
     Outcome,
     Sample,
     noise_floor,
-    overshoots,
 )
 from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
-NO_SAMPLE: Final = "no usable sample"
-"""Reason that every algorithm gives for doing nothing on a dropped sample or a NaN."""
 
-
-@dataclass(kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Facts:
-    """What a run knows about itself; `cause` and `amplitude` are set when it has ended."""
+    """What a finished run knows about itself."""
 
     scene: Scene
     plant: LiquidRing
     state: DiscState
     loop: LoopFactor
-    own_algorithm: str = ""
+    own_algorithm: str
     """Name of the caller's; empty: that of the scene."""
-    time: float = 0.0
-    """s."""
-    since: float = math.inf
-    """s, from which on the true amplitude has not been above the limit; infinite while it is."""
-    held_since: float = math.inf
-    """The same of the first time that it held for the hold time."""
-    drift: float = 0.0
-    """Largest change of a fill ratio while the gas was off."""
-    runs_back: tuple[bool, ...] = ()
-    """Whether liquid of each pair still ran back at the end of the last stretch of time."""
-    samples: list[Sample] = field(default_factory=list)
-    injections: list[Injection] = field(default_factory=list)
-    shortened: int = 0
-    """Injections shortened or left out so that the driven chamber keeps its residual fill."""
-    refused: tuple[str, ...] = ()
-    """Letters of the driven chambers of those in the last command."""
-    cause: Cause = Cause.NONE
-    amplitude: FloatArray = field(default_factory=lambda: np.empty(0))
+    run: np.void
+    """As it ended, of type `RUN`."""
+    samples: tuple[Sample, ...]
+    injections: tuple[Injection, ...]
+    amplitude: FloatArray
     """True vibration, m zero-to-peak."""
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return float(self.run["time"])
+
+    @property
+    def since(self) -> float:
+        """s, from which on the true amplitude has not been above the limit; infinite while it is."""
+        return float(self.run["since"])
+
+    @property
+    def drift(self) -> float:
+        """Largest change of a fill ratio while the gas was off."""
+        return float(self.run["drift"])
+
+    @property
+    def shortened(self) -> int:
+        """Injections shortened or left out so that the driven chamber keeps its residual fill."""
+        return int(self.run["shortened"])
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Letters of the driven chambers of those in the last command."""
+        letters = chamber_letters(self.scene.disc.chambers)
+        return tuple(letters[i] for i in np.flatnonzero(self.run["refused"]))
+
+    @property
+    def cause(self) -> Cause:
+        """Why the loop stopped cycling."""
+        return Cause(int(self.run["cause"]))
 
     @property
     def initial_amplitude(self) -> float:
@@ -79,7 +94,7 @@ class Facts:
     @property
     def overshoots(self) -> int:
         """Times that the residual turned between samples while above the limit."""
-        return overshoots(self.samples, limit=self.scene.controller.limit)
+        return int(self.run["overshoots"])
 
     @cached_property
     def unreachable_amplitude(self) -> float:
@@ -96,8 +111,9 @@ class Facts:
     @property
     def settling_time(self) -> float | None:
         """s, from which on the amplitude first held; None when it has not, or is not expected to stay."""
-        if self.loop.stays and self.held_since < math.inf:
-            return self.held_since
+        held_since = float(self.run["held_since"])
+        if self.loop.stays and held_since < math.inf:
+            return held_since
         return self.since if self.cause is Cause.AT_REST and self.since < math.inf else None
 
     @property
@@ -118,7 +134,7 @@ class Facts:
             return Outcome.SETTLED
         if self.beyond_disc > limit and not self.loop.unstable:
             return Outcome.CAPACITY_EXCEEDED
-        if self.plant.drains(self.state, self.runs_back, self.scene):
+        if self.run["drains"]:
             return Outcome.DRIFTING
         higher = self.final_amplitude > self.initial_amplitude + self.noise_floor
         if has_grown(self.cause, higher):
@@ -127,7 +143,7 @@ class Facts:
             return Outcome.UNSTABLE
         if self.unreachable_amplitude > limit:
             return Outcome.STALLED
-        if min(self.since, self.held_since) < math.inf:
+        if min(self.since, float(self.run["held_since"])) < math.inf:
             return Outcome.HOLD_INCOMPLETE if self.loop.stays else Outcome.HOVERING
         if self.refused and self.cause is Cause.IDLE:
             return Outcome.CHAMBER_EMPTY
@@ -174,6 +190,6 @@ def _out_of_time(facts: Facts) -> Outcome:
     if NOISE_DEVIATIONS * facts.scene.sensor.amplitude_noise > facts.scene.controller.limit:
         return Outcome.NOISE
     last = facts.samples[-1].command
-    if not last.resting and not last.valves and last.reason.startswith("the valve-open time"):
+    if not last.resting and not last.valves and last.reason == BELOW_MINIMUM:
         return Outcome.GAS_TIME_TOO_SHORT
     return Outcome.TIME_LIMIT

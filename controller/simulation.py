@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, ClassVar, Final
 
 from ringbalance.controller import deferred
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.formulas import has_risen, has_turned
 from ringbalance.controller.liquid_ring.plant import Operation
 from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.controller.tuning.loop_factor import LoopFactor
@@ -273,26 +271,3 @@ def noise_floor(*, amplitude_noise: float, initial_amplitude: float) -> float:
     Returns: m.
     """
     return NOISE_DEVIATIONS * math.sqrt(2) * amplitude_noise + ROUND_OFF * initial_amplitude
-
-
-def overshoots(samples: Sequence[Sample], *, limit: float) -> int:
-    """Times that the residual turned by more than 90 degrees between usable samples while above the limit.
-
-    Args: `samples`: of one run, in order. `limit`: m.
-    """
-    seen = [m for s in samples if (m := s.measurement) is not None and m.usable(needs_phase=True)]
-    return sum(b.amplitude > limit and has_turned(a.phase, b.phase) for a, b in pairwise(seen))
-
-
-def misadjustments(samples: Sequence[Sample], *, floor: float) -> int:
-    """Operations after which the measured amplitude was higher by more than the noise floor.
-
-    Args: `samples`: of one run, in order; one without a usable amplitude is passed over. `floor`: m.
-    """
-    count, before, operated = 0, math.inf, False
-    for sample in samples:
-        if sample.measurement is not None and sample.measurement.usable(needs_phase=False):
-            count += operated and has_risen(before, sample.measurement.amplitude, floor)
-            before, operated = sample.measurement.amplitude, False
-        operated = operated or bool(sample.command.valves)
-    return count

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 from typing import Final
@@ -16,9 +16,11 @@ from ringbalance.reports import summary
 from ringbalance.reports.equations import GLYPHS, share_glyphs
 from ringbalance.reports.figures.style import DARK, LIGHT
 from ringbalance.reports.page import ANNEX, DOCUMENTS, PageContent, page_content
-from ringbalance.reports.prose import marked_up
+from ringbalance.reports.prose import input_name, key_words, series
 from ringbalance.reports.section import Record
 from ringbalance.reports.sections import PREFIXES
+from ringbalance.reports.traced import FILTERS, finished, listing_of, table_of
+from ringbalance.scene.describe import usual_name
 
 _STYLED: Final = re.compile(r'(<(?:path|g|text|tspan|use|rect|line|polyline|image)\b[^>]*?) style="([^"]*)"')
 _PART_ID: Final = re.compile(r'(<(?:path|g|defs|text)\b[^>]*?)( id="([^"]*)")')
@@ -35,9 +37,9 @@ def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> 
     return render_pages(page_content(evidence, pictures=pictures))
 
 
-def render_pages(content: PageContent) -> dict[str, str]:
+def render_pages(content: PageContent, *, documents: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
     """Fills the template, once for each document."""
-    return {file: _page(content, file) for file in DOCUMENTS}
+    return {file: _page(content, file) for file in documents}
 
 
 @cache
@@ -46,11 +48,22 @@ def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(_template),
         autoescape=True,
-        trim_blocks=True,
         undefined=jinja2.StrictUndefined,
-        finalize=marked_up,
+        finalize=finished,
     )
-    environment.filters |= {"tone": summary.tone, "verbatim": escape}
+    environment.filters |= {
+        "tone": summary.tone,
+        "verbatim": escape,
+        "series": series,
+        "opening": lambda text: f"{text[0].upper()}{text[1:]}",
+        "as_in": lambda name, names: names.get(name, name),
+        "sentence": lambda text: f"{text[0].upper()}{text[1:].rstrip('.')}.",
+        "input_name": input_name,
+        "key_words": key_words,
+        "usual_name": usual_name,
+        **FILTERS,
+    }
+    environment.globals |= {"table_of": table_of, "listing_of": listing_of}
     environment.tests |= {"verdict": summary.is_verdict}
     return environment
 

@@ -20,11 +20,11 @@ from typing import Any, Final
 from ringbalance.controller.compilation.cache import (
     OTHER,
     checked_content,
+    code_root,
     discard,
     trusted,
     write_checked,
 )
-from ringbalance.controller.compilation.compiled import code_folder
 from ringbalance.reports.provenance import versions
 from ringbalance.scene.faults import toml_text
 
@@ -164,19 +164,17 @@ def _check_kept(kept: object) -> None:
 
 
 def keep_cases(kept: Mapping[str, Record]) -> None:
-    """Keep what `kept_cases` gives, in place of what another version of the program has kept."""
+    """Keep what `kept_cases` gives."""
     path = _kept_file()
     if not trusted(path.parent):
         return
-    for other in path.parent.glob(f"{_PREFIX}*{OTHER}"):
-        discard(other)
     # Without them the next report runs the cases again.
     with contextlib.suppress(OSError):
         write_checked(path, json.dumps(kept, allow_nan=False).encode())
 
 
 def _kept_file() -> Path:
-    return code_folder() / f"{_PREFIX}{_program()}{OTHER}"
+    return code_root() / f"{_PREFIX}{_program()}{OTHER}"
 
 
 @cache

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final, Literal
 
+from markupsafe import Markup
+
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reports.prose import untraced
@@ -25,7 +27,7 @@ Place = Literal["report", "annex"]
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Texts in rows and columns; a column is set as numbers when most of its cells begin like one."""
+    """Texts or markup in rows and columns; a column is set as numbers when most cells begin like one."""
 
     caption: str = ""
     heads: Cells
@@ -38,7 +40,13 @@ class Table:
     def numeric(self) -> list[bool]:
         """By column."""
         columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.heads)
-        return [_numeric([untraced(cell) for cell in column if cell.strip(MISSING)]) for column in columns]
+        plain = ([striptags(untraced(cell)) for cell in column] for column in columns)
+        return [_numeric([cell for cell in column if cell.strip(MISSING)]) for column in plain]
+
+
+def striptags(text: str) -> str:
+    """What a reader sees of markup; other text as it is."""
+    return text.striptags() if isinstance(text, Markup) else text
 
 
 def _numeric(cells: Cells) -> bool:
@@ -92,13 +100,13 @@ class Section:
     """From its own evidence and the whole to what the template calls `view`: texts, `Drawing`s, or None."""
     always: bool = False
     """Whether it is shown without evidence of its own, which is then empty."""
-    in_parts: bool = False
-    """Whether its view is a list of kinds and contents, which one template sets in turn."""
+    template: str = ""
+    """File in `templates`; by default that of its name."""
 
     @property
-    def template(self) -> str:
+    def file(self) -> str:
         """File in `templates`."""
-        return "parts.html" if self.in_parts else f"{self.name}.html"
+        return self.template or f"{self.name}.html"
 
     def view(self, evidence: Record) -> Record | None:
         """What the template shows of the whole evidence; None: no such section."""

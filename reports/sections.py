@@ -126,7 +126,7 @@ def viewed(evidence: Record, views: Mapping[str, Record | None]) -> list[Record]
         {
             "name": s.name,
             "title": s.title,
-            "template": s.template,
+            "template": s.file,
             "place": s.place,
             "number": f"{PREFIXES[s.place]}{next(counts[s.place])}",
             "view": view,

@@ -66,7 +66,7 @@ def simulate(
     if json:
         print(json_format.dumps(document, allow_nan=False))
     else:
-        balancer.show(run, results_console())
+        results_console().print(balancer.rows(run).view())
     return SETTLED if run.settled else NOT_SETTLED
 
 

@@ -45,6 +45,8 @@ class Rows:
     """Names and texts that are no quantities, for a terminal."""
     tables: tuple[Table, ...] = ()
     """For a terminal; those without rows are left out."""
+    listed: int | None = None
+    """How many quantities a terminal lists, where its tables have the others; None: all."""
 
     def document(self) -> dict[str, Any]:
         """What the JSON of every command has of them."""
@@ -58,7 +60,7 @@ class Rows:
 
         Args: `headline`: whether the first finding is one; otherwise the title is, and findings come later.
         """
-        numbers = two_columns([*self.facts, *quantity_rows(self.quantities)])
+        numbers = two_columns([*self.facts, *quantity_rows(self.quantities[: self.listed])])
         tables = (terminal_table(table) for table in self.tables if table.rows)
         if headline:
             return Group(findings_text(self.findings), numbers, *more, *tables)

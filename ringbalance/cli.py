@@ -61,10 +61,6 @@ COMMANDS = {
         "inside.",
     ),
     "plot": ("ringbalance.reports.cli:plot", "The off-screen 3-D pictures alone."),
-    "cache": (
-        "ringbalance.controller.compilation.cli:cache",
-        "The compiled code that is kept between runs: where, how much, and --clear to remove it.",
-    ),
 }
 THREAD_COUNTS = (
     "OPENBLAS_NUM_THREADS",

@@ -167,10 +167,6 @@ def test_keys_of_extremes() -> None:
     compare("`extremes --json`", [violated])
 
 
-def test_keys_of_cache(printed: Any) -> None:
-    compare("`cache --json`", [printed("cache")])
-
-
 @pytest.mark.parametrize("words", [("calibrate", PAPER), ("simulate", DRIVEN)])
 def test_each_command_names_its_scene(words: tuple[str, str], printed: Any) -> None:
     scene = rb.load_scene(words[1])

@@ -15,7 +15,7 @@ from ringbalance.results.numbers import MINUS, SCALES
 
 _TRACED: Final = re.compile(r'<span data-from="([^"]+)">(.*?)</span>')
 _NUMBER: Final = re.compile(
-    rf"\(?({MINUS}?\d[\d\u202f]*(?<=\d)(?:\.\d+)?)(?:\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
+    rf"\(?\+?({MINUS}?\d[\d\u202f]*(?<=\d)(?:\.\d+)?)(?:\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
 )
 _OUTER: Final = re.compile("\\)\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
 _RAISED: Final = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")

@@ -15,10 +15,10 @@ import numpy as np
 
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration, calibrate
-from ringbalance.reports.pages.drag_coefficient import SECTION, liquid_cells
+from ringbalance.reports.pages.drag_coefficient import SECTION
 from ringbalance.reports.section import Record, Work
 from ringbalance.reports.studies.drag_map import DragMap
-from ringbalance.results.numbers import number, percent, shown
+from ringbalance.results.numbers import MISSING, given, measured, number, percent, shown
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.verification.runner import paper_scene
@@ -50,7 +50,31 @@ def _liquids_table(liquids: list[Record]) -> str:
     """One row a liquid."""
     heads = ("liquid", "viscosity", "kg/m³", "gas", "tube runs", "velocity", "k")
     more = ("Eq. 18 reads", "Eq. 19 is off by", "50 is")
-    return _table((*heads, *more), [tuple(liquid_cells(record)) for record in liquids])
+    return _table((*heads, *more), [tuple(_liquid_cells(record)) for record in liquids])
+
+
+_LIQUID_HEADS: Final = (
+    *("Liquid", "Viscosity", "Density\nkg/m³", "Gas", "The tube runs", "Velocity", "k"),
+    *("Eq. 18\nreads", "Eq. 19\nis off by"),
+)
+
+
+def _liquid_cells(record: Record) -> Sequence[str]:
+    """One liquid under _LIQUID_HEADS, and the verdict on k = 50; a star: not under the scene's gas."""
+    runs = record["runs"]
+    star = "" if record["starts_at_scene_pressure"] else "*"
+    return (
+        record["name"],
+        shown(record["kinematic_viscosity_m2_s"], "m^2/s", digits=3),
+        f"{record['density_kg_m3']:.0f}",
+        f"{given(record['gas_pressure_Pa'], 'Pa', digits=3)}{star}",
+        f"{record['regime']}, {record['flow_state']}" if runs else "nothing flows",
+        shown(record["velocity_m_s"], "m/s", record["velocity_uncertainty"]) if runs else MISSING,
+        measured(record["k"], record["k_uncertainty"]) if runs else MISSING,
+        measured(record["apparent_k"], None, digits=3) if runs else MISSING,
+        percent(record["velocity_error"], signed=True, digits=2) if runs else MISSING,
+        record["verdict"],
+    )
 
 
 def _bores_table(calibration: Calibration) -> str:

@@ -62,6 +62,7 @@ def _trial_of(scene: Scene) -> Trial:
     """The one-by-one trial algorithm with a scene's settings."""
     settings, letters = scene.controller, chamber_letters(scene.disc.chambers)
     return Trial(
+        chambers=scene.disc.chambers,
         sequence=tuple(letters.index(letter) for letter in settings.sequence),
         limit=settings.limit,
         first_trial=settings.first_trial,

@@ -1,23 +1,32 @@
 """The law-based algorithm: valve-open times straight from the flow law, and it learns the influence
 coefficient.
 
-From a wanted balancing moment to the fills of the pairs it goes by `pair_changes` and `fill_for_moment`.
+From a wanted balancing moment to the fills of the pairs it goes by `wanted_moment`.
 """
 
 from __future__ import annotations
 
-import cmath
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand, opening
-from ringbalance.controller.liquid_ring.motion import PairState
+from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
+from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
+from ringbalance.controller.compilation.compiled import in_place
+from ringbalance.controller.liquid_ring.compiled_column import steady
+from ringbalance.controller.liquid_ring.compiled_events import command
+from ringbalance.controller.liquid_ring.compiled_lift import shown
+from ringbalance.controller.liquid_ring.compiled_march import advance
+from ringbalance.controller.liquid_ring.interval import packed
+from ringbalance.controller.liquid_ring.motion import Motion
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.rotor import chamber_directions, disc_unbalance
-from ringbalance.reduced_model.law.model import MomentCurve
+from ringbalance.controller.liquid_ring.records import EVENTS, WORKSPACE, Event, X
+from ringbalance.controller.loop_records import LAW_BASED, Record
+from ringbalance.controller.moment_table import MomentTable, pair_moment
+from ringbalance.controller.rotor import chamber_directions
 from ringbalance.scene.arrays import FloatArray
 
 PRIOR_STANDARD_DEVIATION: Final = 0.5
@@ -26,66 +35,22 @@ LEAST_LAW_STANDARD_DEVIATION: Final = 0.05
 """Standard deviation, relative, below which no flow law's velocity is trusted."""
 MAGNITUDE_RANGE: Final = 10.0
 """Factor around the assumed magnitude that the estimate keeps to: no response proves no coefficient."""
+FILL_ERROR: Final = 1e-9
+"""Error in fill ratio at which a valve-open time is good enough."""
+_HALVINGS: Final = 60
+_BLOCKED: Final = EVENTS.index(Event.BLOCKED)
+_EMPTY: Final = EVENTS.index(Event.EMPTY)
+_FULL: Final = EVENTS.index(Event.FULL)
 
 
 @dataclass(frozen=True, kw_only=True)
-class _InfluenceEstimate:
-    """Estimate of K in V1 = V0 + K U."""
-
-    value: complex
-    """K, m/(kg m)."""
-    variance: float
-    """Mean square of its error, both components together, (m/(kg m))^2."""
-
-    def updated(
-        self,
-        *,
-        moment_change: complex,
-        vibration_change: complex,
-        noise_variance: float,
-        law_standard_deviation: float,
-        assumed_magnitude: float,
-    ) -> _InfluenceEstimate:
-        """Learn from one operation, dV = K dU + noise, by a Kalman filter of one complex number.
-
-        gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with R =
-        `noise_variance` + (s |K dU|)^2, s = `law_standard_deviation` (relative): a response that noise could
-        have made moves K little, and no moment counts as better known than by s. P never falls below
-        (s |K|)^2, so the estimate keeps following. All SI; variances are of both components together.
-        Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", J. Basic Eng. 82 (1960).
-        """
-        k, p = self.value, self.variance
-        expected = abs(moment_change) ** 2 * p
-        if expected == 0:
-            return self
-        rest = noise_variance + abs(law_standard_deviation * k * moment_change) ** 2
-        gain = p * moment_change.conjugate() / (expected + rest)
-        value = _held(k + gain * (vibration_change - k * moment_change), k, assumed_magnitude)
-        left = p * rest / (expected + rest)
-        return _InfluenceEstimate(value=value, variance=max(left, abs(law_standard_deviation * value) ** 2))
-
-
-@dataclass(frozen=True, kw_only=True)
-class _LawBasedState:
-    """Everything that the algorithm remembers between samples."""
-
-    disc: DiscState
-    """The chambers' liquid as the law has it, when the valves last opened."""
-    influence: _InfluenceEstimate
-    previous: Measurement | None = None
-    """The last usable sample."""
-    valves: tuple[ValveCommand, ...] = ()
-    """What was commanded on it."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LawBased:
+class LawBased(BuiltIn):
     """Valve-open times that take the whole residual away in one operation, t = (V/S) integral dx/u(x) for
     each pair.
 
     The residual unbalance V/K asks for a change of the disc's moment; the moment curve turns it into fill
     ratios of the pairs, the flow law into valve-open times, with the chambers' fills followed by the same law
-    since the start.  After each operation K is re-estimated from what the vibration did (`updated`), so a
+    since the start.  After each operation K is re-estimated from what the vibration did (`learnt`), so a
     wrong influence coefficient, lag angle or speed of the flow spoils only the first operation.  There is no
     gain to tune.
 
@@ -123,6 +88,11 @@ class LawBased:
         return 2
 
     @property
+    def plant(self) -> npt.NDArray[np.void]:
+        """The assumed disc, type `PLANT`, shape (1,)."""
+        return self.ring.dynamics.kept_plant(total=self.initial.pairs[0].total)
+
+    @property
     def law_standard_deviation(self) -> float:
         """Standard deviation of the law's velocity at the start, relative."""
         pair, flow = self.initial.pairs[0], self.ring.model.flow
@@ -133,188 +103,247 @@ class LawBased:
         own = float(found.uncertainty) / (2 * velocity) if velocity > 0 else 0.0
         return max(own, LEAST_LAW_STANDARD_DEVIATION)
 
-    def start(self) -> _LawBasedState:
-        variance = abs(PRIOR_STANDARD_DEVIATION * self.influence) ** 2
-        estimate = _InfluenceEstimate(value=self.influence, variance=variance)
-        return _LawBasedState(disc=self.initial, influence=estimate)
+    def fill(self, loop: Record, run: Record) -> None:
+        """As `BuiltIn.fill`."""
+        chambers, total = self.ring.chambers, self.initial.pairs[0].total
+        loop["algorithm"], loop["chambers"], loop["rest_limit"] = LAW_BASED, chambers, self.limit
+        loop["assumed_amplitude_noise"], loop["assumed_phase_noise"] = self.amplitude_noise, self.phase_noise
+        loop["probe"], loop["influence"], loop["total"] = self.probe, self.influence, total
+        loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
+        loop["offset"][: len(self.offsets)] = self.offsets
+        loop["axis"][: chambers // 2] = chamber_directions(chambers)[: chambers // 2]
+        table = MomentTable.of(model=self.ring.model, total=total)
+        loop["assumed_lowest"], loop["assumed_step"], loop["assumed_moment"] = table
+        lowest = total - self.ring.model.flow.max_fill_ratio
+        loop["least_fill"] = max(min(self.ring.residual_fill, total / 2), lowest)
+        loop["law_deviation"] = self.law_standard_deviation
+        run["influence"], run["before_time"] = self.influence, math.inf
+        run["variance"] = abs(PRIOR_STANDARD_DEVIATION * self.influence) ** 2
 
-    def step(self, state: _LawBasedState, measurement: Measurement | None) -> tuple[_LawBasedState, Command]:
-        if measurement is None or not measurement.usable(needs_phase=True):
-            return state, Command(reason="no usable sample")
-        seen = self._seen(state, measurement)
-        if measurement.amplitude <= self.limit:
-            return seen, Command(resting=True)
-        command = opening(
-            self._gas_times(seen, _vector(measurement)),
-            minimum_gas_time=self.minimum_gas_time,
-            maximum_gas_time=self.maximum_gas_time,
-            offsets=self.offsets,
-        )
-        return replace(seen, valves=command.valves), command
-
-    def _seen(self, state: _LawBasedState, now: Measurement) -> _LawBasedState:
-        """Follow the liquid to the sample's time, and learn from the response."""
-        before = state.previous
-        if before is None or now.time <= before.time:
-            return replace(state, previous=now, valves=())
-        disc = self._advanced(state, now.time - before.time)
-        if not state.valves:
-            return replace(state, disc=disc, previous=now)
-        influence = state.influence.updated(
-            moment_change=self._moment(disc) - self._moment(state.disc),
-            vibration_change=_vector(now) - _vector(before),
-            noise_variance=self._noise(now) + self._noise(before),
-            law_standard_deviation=self.law_standard_deviation,
-            assumed_magnitude=abs(self.influence),
-        )
-        return _LawBasedState(disc=disc, influence=influence, previous=now)
-
-    def _advanced(self, state: _LawBasedState, interval: float) -> DiscState:
-        times = {valve.chamber: min(self._acting(valve), interval) for valve in state.valves}
-        return self.ring.advance(state.disc, gas_times=times, duration=interval, points=1).state
-
-    def _acting(self, valve: ValveCommand) -> float:
-        """Of a valve-open time, s, what moves liquid by the law."""
-        offset = self.offsets[valve.chamber] if self.offsets else 0.0
-        return max(valve.duration - offset, 0.0)
-
-    def _noise(self, sample: Measurement) -> float:
-        return self.amplitude_noise**2 + (sample.amplitude * self.phase_noise) ** 2
-
-    def _moment(self, disc: DiscState) -> complex:
-        return complex(disc_unbalance(moment=self.ring.model.moment, fill_ratio=disc.fills()))
-
-    def _gas_times(self, state: _LawBasedState, vibration: complex) -> tuple[tuple[int, float], ...]:
-        pairs = state.disc.pairs
-        moments = [self._pair_moments(pair) for pair in pairs]
-        changes = pair_changes(
-            wanted=-vibration / state.influence.value,
-            bounds=[(low - now, high - now) for now, low, high in moments],
-        )
-        asked = [
-            self._pair_time(index, pair, now + change)
-            for index, (pair, (now, _, _), change) in enumerate(zip(pairs, moments, changes, strict=True))
-            if change != 0
+    def liquid(self) -> npt.NDArray[np.void]:
+        """As `BuiltIn.liquid`."""
+        pairs = [
+            packed(self.plant, fill=pair.fill, primed=False, motion=Motion()) for pair in self.initial.pairs
         ]
-        return tuple(asked)
+        return np.concatenate([*pairs, pairs[0]])
 
-    def _pair_moments(self, pair: PairState) -> tuple[float, float, float]:
-        """Now, smallest and largest."""
-        low, high = self._range(pair)
-        x = np.array([pair.fill, low, high])
-        found = self.ring.model.moment.pair_moment(fill_ratio=x, opposite_fill_ratio=pair.total - x)
-        return float(found[0]), float(found[1]), float(found[2])
+    def react(self, loop: Record, memory: Memory) -> None:
+        """As `BuiltIn.react`."""
+        room = np.zeros(WORKSPACE)
+        law_based_step(loop, self.plant[0], memory.run[0], memory.liquid, np.zeros((2, 1)), room)
 
-    def _range(self, pair: PairState) -> tuple[float, float]:
-        lowest = max(
-            min(self.ring.residual_fill, pair.total / 2), pair.total - self.ring.model.flow.max_fill_ratio
+
+@in_place
+def law_based_step(
+    loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
+) -> None:
+    """One step of `LawBased` on a usable sample; `liquid` has the pairs as they are believed to be."""
+    _follow(loop, plant, run, liquid, notes, w)
+    run.before_time = run.time
+    run.before_amplitude, run.before_phase = run.seen_amplitude, run.seen_phase
+    for i in range(loop.chambers // 2):
+        run.given[i] = 0.0
+    if run.seen_amplitude <= loop.rest_limit:
+        run.resting = 1
+        return
+    _aim(loop, plant, run, liquid, notes, w)
+    for i in range(loop.chambers // 2):
+        run.given[i], run.given_side[i] = run.asked[i], run.side[i]
+
+
+@in_place
+def _vector(amplitude: float, phase: float) -> complex:
+    return complex(amplitude * math.cos(phase), amplitude * math.sin(phase))
+
+
+@in_place
+def _disc_moment(loop: Record, plant: Record, liquid: Record) -> complex:
+    found = 0j
+    for i in range(loop.chambers // 2):
+        fill = shown(plant, liquid[i], liquid[i].state[X])
+        found += loop.axis[i] * pair_moment(loop.assumed_moment, loop.assumed_lowest, loop.assumed_step, fill)
+    return found
+
+
+@in_place
+def _follow(
+    loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
+) -> None:
+    """Follow the liquid to the sample's time, and learn from the response."""
+    interval = run.time - run.before_time
+    if not interval > 0.0:
+        return
+    half, opened, before = loop.chambers // 2, False, _disc_moment(loop, plant, liquid)
+    for i in range(half):
+        if run.given[i] > 0.0:
+            opened = True
+            offset = loop.offset[i + half * run.given_side[i]]
+            acting = min(max(run.given[i] - offset, 0.0), interval)
+            if acting > 0.0:
+                command(plant, liquid[i], run.given_side[i], acting)
+        liquid[i].steps = 0
+        advance(plant, liquid[i], interval, notes, 1, 0, w)
+    if opened:
+        change = _vector(run.seen_amplitude, run.seen_phase) - _vector(run.before_amplitude, run.before_phase)
+        noise = 2.0 * loop.assumed_amplitude_noise**2 + loop.assumed_phase_noise**2 * (
+            run.seen_amplitude**2 + run.before_amplitude**2
         )
-        return lowest, pair.total - lowest
-
-    def _pair_time(self, index: int, pair: PairState, moment: float) -> tuple[int, float]:
-        low, high = self._range(pair)
-        curve, total = self.ring.model.moment, pair.total
-        wanted = fill_for_moment(moment=curve, wanted=moment, total=total, lowest=low, highest=high)
-        first = wanted < pair.fill
-        chamber = index if first else index + self.ring.chambers // 2
-        target = wanted if first else total - wanted
-        time = self.ring.gas_time(pair, first=first, fill=target, longest=self.maximum_gas_time)
-        blocked = time == 0 and target < (pair.fill if first else pair.opposite_fill)
-        return chamber, self.probe if blocked else time
+        run.influence, run.variance = learnt(
+            run.influence,
+            run.variance,
+            _disc_moment(loop, plant, liquid) - before,
+            change,
+            noise,
+            loop.law_deviation,
+            abs(loop.influence),
+        )
 
 
-def _vector(measurement: Measurement) -> complex:
-    return cmath.rect(measurement.amplitude, measurement.phase)
+@in_place
+def learnt(
+    influence: complex,
+    variance: float,
+    moment_change: complex,
+    vibration_change: complex,
+    noise_variance: float,
+    law_deviation: float,
+    assumed_magnitude: float,
+) -> tuple[complex, float]:
+    """Learn K from one operation, dV = K dU + noise, by a Kalman filter of one complex number.
 
-
-def _held(value: complex, before: complex, assumed: float) -> complex:
+    gain = P dU* / (P |dU|^2 + R), K <- K + gain (dV - K dU), P <- P R/(P |dU|^2 + R), with R =
+    `noise_variance` + (s |K dU|)^2, s = `law_deviation` (relative): a response that noise could have made
+    moves K little, and no moment counts as better known than by s. P never falls below (s |K|)^2, so the
+    estimate keeps following. All SI; variances are of both components together.
+    Returns: K, m/(kg m), and P.
+    Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", J. Basic Eng. 82 (1960).
+    """
+    expected = abs(moment_change) ** 2 * variance
+    if expected == 0.0:
+        return influence, variance
+    rest = noise_variance + abs(law_deviation * influence * moment_change) ** 2
+    gain = variance * moment_change.conjugate() / (expected + rest)
+    value = influence + gain * (vibration_change - influence * moment_change)
     magnitude = abs(value)
-    if magnitude == 0:
-        return before / abs(before) * assumed / MAGNITUDE_RANGE
-    bounded = min(max(magnitude, assumed / MAGNITUDE_RANGE), assumed * MAGNITUDE_RANGE)
-    return value * (bounded / magnitude)
+    if magnitude == 0.0:
+        value = influence / abs(influence) * assumed_magnitude / MAGNITUDE_RANGE
+    else:
+        bounded = max(magnitude, assumed_magnitude / MAGNITUDE_RANGE)
+        value = value * (min(bounded, assumed_magnitude * MAGNITUDE_RANGE) / magnitude)
+    left = variance * rest / (expected + rest)
+    return value, max(left, abs(law_deviation * value) ** 2)
 
 
-SCAN: Final = 33
-ROUNDS: Final = 11
-END_STEP: Final = 1e-3
-"""Share of the range of x over which a slope at its end is taken."""
+@in_place
+def _aim(loop: Record, plant: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray) -> None:
+    """Command the valve-open times that take the residual away."""
+    half, lowest = loop.chambers // 2, loop.least_fill
+    highest = loop.total - lowest
+    least, most = _along(loop, lowest), _along(loop, highest)
+    for i in range(half):
+        now = _along(loop, shown(plant, liquid[i], liquid[i].state[X]))
+        run.least[i], run.most[i] = least - now, most - now
+    split_change(-_vector(run.seen_amplitude, run.seen_phase) / run.influence, run, loop.axis, half)
+    for i in range(half):
+        if run.change[i] != 0.0:
+            fill = shown(plant, liquid[i], liquid[i].state[X])
+            wanted = fill_for_moment(
+                loop.assumed_moment,
+                loop.assumed_lowest,
+                loop.assumed_step,
+                _along(loop, fill) + run.change[i],
+                lowest,
+                highest,
+            )
+            side = 0 if wanted < fill else 1
+            time = _gas_time(loop, plant, liquid, i, side, wanted, notes, w)
+            chamber = i + side * half
+            open_valve(loop, run, chamber, time, loop.offset[chamber])
 
 
-def pair_changes(*, wanted: complex, bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
-    """Split a change of the disc's moment over its pairs, each within the bounds of its change, kg m.
-
-    The change goes to the two directions on either side of it; what a pair cannot give goes to the pairs that
-    are left; what no pair can give is asked, by its component, of those already at their ends, for the fills
-    are only assumed.
-    Source: section 4.2 of the liquid-ring paper, by oblique components for other numbers of chambers.
-    """
-    axes = [complex(e) for e in chamber_directions(2 * len(bounds))[: len(bounds)]]
-    fixed: dict[int, float] = {}
-    sense: dict[int, float] = {}
-    free = dict.fromkeys(range(len(bounds)), 0.0)
-    while free:
-        left = wanted - sum(fixed[p] * axes[p] for p in fixed)
-        free = _shares(left, {p: axes[p] for p in free})
-        over = {p: min(max(c, bounds[p][0]), bounds[p][1]) for p, c in free.items()}
-        over = {p: c for p, c in over.items() if c != free[p]}
-        if not over:
-            break
-        sense |= {p: free[p] - bound for p, bound in over.items()}
-        fixed |= over
-        free = {p: c for p, c in free.items() if p not in over}
-    missing = wanted - sum(c * axes[p] for p, c in (fixed | free).items())
-    more = {p: c + _onward((missing * axes[p].conjugate()).real, sense[p]) for p, c in fixed.items()}
-    return tuple((free | more)[p] for p in range(len(bounds)))
+@in_place
+def _along(loop: Record, fill: float) -> float:
+    return pair_moment(loop.assumed_moment, loop.assumed_lowest, loop.assumed_step, fill).real
 
 
-def _onward(component: float, sense: float) -> float:
-    """Only in the sense in which the pair was asked for more than it has."""
-    return component if component * sense > 0 else 0.0
-
-
-def _shares(wanted: complex, axes: dict[int, complex]) -> dict[int, float]:
-    """Components along the two neighbouring directions; along the axis when only one is there."""
-    none = dict.fromkeys(axes, 0.0)
-    if len(axes) == 1:
-        return {p: (wanted * e.conjugate()).real for p, e in axes.items()}
-    ends = [(p, s, s * e) for p, e in axes.items() for s in (1.0, -1.0)]
-    ends.sort(key=lambda end: float(np.angle(end[2])) % (2 * np.pi))
-    slack = -1e-12 * abs(wanted)
-    for (p, s, a), (q, t, b) in zip(ends, [*ends[1:], ends[0]], strict=True):
-        between = (a.conjugate() * b).imag
-        first = (wanted.conjugate() * b).imag / between
-        second = (a.conjugate() * wanted).imag / between
-        if min(first, second) >= slack:
-            return none | {p: s * max(first, 0.0), q: t * max(second, 0.0)}
-    return none
-
-
-def fill_for_moment(
-    *, moment: MomentCurve, wanted: float, total: float, lowest: float, highest: float
+@in_place
+def _fill_after(
+    plant: Record, liquid: Record, pair: int, side: int, time: float, notes: FloatArray, w: FloatArray
 ) -> float:
-    """Fill ratio of the positive chamber at which a pair has a moment, kg m, growing with that fill.
+    """Fill of a driven chamber after a time of gas, s; a spare pair is tried."""
+    trial = liquid.size - 1
+    liquid[trial] = liquid[pair]
+    motion = liquid[trial]
+    motion.steps = 0
+    command(plant, motion, side, 2.0 * time + 1.0)
+    advance(plant, motion, time, notes, 1, 0, w)
+    fill = shown(plant, motion, motion.state[X])
+    return plant.total - fill if side else fill
 
-    Beyond the ends it continues straight, so that it may lie outside [lowest, highest].
+
+@in_place
+def _gas_time(
+    loop: Record,
+    plant: Record,
+    liquid: Record,
+    pair: int,
+    side: int,
+    wanted: float,
+    notes: FloatArray,
+    w: FloatArray,
+) -> float:
+    """Valve-open time that brings a pair to a fill of its positive chamber, t = (V/S) integral dx/u(x), s.
+
+    At most the longest; the time of the stall when the flow stalls before; below the smallest possible fill
+    the last velocity is kept; the probe's where nothing flows.
     """
+    longest, fill = loop.maximum_gas_time, shown(plant, liquid[pair], liquid[pair].state[X])
+    target, now = (plant.total - wanted, plant.total - fill) if side else (wanted, fill)
+    if target >= now:
+        return 0.0
+    reached = _fill_after(plant, liquid, pair, side, longest, notes, w)
+    motion = liquid[liquid.size - 1]
+    if motion.event == _BLOCKED:
+        return float(loop.probe)
+    if reached <= target:
+        return _time_to(plant, liquid, pair, side, target, longest, notes, w)
+    if motion.ended == 0.0:
+        return float(longest)
+    more = 0.0
+    if motion.event in (_EMPTY, _FULL):
+        lowest = max(0.0, plant.total - plant.max_fill_ratio)
+        p = plant.gas_pressure
+        speed = steady(plant, lowest, plant.total - lowest, p, 0.0, True, 0.0)[0]
+        more = (reached - target) * plant.chamber_volume / (plant.tube_area * max(speed, 1e-12))
+    return float(min(motion.ended + more, longest))
 
-    def of(x: FloatArray) -> FloatArray:
-        other = np.clip(total - x, lowest, highest)
-        return moment.pair_moment(fill_ratio=x, opposite_fill_ratio=other)
 
-    if highest <= lowest:
-        return lowest
-    step = END_STEP * (highest - lowest)
-    ends = of(np.array([lowest, lowest + step, highest - step, highest]))
-    if wanted <= ends[0]:
-        return lowest + float((wanted - ends[0]) / (ends[1] - ends[0])) * step
-    if wanted >= ends[3]:
-        return highest + float((wanted - ends[3]) / (ends[3] - ends[2])) * step
-    low, high = lowest, highest
-    for _ in range(ROUNDS):
-        x = np.linspace(low, high, SCAN)
-        above = of(x) >= wanted
-        above[0], above[-1] = False, True
-        first = int(np.argmax(above))
-        low, high = float(x[first - 1]), float(x[first])
-    return high
+@in_place
+def _time_to(
+    plant: Record,
+    liquid: Record,
+    pair: int,
+    side: int,
+    target: float,
+    longest: float,
+    notes: FloatArray,
+    w: FloatArray,
+) -> float:
+    """Valve-open time, at most `longest`, s, after which a driven chamber is at a fill that it reaches.
+
+    By the secant within a bracket that shrinks, halving the weight of an end that stays (the Illinois rule).
+    """
+    low, high, stays = 0.0, longest, 0
+    above = _fill_after(plant, liquid, pair, side, 0.0, notes, w) - target
+    below = _fill_after(plant, liquid, pair, side, longest, notes, w) - target
+    time = longest
+    for _ in range(_HALVINGS):
+        time = low + (high - low) * above / (above - below) if above > below else (low + high) / 2.0
+        found = _fill_after(plant, liquid, pair, side, time, notes, w) - target
+        if abs(found) <= FILL_ERROR or high - low <= 4e-16 * high:
+            break
+        if found > 0.0:
+            low, above, below, stays = time, found, below * (0.5 if stays > 0 else 1.0), 1
+        else:
+            high, below, above, stays = time, found, above * (0.5 if stays < 0 else 1.0), -1
+    return time

@@ -4,30 +4,21 @@ goes."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Literal
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, opening
+from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
+from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.formulas import vector_gas_time, vector_shares
+from ringbalance.controller.loop_records import TARGET_VECTOR, Record
 
 OnReversal = Literal["reset", "accumulate"]
-
-NEVER: Final = Measurement(time=math.inf, amplitude=0.0, phase=0.0)
-"""In the place of a sample before the first one."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _TargetVectorState:
-    """Everything that the algorithm remembers between samples."""
-
-    integral: float = 0.0
-    """Integral of the amplitude over time, m s."""
-    previous: Measurement | None = None
-    """The last usable sample above the limit."""
+_vector_gas_time: Final = in_place(vector_gas_time)
+_vector_shares: Final = in_place(vector_shares)
 
 
 @dataclass(frozen=True, kw_only=True)
-class TargetVector:
+class TargetVector(BuiltIn):
     """Valve-open time of the correction *vector*, T = Kc (e + 1/Ti int e dt + Td de/dt), split over two
     chambers.
 
@@ -76,63 +67,44 @@ class TargetVector:
         """Two: this algorithm lowers the amplitude with every operation unless its beliefs are wrong."""
         return 2
 
-    def start(self) -> _TargetVectorState:
-        return _TargetVectorState()
+    def fill(self, loop: Record, run: Record) -> None:
+        """As `BuiltIn.fill`."""
+        loop["algorithm"], loop["chambers"], loop["rest_limit"] = TARGET_VECTOR, self.chambers, self.limit
+        loop["assumed_lag"], loop["resets"] = self.lag_angle, self.on_reversal == "reset"
+        loop["integral_time"] = math.inf if self.integral_time is None else self.integral_time
+        loop["derivative_time"] = self.derivative_time
+        loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
+        loop["offset"][: len(self.offsets)] = self.offsets
+        run["proportional"], run["before_time"] = self.proportional, math.inf
 
-    def step(
-        self, state: _TargetVectorState, measurement: Measurement | None
-    ) -> tuple[_TargetVectorState, Command]:
-        if measurement is None or not measurement.usable(needs_phase=True):
-            return state, Command(reason="no usable sample")
-        if measurement.amplitude <= self.limit:
-            return _TargetVectorState(), Command(resting=True)
-        wanted, integral = self._pid(state, measurement)
-        shares = components(
-            chambers=self.chambers,
-            angle=measurement.phase + self.lag_angle,
-            length=min(max(wanted, 0.0), self.maximum_gas_time),
-            at_residual=measurement.at_residual,
-        )
-        command = opening(
-            shares,
-            minimum_gas_time=self.minimum_gas_time,
-            maximum_gas_time=self.maximum_gas_time,
-            offsets=self.offsets,
-        )
-        return replace(state, integral=integral, previous=measurement), command
-
-    def _pid(self, state: _TargetVectorState, now: Measurement) -> tuple[float, float]:
-        """Unlimited valve-open time of the vector and the integral to remember."""
-        before = state.previous or NEVER
-        return vector_gas_time(
-            now.amplitude,
-            now.phase,
-            now.time,
-            state.integral,
-            before.amplitude,
-            before.phase,
-            before.time,
-            self.proportional,
-            math.inf if self.integral_time is None else self.integral_time,
-            self.derivative_time,
-            self.maximum_gas_time,
-            self.on_reversal == "reset",
-        )
+    def react(self, loop: Record, memory: Memory) -> None:
+        """As `BuiltIn.react`."""
+        target_vector_step(loop, memory.run[0])
 
 
-def components(
-    *, chambers: int, angle: float, length: float, at_residual: tuple[bool, ...] = ()
-) -> tuple[tuple[int, float], ...]:
-    """Split a vector over the chamber directions on either side of it; (chamber, share >= 0) each.
-
-    With the angle D between the two, the spacing 2 pi/n, and d the angle past the first, the shares are
-    length sin(D - d)/sin D and length sin(d)/sin D; four chambers: T|cos|, T|sin|. Two chambers have one
-    axis: the share is the component along it.
-    With six chambers or more one that is `at_residual` is passed over for the next one on its side, as long
-    as D stays below pi.  Beyond it, and so with four chambers, the two that are left cannot form the vector:
-    it is split over its nearest directions.
-    Source: section 4.2 of the liquid-ring paper, by oblique components for other numbers of chambers.
-    """
-    without = at_residual or (False,) * chambers
-    first, share, second, other = vector_shares(chambers, angle, length, without)
-    return ((first, share),) if chambers == 2 else ((first, share), (second, other))
+@in_place
+def target_vector_step(loop: Record, run: Record) -> None:
+    """One step of `TargetVector` on a usable sample."""
+    if run.seen_amplitude <= loop.rest_limit:
+        run.resting, run.integral, run.before_time = 1, 0.0, math.inf
+        return
+    wanted, run.integral = _vector_gas_time(
+        run.seen_amplitude,
+        run.seen_phase,
+        run.time,
+        run.integral,
+        run.before_amplitude,
+        run.before_phase,
+        run.before_time,
+        run.proportional,
+        loop.integral_time,
+        loop.derivative_time,
+        loop.maximum_gas_time,
+        loop.resets > 0,
+    )
+    run.before_amplitude, run.before_phase, run.before_time = run.seen_amplitude, run.seen_phase, run.time
+    length = min(max(wanted, 0.0), loop.maximum_gas_time)
+    angle = run.seen_phase + loop.assumed_lag
+    first, share, second, other = _vector_shares(loop.chambers, angle, length, run.at_residual)
+    open_valve(loop, run, first, share, loop.offset[first])
+    open_valve(loop, run, second, other, loop.offset[second])

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import ClassVar
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement, opening
-
-
-@dataclass(frozen=True, kw_only=True)
-class _TrialState:
-    """Everything that the algorithm remembers between samples."""
-
-    position: int = 0
-    """Index into the sequence of the chamber being tried."""
-    previous: float | None = None
-    """Amplitude at the last usable sample that led to a command, m; None before the first."""
+from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
+from ringbalance.controller.compilation.compiled import in_place
+from ringbalance.controller.loop_records import NO_PHASE, TRIAL, Record
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trial:
+class Trial(BuiltIn):
     """Gas into one chamber at a time, with a step that shrinks near the goal; the phase is not read.
 
     The first trial of a chamber is short.  If the amplitude falls, the chamber stays and the step is long
@@ -31,6 +23,9 @@ class Trial:
     Source: section 4.1 of the liquid-ring paper.
     """
 
+    needs: ClassVar[int] = NO_PHASE
+    chambers: int
+    """n, even."""
     sequence: tuple[int, ...]
     """Chamber indices in the order of trial."""
     limit: float
@@ -53,26 +48,32 @@ class Trial:
         """One round through the sequence: a rise is how this algorithm learns."""
         return len(self.sequence)
 
-    def start(self) -> _TrialState:
-        return _TrialState()
+    def fill(self, loop: Record, run: Record) -> None:
+        """As `BuiltIn.fill`."""
+        run["position"] = 0
+        loop["algorithm"], loop["chambers"], loop["rest_limit"] = TRIAL, self.chambers, self.limit
+        loop["trials"], loop["sequence"][: len(self.sequence)] = len(self.sequence), self.sequence
+        for name in ("first_trial", "long_step", "short_step", "fine_below"):
+            loop[name] = getattr(self, name)
+        loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
 
-    def step(self, state: _TrialState, measurement: Measurement | None) -> tuple[_TrialState, Command]:
-        if measurement is None or not measurement.usable(needs_phase=False):
-            return state, Command(reason="no usable sample")
-        amplitude = measurement.amplitude
-        if amplitude <= self.limit:
-            return _TrialState(position=state.position), Command(resting=True)
-        fell = state.previous is not None and amplitude < state.previous
-        rose = state.previous is not None and not fell
-        position = (state.position + rose) % len(self.sequence)
-        command = opening(
-            ((self.sequence[position], self._gas_time(amplitude, first=not fell)),),
-            minimum_gas_time=self.minimum_gas_time,
-            maximum_gas_time=self.maximum_gas_time,
-        )
-        return _TrialState(position=position, previous=amplitude), command
+    def react(self, loop: Record, memory: Memory) -> None:
+        """As `BuiltIn.react`."""
+        trial_step(loop, memory.run[0])
 
-    def _gas_time(self, amplitude: float, *, first: bool) -> float:
-        fine = amplitude < self.fine_below
-        longest = self.short_step if fine else math.inf
-        return min(self.first_trial, longest) if first else (self.short_step if fine else self.long_step)
+
+@in_place
+def trial_step(loop: Record, run: Record) -> None:
+    """One step of `Trial` on a usable sample."""
+    amplitude = run.seen_amplitude
+    if amplitude <= loop.rest_limit:
+        run.resting, run.tried = 1, 0
+        return
+    fell = run.tried > 0 and amplitude < run.before_amplitude
+    if run.tried > 0 and not fell:
+        run.position = (run.position + 1) % loop.trials
+    step = loop.long_step if fell else loop.first_trial
+    if amplitude < loop.fine_below:
+        step = loop.short_step if fell else min(step, loop.short_step)
+    run.tried, run.before_amplitude = 1, amplitude
+    open_valve(loop, run, loop.sequence[run.position], step, 0.0)

@@ -1,14 +1,13 @@
 """Functions compiled to machine code by numba, kept between runs, compiled again when any of them changes.
 
 Numba looks only at a function's own file to see whether kept code is stale, though it holds the code of
-every compiled function that it calls.  The folder that it is kept in is therefore named after all of their
+every compiled function that it calls.  The files that it is kept in are therefore named after all of their
 sources.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 import re
 from collections.abc import Callable
 from functools import cache, cached_property
@@ -20,9 +19,7 @@ from numba.core import registry, sigutils, types
 from numba.core.compiler_lock import global_compiler_lock
 
 from ringbalance.controller.compilation.cache import KeptCode
-from ringbalance.controller.compilation.folders import folder_name
 from ringbalance.controller.compilation.signals import signals_deferred, signals_live
-from ringbalance.scene.platform.files import cache_folder
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -76,7 +73,7 @@ def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
         kind = _Guarded if _calls_python(function) else _Called
         dispatcher = kind(py_func=function, locals=dispatcher.locals, targetoptions=dispatcher.targetoptions)
     try:
-        dispatcher._cache = KeptCode(function, code_folder())
+        dispatcher._cache = KeptCode(function, _digest())
     except (AttributeError, TypeError, RuntimeError, OSError):
         # A numba that keeps code in another way, or a function without a file: compile in every process.
         return cast(Callable[P, R], dispatcher)
@@ -169,18 +166,7 @@ class _Guarded(_Called):
             return super()._compile_for_args(*args, **kwargs)
 
 
-def code_root() -> Path:
-    """Folder that holds the code of all versions; NUMBA_CACHE_DIR moves it."""
-    given = os.environ.get("NUMBA_CACHE_DIR")
-    return Path(given) / "ringbalance" if given else cache_folder()
-
-
 @cache
-def code_folder() -> Path:
-    """Folder of this version's code; it may not exist yet."""
-    return code_root() / folder_name(checkout=Path(__file__).parent, digest=_digest())
-
-
 def _digest() -> str:
     total = hashlib.sha256(numba.__version__.encode())
     for path in compiled_sources():

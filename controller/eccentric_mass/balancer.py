@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from rich.console import Console
 
 from ringbalance.controller.balancer import (
     CommonRotor,
@@ -25,7 +24,7 @@ from ringbalance.controller.balancer import (
     vibrating,
     with_settings,
 )
-from ringbalance.controller.eccentric_mass.document import eccentric_history, show_eccentric
+from ringbalance.controller.eccentric_mass.document import eccentric_history
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
@@ -34,9 +33,9 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, 
 from ringbalance.controller.eccentric_mass.tuning import (
     EccentricTuning,
     drawn_run,
-    show_eccentric_tuning,
     tune_eccentric,
 )
+from ringbalance.results.result import Rows
 
 _FINEST_SHARE: Final = 0.01
 """Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
@@ -186,13 +185,9 @@ class EccentricMassBalancer:
         """See `Balancer`."""
         return tune_eccentric(self.scene, told=progress)
 
-    def show(self, run: EccentricRun, console: Console) -> None:
+    def rows(self, run: EccentricRun) -> Rows:
         """See `Balancer`."""
-        show_eccentric(run, console=console)
-
-    def show_recommendation(self, recommendation: EccentricTuning, console: Console) -> None:
-        """See `Balancer`."""
-        show_eccentric_tuning(recommendation, console)
+        return run.rows()
 
     def history(self, run: EccentricRun) -> Mapping[str, Sequence[Any]]:
         """See `Balancer`."""

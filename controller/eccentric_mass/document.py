@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
-from rich.console import Console, Group, RenderableType
-from rich.table import Table
-from rich.text import Text
 
 from ringbalance.controller.document import amplitude_line
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.controller.eccentric_mass.run_status import length_text
-from ringbalance.results.render import two_columns
+from ringbalance.results.findings import Finding
+from ringbalance.results.numbers import given
+from ringbalance.results.result import Rows
+from ringbalance.results.rows import Quantity, around
+from ringbalance.results.table import Table
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.uncertain import NORMAL_95
 
@@ -64,6 +64,7 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
             "friction_arm_m": run.estimates.friction_arm[kept].T.tolist(),
             "friction_variance": run.estimates.friction_variance[kept].T.tolist(),
         },
+        **run.rows().document(),
     }
 
 
@@ -121,61 +122,47 @@ def _targets(run: EccentricRun) -> dict[str, Any]:
     }
 
 
-def show_eccentric(run: EccentricRun, *, console: Console) -> None:
-    """Print a run: summary, amplitude over time, stages."""
-    console.print(Group(*_parts(run)))
-
-
-def _parts(run: EccentricRun) -> Iterable[RenderableType]:
-    yield Text(run.status, style="bold green" if run.settled else "bold yellow")
-    for warning in run.warnings:
-        yield Text(f"warning: {warning}", style="yellow")
-    yield _summary(run)
-    yield amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))
-    yield _stages(run)
-
-
-def _summary(run: EccentricRun) -> Table:
-    when = "-" if run.settling_time is None else f"{run.settling_time:.3f} s"
-    ratio = "-" if run.residual_ratio is None else f"{100 * run.residual_ratio:.3g} %"
-    rows = (
-        ("settling time", when),
-        ("amplitude at the end", length_text(run.final_amplitude)),
-        ("amplitude at worst", length_text(run.worst_amplitude)),
-        ("limit", length_text(run.limit)),
-        ("of the vibration without balancing", ratio),
-        ("imbalance", _imbalance(run)),
-        ("friction arms, +- standard deviation", _friction(run)),
-        ("masses at", "  ".join(f"{_degrees(angle)} deg" for angle in run.mass_angle[:, -1])),
-        ("electrical energy", f"{run.electrical_energy:.4g} J"),
+def eccentric_rows(run: EccentricRun) -> Rows:
+    """Quantities, findings and stages of a run."""
+    remedies = (
+        Finding(code="masses_remedy", values={"text": each.text}, change=dict(each.changes))
+        for each in run.remedies
     )
-    return two_columns(rows)
-
-
-def _imbalance(run: EccentricRun) -> str:
-    x, y = run.estimates.imbalance[-1]
-    deviation = math.sqrt(float(np.max(np.linalg.eigvalsh(run.imbalance_covariance))))
-    phase = _degrees(math.atan2(y, x))
-    return f"{math.hypot(x, y):.4g} kg m at {phase} deg, standard deviation {deviation:.2g} kg m"
-
-
-def _friction(run: EccentricRun) -> str:
-    arms, variances = run.estimates.friction_arm[-1], run.estimates.friction_variance[-1]
-    return "  ".join(
-        f"{length_text(arm)} +- {length_text(math.sqrt(variance))}"
-        for arm, variance in zip(arms, variances, strict=True)
+    at = np.searchsorted(run.time, [stage.end for stage in run.stages])
+    stages = [
+        (stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", given(float(amplitude), "m", digits=4))
+        for stage, amplitude in zip(run.stages, run.amplitude[at], strict=True)
+    ]
+    return Rows(
+        title=f"Run of {run.scene} ({run.source}), eccentric masses",
+        quantities=tuple(_quantities(run)),
+        findings=(run.ended, *remedies, *run.warned),
+        facts=(("amplitude (log)", amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))),),
+        tables=(Table(caption="Stages", heads=("stage", "from, s", "to, s", "amplitude"), rows=stages),),
     )
 
 
-def _stages(run: EccentricRun) -> Table:
-    table = Table(title="stages", title_justify="left")
-    for name, side in (("stage", "left"), ("from, s", "right"), ("to, s", "right"), ("amplitude", "right")):
-        table.add_column(name, justify="right" if side == "right" else "left")
-    for stage in run.stages:
-        end = run.amplitude[np.searchsorted(run.time, stage.end)]
-        table.add_row(stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", length_text(float(end)))
-    return table
-
-
-def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle) % 360:.2f}"
+def _quantities(run: EccentricRun) -> Iterator[Quantity]:
+    x, y = (float(each) for each in run.estimates.imbalance[-1])
+    width = NORMAL_95 * math.sqrt(float(np.max(np.linalg.eigvalsh(run.imbalance_covariance))))
+    size = math.hypot(x, y)
+    rows: list[tuple[str, str, str, float | None, float]] = [
+        ("settling_time", "settling time", "s", run.settling_time, 0.0),
+        ("final_amplitude", "amplitude at the end", "m", run.final_amplitude, 0.0),
+        ("worst_amplitude", "amplitude at worst", "m", run.worst_amplitude, 0.0),
+        ("limit", "limit", "m", run.limit, 0.0),
+        ("residual_ratio", "of the vibration without balancing", "1", run.residual_ratio, 0.0),
+        ("imbalance", "imbalance", "kg m", size, width),
+        ("imbalance_angle", "angle of the imbalance", "rad", math.atan2(y, x) % math.tau, 0.0),
+        ("energy", "electrical energy", "J", run.electrical_energy, 0.0),
+    ]
+    for number, arm in enumerate(run.estimates.friction_arm[-1], start=1):
+        wide = NORMAL_95 * math.sqrt(run.estimates.friction_variance[-1][number - 1])
+        rows.append((f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), wide))
+    for number, angle in enumerate(run.mass_angle[:, -1], start=1):
+        place = float(angle) % math.tau
+        rows.append((f"mass_angle_{number}", f"mass {number} at", "rad", place, 0.0))
+    for key, name, unit, value, half in rows:
+        low, high = (None, None) if value is None else around(value, half)
+        origin = "given" if key == "limit" else "simulated"
+        yield Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, origin=origin)

@@ -18,6 +18,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings, believed_whirl
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
+from ringbalance.results.findings import Finding
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 
@@ -58,8 +59,14 @@ def simulate_eccentric(
         outcome=outcome,
         settled=settled,
         settling_time=facts.settling_time if settled else None,
-        status=facts.status(remedies),
-        warnings=(*found_beforehand(scene, friction_known=facts.friction_known), *facts.warnings),
+        ended=facts.ended,
+        warned=(
+            *(
+                Finding(code="masses_beforehand", values={"text": text})
+                for text in found_beforehand(scene, friction_known=facts.friction_known)
+            ),
+            *facts.warnings,
+        ),
         remedies=remedies,
         innovation=innovation,
         limit=scene.supervisor.limit,

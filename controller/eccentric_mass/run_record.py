@@ -11,7 +11,8 @@ import numpy as np
 from ringbalance.controller import deferred
 from ringbalance.controller.eccentric_mass.run_loop import Record
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets
-from ringbalance.results.result import CommandResult
+from ringbalance.results.findings import Finding
+from ringbalance.results.result import DeferredResult
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 
 _NOTHING: Final = 1e-6
@@ -62,12 +63,12 @@ class StageSpan:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class EccentricRun(CommandResult):
+class EccentricRun(DeferredResult):
     """One run of the whole strategy on the plant."""
 
     _deferred: ClassVar[Any] = deferred
     _document: ClassVar[str] = "eccentric_document"
-    _summary: ClassVar[str] = "eccentric_lines"
+    _rows: ClassVar[str] = "eccentric_rows"
 
     balancer: str
     """ "eccentric_mass"."""
@@ -82,9 +83,10 @@ class EccentricRun(CommandResult):
     """Whether the amplitude ends at or below the limit and stays there."""
     settling_time: float | None
     """s, from which on the amplitude stays at or below the limit; None when not settled."""
-    status: str
-    """How the run ended and what to do next."""
-    warnings: tuple[str, ...]
+    ended: Finding
+    """How the run ended."""
+    warned: tuple[Finding, ...]
+    """What the user should know although the run continued."""
     remedies: tuple[Remedy, ...]
     """Each by itself, the likeliest first; empty for a settled run, and where no single value will do."""
     innovation: float | None
@@ -118,6 +120,20 @@ class EccentricRun(CommandResult):
     """For the imbalance as it was estimated; None when it never came to that."""
     unbalanced_amplitude: float
     """Steady amplitude that the masses' first places would give at the last speed, m."""
+
+    @property
+    def status(self) -> str:
+        """How the run ended and what to do next."""
+        return ": ".join([self.ended.text, *self._advice])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know, as sentences."""
+        return tuple(each.text for each in self.warned)
+
+    @property
+    def _advice(self) -> list[str]:
+        return [", or ".join(remedy.text for remedy in self.remedies)] if self.remedies else []
 
     @property
     def amplitude(self) -> FloatArray:

@@ -10,9 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from ringbalance.controller import deferred
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
@@ -22,7 +19,10 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, 
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
-from ringbalance.results.result import CommandResult
+from ringbalance.results.findings import Finding
+from ringbalance.results.result import DeferredResult, Rows
+from ringbalance.results.rows import Quantity
+from ringbalance.results.table import Table
 
 RUNS: Final = 40
 FIRST_RUNS: Final = 16
@@ -45,12 +45,12 @@ class _EccentricSettling:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class EccentricTuning(CommandResult):
+class EccentricTuning(DeferredResult):
     """What is recommended for the drives of eccentric masses."""
 
     _deferred: ClassVar[Any] = deferred
     _document: ClassVar[str] = "eccentric_tuning_document"
-    _summary: ClassVar[str] = "eccentric_tuning_lines"
+    _rows: ClassVar[str] = "eccentric_tuning_rows"
 
     scene: EccentricScene
     """As given."""
@@ -203,6 +203,7 @@ def eccentric_tuning_document(tuning: EccentricTuning) -> dict[str, Any]:
         "tuned": dict(tuning.tuned),
         "drawn": [each.quantity for each in scene.uncertainty],
         **_settling_document(tuning.settling),
+        **tuning.rows().document(),
     }
 
 
@@ -220,36 +221,38 @@ def _settling_document(settling: _EccentricSettling | None) -> dict[str, Any]:
     }
 
 
-def show_eccentric_tuning(tuning: EccentricTuning, console: Console) -> None:
-    """Print the loops of a scene's drives, and the settling times."""
-    console.print(Text(tuning.status, style=f"bold {'green' if tuning.succeeded else 'yellow'}"))
-    table = Table()
-    for name in (
-        "loop",
-        "key",
-        "value",
-        "recommended, at most",
-        "unit",
-        "largest pole",
-        "voltage hold, at most",
-    ):
-        table.add_column(name)
-    for loop in tuning.gains.loops:
-        table.add_row(
+def eccentric_tuning_rows(tuning: EccentricTuning) -> Rows:
+    """The loops of a scene's drives, and the settling times."""
+    scene, loops, settling = tuning.scene, tuning.gains.loops, tuning.settling
+    recommended = (
+        Quantity(key=loop.key, name=f"{loop.key}, at most", value=loop.recommended, unit=loop.unit or "1")
+        for loop in loops
+    )
+    hold = Quantity(key="voltage_hold", name="voltage hold, at most", unit="s", value=tuning.gains.step)
+    heads = ("loop", "key", "value", "at most", "unit", "largest pole", "hold, s")
+    rows = [
+        (
             loop.name,
             loop.key,
             f"{loop.value:.4g}",
             f"{loop.recommended:.4g}",
             loop.unit,
             f"{loop.radius:.4f}",
-            f"{loop.recommended_step:.4g} s",
+            f"{loop.recommended_step:.4g}",
         )
-    console.print(table)
-    if tuning.settling is not None:
-        _show_settling(tuning, tuning.settling, console)
-
-
-def _show_settling(tuning: EccentricTuning, settling: _EccentricSettling, console: Console) -> None:
-    drawn = ", ".join(each.quantity for each in tuning.scene.uncertainty) or "nothing, the scene states none"
-    for name, value in (settling.times.rows(settling.span) | {"drawn from their uncertainty": drawn}).items():
-        console.print(f"{name}: {value}")
+        for loop in loops
+    ]
+    drawn = ", ".join(each.quantity for each in scene.uncertainty) or "nothing, the scene states none"
+    return Rows(
+        title=f"Tuning of {scene.name} ({scene.source}), eccentric masses",
+        quantities=(*recommended, hold, *(() if settling is None else settling.times.quantities())),
+        findings=(
+            Finding(
+                code="tuned" if tuning.succeeded else "not_tuned",
+                values={"text": tuning.status},
+                change=dict(tuning.tuned),
+            ),
+        ),
+        facts=() if settling is None else (("drawn from their uncertainty", drawn),),
+        tables=(Table(caption="Loops of the drives", heads=heads, rows=rows),),
+    )

@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from rich.console import Console
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.balancer import (
@@ -25,10 +24,10 @@ from ringbalance.controller.balancer import (
     vibrating,
     with_settings,
 )
-from ringbalance.controller.document import show, simulation_history
+from ringbalance.controller.document import simulation_history
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
-from ringbalance.controller.line_runs import line_runs, line_runs_text
+from ringbalance.controller.line_runs import line_runs, line_runs_table
 from ringbalance.controller.liquid_ring.motion import gives_forces
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
@@ -38,15 +37,14 @@ from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.search import recommended
 from ringbalance.controller.tuning.settling import drawn_run
 from ringbalance.controller.tuning.tune import Tuning, tune
-from ringbalance.controller.tuning.view import show_tuning
 from ringbalance.reduced_model.calibration import calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.completing import completed_model, lacking
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.model import BalancerModel, completed_model, lacking
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
 from ringbalance.results.findings import Finding
+from ringbalance.results.result import Rows
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
@@ -265,15 +263,11 @@ class LiquidRingBalancer:
         """See `Balancer`."""
         return tune(self.scene, self.model, progress=progress)
 
-    def show(self, run: Simulation, console: Console) -> None:
+    def rows(self, run: Simulation) -> Rows:
         """See `Balancer`."""
-        show(run, console=console)
-        if at_ends := line_runs(self.scene, self.model):
-            console.print(line_runs_text(at_ends), highlight=False, markup=False)
-
-    def show_recommendation(self, recommendation: Tuning, console: Console) -> None:
-        """See `Balancer`."""
-        show_tuning(recommendation, console)
+        rows = run.rows()
+        at_ends = line_runs_table(line_runs(self.scene, self.model))
+        return replace(rows, tables=(at_ends, *rows.tables))
 
     def history(self, run: Simulation) -> Mapping[str, Sequence[Any]]:
         """See `Balancer`."""

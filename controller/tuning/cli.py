@@ -44,5 +44,5 @@ def tune(
     if json:
         print(json_format.dumps(found.to_dict(), allow_nan=False))
     else:
-        balancer.show_recommendation(found, results_console())
+        results_console().print(found.rows().view())
     return TUNED if found.succeeded else NOT_TUNED

@@ -19,13 +19,17 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, pair_changes
+from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.algorithms.target_vector import TargetVector
+from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
 from ringbalance.controller.liquid_ring.reach import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,
     starting_pressure,
 )
+from ringbalance.controller.loop_records import RUN
+from ringbalance.controller.moment_table import MomentTable
+from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio, stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
@@ -144,15 +148,13 @@ def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     ends = np.array([scene.disc.initial_fill, lowest, highest])
     now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)
     pairs = scene.disc.chambers // 2
-    changes = pair_changes(
-        wanted=-scene.rotor.initial_unbalance,
-        bounds=[(float(low - now), float(high - now))] * pairs,
-    )
+    run, axes = np.zeros(1, dtype=RUN), chamber_directions(scene.disc.chambers)[:pairs]
+    run["least"], run["most"] = low - now, high - now
+    split_change(-scene.rotor.initial_unbalance, run[0], axes, pairs)
+    table = MomentTable.of(model=model, total=total)
     fills = [
-        fill_for_moment(
-            moment=model.moment, wanted=float(now) + change, total=total, lowest=lowest, highest=highest
-        )
-        for change in changes
+        fill_for_moment(table.nodes, table.lowest, table.step, float(now) + change, lowest, highest)
+        for change in run["change"][0, :pairs].tolist()
     ]
     return np.asarray(np.clip(np.array(fills), lowest, highest), dtype=np.float64)
 

@@ -18,9 +18,9 @@ from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_gas
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.holding import Holding
-from ringbalance.reduced_model.operating.residual import Drawing, stalled_fill_ratio
+from ringbalance.reduced_model.operating.residual import Drawing, Holding, stalled_fill_ratio
 from ringbalance.results.findings import Finding
+from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
@@ -75,14 +75,30 @@ class SettlingTimes:
         """A fraction of the runs as their number, which claims nothing finer."""
         return f"{round(fraction * self.runs)} of {self.runs} runs"
 
-    def rows(self, limit: float) -> dict[str, str]:
-        """As a person reads them; `limit` is the time that each run had, s."""
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The fraction of runs that settle with its interval, and when half and 95 % have."""
+        names = {"p50": "50 % of runs settle within", "p95": "95 % of runs settle within"}
         times = (
-            f"{name[1:]} % of runs {f'within {time:.3g} s' if time is not None else 'not reached'}"
+            Quantity(
+                key=f"settling_time_{name}",
+                name=names[name],
+                unit="s",
+                value=time,
+                origin="simulated",
+                status="ok" if time is not None else "not_reached",
+                digits=3,
+            )
             for name, time in self.quantiles.items()
         )
-        settled = f"{self.told(self.settled.value)} within {limit:.4g} s"
-        return {"settling time": ", ".join(times), "settled": settled}
+        fraction = Quantity(
+            key="fraction_settled",
+            name="fraction of runs that settle",
+            value=self.settled.value,
+            lower=self.settled.low,
+            upper=self.settled.high,
+            origin="simulated",
+        )
+        return (*times, fraction, Quantity(key="runs", name="runs", value=self.runs, origin="simulated"))
 
 
 def settling_times(

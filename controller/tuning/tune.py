@@ -38,7 +38,7 @@ from ringbalance.reduced_model.chamber.gravity import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.terms import ModelUsed, neglected_in_injections
-from ringbalance.results.result import CommandResult
+from ringbalance.results.result import DeferredResult
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.models import Scene
@@ -46,12 +46,12 @@ from ringbalance.scene.narrowing import AnyScene
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Tuning(CommandResult):
+class Tuning(DeferredResult):
     """What is recommended for a scene's controller under a law."""
 
     _deferred: ClassVar[Any] = deferred
     _document: ClassVar[str] = "tuning_document"
-    _summary: ClassVar[str] = "tuning_lines"
+    _rows: ClassVar[str] = "tuning_rows"
 
     scene: Scene
     """With what is recommended."""
@@ -267,6 +267,7 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "left_out": [],
         "neglected": asdict(neglected_in_injections(tuning.models_used)),
         "models_used": [asdict(used) for used in tuning.models_used],
+        **tuning.rows().document(),
     }
 
 

@@ -1,82 +1,90 @@
-"""A tuning of a liquid ring for a person."""
+"""A tuning of a liquid ring as rows."""
 
 from __future__ import annotations
 
-import math
-
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
+from collections.abc import Iterator
 
 from ringbalance.controller.tuning.tune import Tuning
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.terms import neglected_in_injections
-from ringbalance.results.render import two_columns
-
-_UM = 1e6
-
-
-def show_tuning(tuning: Tuning, console: Console) -> None:
-    """Print what is recommended, the margins and the settling times."""
-    console.print(Text(tuning.status, style=f"bold {'green' if tuning.succeeded else 'yellow'}"))
-    warning = line_warning(tuning.gas_line)
-    # Runs that settle with the scene's own line have shown what its smallest correction left open.
-    if warning and not tuning.reachable:
-        console.print(Text(warning, style="yellow"))
-    console.print(two_columns(_rows(tuning).items()))
-    parts = Table(title="uncertainty of the loop factor (95 %)", title_justify="left")
-    for name in ("part", "relative", "from"):
-        parts.add_column(name)
-    for part in tuning.contributions:
-        parts.add_row(part.name, f"{100 * part.uncertainty:.2g} %", part.source)
-    console.print(parts)
+from ringbalance.results.findings import Finding
+from ringbalance.results.numbers import percent
+from ringbalance.results.result import Rows
+from ringbalance.results.rows import Quantity
+from ringbalance.results.table import Table
+from ringbalance.scene.arrays import finite
 
 
-def _rows(tuning: Tuning) -> dict[str, str]:
-    settings, loop, margins = tuning.scene.controller, tuning.loop, tuning.margins
-    rows = {"flow law": tuning.law, "algorithm": settings.kind.replace("_", " ")}
-    if tuning.gain is not None:
-        rows["recommended gain"] = f"{tuning.gain / _UM:.4g} s/um (controller.proportional)"
-    if loop.value is not None:
-        rows["loop factor"] = f"{loop.value:.3g} of at most {loop.limit:.3g}"
-    if tuning.present.value is not None:
-        rows["loop factor of the scene"] = f"{tuning.present.value:.3g}"
-    if loop.deviation is not None:
-        rows["noise leaves"] = f"{loop.deviation * _UM:.4g} um, limit {settings.limit * _UM:.4g} um"
-    if margins is not None:
-        rows["margins"] = (
-            f"gain x {margins.gain_factor:.3g}, phase {math.degrees(margins.phase):.3g} deg; together (disk) "
-            f"gain x {margins.disk_gain_factor:.3g}, phase {math.degrees(margins.disk_phase):.3g} deg"
-        )
-        rows["left at the edge of the uncertainty"] = (
-            f"gain x {margins.left_gain_factor:.3g}, phase {math.degrees(margins.left_phase):.3g} deg"
-        )
-    if tuning.first_gas_time is not None and tuning.last_gas_time is not None:
-        rows["valve-open times"] = (
-            f"{tuning.first_gas_time:.3g} s at first, {tuning.last_gas_time * 1e3:.3g} ms at the limit; the "
-            f"valve's shortest is {settings.minimum_gas_time * 1e3:.3g} ms"
-        )
+def tuning_rows(tuning: Tuning) -> Rows:
+    """What is recommended, the margins, and the settling times."""
+    scene = tuning.scene
+    facts = [("flow law", tuning.law), ("algorithm", scene.controller.kind.replace("_", " "))]
     if tuning.change:
-        rows["recommended beside the gain"] = tuning.change
-    if tuning.dead_times:
-        low, high = min(tuning.dead_times), max(tuning.dead_times)
-        rows["dead time of the valves"] = (
-            f"{low * 1e3:.3g} to {high * 1e3:.3g} ms; no injection moves liquid up to "
-            f"{tuning.dead_zone * _UM:.3g} um"
-        )
-    rows["smallest correction, ideal valve"] = f"{tuning.smallest_correction * _UM:.4g} um"
-    rows["gas line"] = line_text(tuning.gas_line)
-    rows["neglected"] = neglected_in_injections(tuning.models_used).text
-    return rows | _settling(tuning) | _tried(tuning)
+        facts.append(("recommended beside the gain", tuning.change))
+    facts.append(("gas line", line_text(tuning.gas_line)))
+    facts.append(("neglected", neglected_in_injections(tuning.models_used).text))
+    parts = [(part.name, percent(part.uncertainty), part.source) for part in tuning.contributions]
+    tried = tuning.search.tried if tuning.search else ()
+    return Rows(
+        title=f"Tuning of {scene.name} ({scene.source}), {tuning.law} law, {scene.controller.kind}",
+        quantities=tuple(_quantities(tuning)),
+        findings=tuple(_findings(tuning)),
+        facts=facts,
+        tables=(
+            Table(
+                caption="Tried",
+                heads=("change", "settled"),
+                rows=[(row.change, f"{round(row.settled * row.runs)} of {row.runs} runs") for row in tried],
+            ),
+            Table(
+                caption="Uncertainty of the loop factor (95 %)",
+                heads=("part", "relative", "from"),
+                rows=parts,
+            ),
+        ),
+    )
 
 
-def _tried(tuning: Tuning) -> dict[str, str]:
-    rows = tuning.search.tried if tuning.search else ()
-    return {
-        f"tried {place}": f"{row.change}: {round(row.settled * row.runs)} of {row.runs} runs"
-        for place, row in enumerate(rows, start=1)
-    }
+def _findings(tuning: Tuning) -> Iterator[Finding]:
+    change = {} if tuning.gain is None else {"controller.proportional": tuning.gain}
+    code = "tuned" if tuning.succeeded else "not_tuned"
+    yield Finding(code=code, values={"text": tuning.status}, change=change)
+    # Runs that settle with the scene's own line have shown what its smallest correction left open.
+    if (warning := line_warning(tuning.gas_line)) and not tuning.reachable:
+        yield Finding(code="gas_line", values={"text": warning})
 
 
-def _settling(tuning: Tuning) -> dict[str, str]:
-    return {} if tuning.settling is None else tuning.settling.rows(tuning.scene.run.time_limit)
+def _quantities(tuning: Tuning) -> Iterator[Quantity]:
+    settings, loop, margins = tuning.scene.controller, tuning.loop, tuning.margins
+    dead = tuning.dead_times
+    rows: list[tuple[str, str, str, float | None]] = [
+        ("gain", "recommended controller.proportional", "s/m", tuning.gain),
+        ("loop_factor", "loop factor", "1", loop.value),
+        ("loop_factor_limit", "loop factor, at most", "1", loop.limit),
+        ("present_loop_factor", "loop factor of the scene", "1", tuning.present.value),
+        ("stationary_deviation", "standard deviation that noise leaves", "m", finite(loop.deviation)),
+        ("limit", "limit", "m", settings.limit),
+        ("first_gas_time", "valve-open time at first", "s", tuning.first_gas_time),
+        ("last_gas_time", "valve-open time at the limit", "s", tuning.last_gas_time),
+        ("minimum_gas_time", "shortest valve-open time", "s", settings.minimum_gas_time),
+        ("dead_time_min", "dead time of the valves, least", "s", min(dead, default=None)),
+        ("dead_time_max", "dead time of the valves, most", "s", max(dead, default=None)),
+        ("dead_zone", "no injection moves liquid up to", "m", tuning.dead_zone),
+        ("smallest_correction", "smallest correction, ideal valve", "m", tuning.smallest_correction),
+    ]
+    if margins is not None:
+        rows += [
+            ("gain_margin", "gain margin, factor", "1", finite(margins.gain_factor)),
+            ("phase_margin", "phase margin", "rad", margins.phase),
+            ("disk_gain_margin", "disk margin, factor", "1", finite(margins.disk_gain_factor)),
+            ("disk_phase_margin", "disk margin, phase", "rad", margins.disk_phase),
+            ("left_gain_margin", "gain margin left, factor", "1", finite(margins.left_gain_factor)),
+            ("left_phase_margin", "phase margin left", "rad", margins.left_phase),
+        ]
+    given = {"limit", "minimum_gas_time"}
+    for key, name, unit, value in rows:
+        if value is not None:
+            origin = "given" if key in given else "computed"
+            yield Quantity(key=key, name=name, unit=unit, value=value, origin=origin, digits=3)
+    if tuning.settling is not None:
+        yield from tuning.settling.quantities()

@@ -26,7 +26,7 @@ from ringbalance.identification.data.measurements import Observations
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.holding import Holding
+from ringbalance.reduced_model.operating.residual import Holding
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene

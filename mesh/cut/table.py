@@ -13,10 +13,11 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline, PPoly
 
 from ringbalance.mesh.cut.integrals import COLUMNS, LONGEST, gauss, integrals, walls_about
 from ringbalance.mesh.cut.patches import split_patches, wall_patches
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry, Stretch
 
 TOLERANCE: Final = 1e-9
@@ -66,9 +67,16 @@ class ChamberTable:
         """Columns and their derivatives by L, each of shape (4, ...); held beyond the ends."""
         level = np.asarray(levels, dtype=np.float64)
         held = np.clip(level, self.nodes[0], self.nodes[-1])
-        cell = np.clip(np.searchsorted(self.nodes, held, side="right") - 1, 0, self.nodes.size - 2)
-        values, slopes = _hermite(self.nodes, self.columns, cell, held)
-        return np.where(held >= self.nodes[-1] * _EMPTY, 0.0, values), slopes
+        values, slopes = self._pieces(held), self._slopes(held)
+        return np.where(held >= self.nodes[-1] * _EMPTY, 0.0, values), np.asarray(slopes)
+
+    @cached_property
+    def _pieces(self) -> CubicHermiteSpline:
+        return _hermite(self.nodes, self.columns)
+
+    @cached_property
+    def _slopes(self) -> PPoly:
+        return self._pieces.derivative()
 
     def at_radius(self, radius: npt.ArrayLike, column: int) -> FloatArray:
         """One column for a concentric surface, the shape of `radius`."""
@@ -112,18 +120,9 @@ class ChamberTable:
 _NEWTON_STEPS: Final = 60
 
 
-def _hermite(
-    nodes: FloatArray, columns: FloatArray, cell: IntArray, at: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Values and slopes at places in cells. Args: `columns`: values and, behind them, slopes at the nodes."""
-    first, last = columns[:, cell], columns[:, cell + 1]
-    width = nodes[cell + 1] - nodes[cell]
-    t, half = (at - nodes[cell]) / width, len(columns) // 2
-    low, d0, d1 = first[:half], width * first[half:], width * last[half:]
-    rise = last[:half] - low
-    c2, c3 = 3 * rise - 2 * d0 - d1, d0 + d1 - 2 * rise
-    value = low + t * (d0 + t * (c2 + t * c3))
-    return np.asarray(value), np.asarray((d0 + t * (2 * c2 + t * 3 * c3)) / width)
+def _hermite(nodes: FloatArray, columns: FloatArray) -> CubicHermiteSpline:
+    """Args: `columns`: values and, behind them, slopes at the nodes."""
+    return CubicHermiteSpline(nodes, *np.split(columns, 2), axis=1)
 
 
 @lru_cache(maxsize=32)
@@ -178,7 +177,8 @@ def _refined(
             break
         middle = (nodes[cell] + nodes[cell + 1]) / 2
         result = exact(middle)
-        guess = np.concatenate(_hermite(nodes, columns, cell, middle))
+        pieces = _hermite(nodes, columns)
+        guess = np.concatenate([pieces(middle), pieces(middle, 1)])
         error[:, cell] = np.abs(result - guess)
         nodes = np.insert(nodes, cell + 1, middle)
         columns = np.insert(columns, cell + 1, result, axis=1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,8 @@ _SHALLOWEST = 1e-10
 _AVERAGING = 1e-8
 """Left-over harmonics in the mean over a turn, relative; decides the number of samples."""
 _EPSILON = float(np.finfo(np.float64).eps)
+_CANCELLED = MappingProxyType({2: 20.0, 3: 1000.0})
+"""Rounding of a film's coordinates, by dimension, over eps R2/depth."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,11 +270,12 @@ class _Case:
     def rounding_bound(self, *, fill_ratio: float, samples: Sequence[Sample]) -> FloatArray:
         """Bound of the rounding in every column of `Sample.values` on the finest mesh.
 
-        eps [4 R2/depth + 0.2 max(nodes along the depth, depth over the nodes' distance along the arc)^2],
+        eps [c R2/depth + 0.2 max(nodes along the depth, depth over the nodes' distance along the arc)^2],
         plus the rounding of a found surface, times the natural size of the column.
         Returns: Bound in the unit of each column, shape (5,); zero for an empty chamber, which is exact.
-        Source: coordinates of a film cancel, and narrow cells make the matrix stiff; the factors are five to
-            ten times what was seen against closed forms between 1 and 180 degrees and depths down to 10 nm.
+        Source: coordinates of a film cancel (c = 20, in three dimensions 1000: a hexahedron's polynomials
+            have large coefficients), and narrow cells make the matrix stiff; the factors are five to ten
+            times what was seen against closed forms between 1 and 180 degrees and depths down to 10 nm.
         """
         if fill_ratio == 0:
             return np.zeros(WIDTH)
@@ -280,7 +284,8 @@ class _Case:
         depth, arc = disc.outer_radius - a, 2 * a * float(half_angle(disc=disc, radius=a))
         stiffness = max(2 * cells[0], 2 * cells[1] * depth / arc) ** 2
         moved = max(sample.rounding for sample in samples)
-        relative = _EPSILON * (4 * disc.outer_radius / depth + 0.2 * stiffness) + moved
+        cancelled = _CANCELLED[len(cells)] * disc.outer_radius / depth
+        relative = _EPSILON * (cancelled + 0.2 * stiffness) + moved
         return relative * _natural_size(case=self, fill_ratio=fill_ratio)
 
     def stated_widths(

@@ -166,7 +166,8 @@ class Drawing:
     """For an HTML page that defines the colour variables."""
     alt: str
     """What the figure shows, in a sentence, for those who cannot see it."""
-    caption: str
+    caption: str = ""
+    """Where the template has none."""
     wide: bool = False
     """Whether it takes the page's whole width."""
 
@@ -295,7 +296,7 @@ def draw(
     name: str,
     paint: Draw,
     alt: str,
-    caption: str,
+    caption: str = "",
     x: str = "",
     y: str = "",
     columns: int = 2,

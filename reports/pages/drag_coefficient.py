@@ -13,11 +13,9 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reports.figures.drag_coefficient import drag_figures
-from ringbalance.reports.prose import series
-from ringbalance.reports.section import Cells, Record, Section, Table, Work
-from ringbalance.reports.studies.drag_map import BORES, ApparentDrag, DragMap, LiquidVerdicts
+from ringbalance.reports.section import Record, Section, Work
+from ringbalance.reports.studies.drag_map import ApparentDrag, DragMap, LiquidVerdicts
 from ringbalance.reports.studies.drag_point import DragPoint
-from ringbalance.results.numbers import MISSING, given, measured, percent, shown
 
 _SAME_POINT: Final = 1e-6
 """Relative difference of two velocities of one operating point: rounding."""
@@ -36,7 +34,10 @@ def _collect(work: Work) -> Record:
         "contours": {
             name: _contour(found, apparent=apparent) for name, apparent in (("k", False), ("apparent", True))
         },
-        "liquids": _with_budget(_liquid_records(verdicts), work.calibration),
+        "liquids": [
+            record | {"verdict": verdict_on_fifty(record)}
+            for record in _with_budget(_liquid_records(verdicts), work.calibration)
+        ],
         "apparent": _apparent(work.calibration),
     }
 
@@ -144,6 +145,7 @@ def _apparent(calibration: Calibration) -> Record | None:
     return {
         "velocity_m_s": _rounded(speed),
         "velocity_of_50_m_s": fifty,
+        "hides_paper": bool(min(read.separated) < paper.PAPER_DRAG_COEFFICIENT < max(read.separated)),
         "pressure_of_50_Pa": (paper.PAPER_DRAG_COEFFICIENT + 1) * law.density * fifty**2 / 2,
         "siphon": _rounded(read.siphon),
         "separated": _rounded(read.separated),
@@ -165,101 +167,8 @@ def verdict_on_fifty(record: Record) -> str:
     return "too low" if gap > 0 else "too high"
 
 
-LIQUID_HEADS: Final = (
-    *("Liquid", "Viscosity", "Density\nkg/m³", "Gas", "The tube runs", "Velocity", "k"),
-    *("Eq. 18\nreads", "Eq. 19\nis off by"),
-)
-
-
-def liquid_cells(record: Record) -> Cells:
-    """One liquid under LIQUID_HEADS, and the verdict on k = 50; a star: not under the scene's gas."""
-    runs = record["runs"]
-    star = "" if record["starts_at_scene_pressure"] else "*"
-    return (
-        record["name"],
-        shown(record["kinematic_viscosity_m2_s"], "m^2/s", digits=3),
-        f"{record['density_kg_m3']:.0f}",
-        f"{given(record['gas_pressure_Pa'], 'Pa', digits=3)}{star}",
-        f"{record['regime']}, {record['flow_state']}" if runs else "nothing flows",
-        shown(record["velocity_m_s"], "m/s", record["velocity_uncertainty"]) if runs else MISSING,
-        measured(record["k"], record["k_uncertainty"]) if runs else MISSING,
-        measured(record["apparent_k"], None, digits=3) if runs else MISSING,
-        percent(record["velocity_error"], signed=True, digits=2) if runs else MISSING,
-        verdict_on_fifty(record),
-    )
-
-
-def _bore(record: Record) -> str:
-    bore = record["bore_for_paper_m"]
-    return shown(bore, "m", digits=3) if bore else _outside(record)
-
-
-def _outside(record: Record) -> str:
-    """No bore of the map gives k = 50: this says on which side it lies."""
-    if not record["runs"]:
-        return MISSING
-    low, high = (given(bore, "m") for bore in BORES)
-    return f"below {low}" if record["k"] < paper.PAPER_DRAG_COEFFICIENT else f"none up to {high}"
-
-
-def _view(found: Record, evidence: Record) -> Record:
-    apparent = found["apparent"]
-    paper_k = given(evidence["paper"]["drag_coefficient"], "1")
-    needs = [
-        f"{r['name']} needs {shown(r['starting_pressure_Pa'], 'Pa', digits=2)}"
-        for r in found["liquids"]
-        if not r["starts_at_scene_pressure"]
-    ]
-    return {
-        "paper_k": paper_k,
-        "lead": _lead(found["liquids"]),
-        "table": _table(found, paper_k),
-        "needs": ", ".join(needs),
-        "decreed": given(found["decreed_k"], "1") if found["decreed_k"] is not None else "",
-        "gas": given(found["map"]["gas_pressure_Pa"], "Pa"),
-        **drag_figures(found),
-        "hidden": _hidden(apparent) if apparent else "",
-    }
-
-
-def _table(found: Record, paper_k: str) -> Table:
-    return Table(
-        caption=f"The known liquids in this tube of {given(found['bore_m'], 'm')} bore, primed, at equal "
-        "fills; a slow, viscous liquid that only spills over the crest moves more slowly than this. The "
-        f"error of Eq. 19 is that of its velocity with k = {paper_k}. ± is the expanded uncertainty (95 %) "
-        "at the operating point, which moves with k itself.",
-        heads=(*LIQUID_HEADS, f"{paper_k} is", f"Bore for\nk = {paper_k}"),
-        rows=[(*liquid_cells(record), _bore(record)) for record in found["liquids"]],
-        style="dense",
-    )
-
-
-def _hidden(apparent: Record) -> str:
-    """Where a separated column would be taken for the paper's number."""
-    readings = apparent["separated"]
-    if not min(readings) < paper.PAPER_DRAG_COEFFICIENT < max(readings):
-        return ""
-    speed = shown(apparent["velocity_of_50_m_s"], "m/s", digits=2)
-    pressure = shown(apparent["pressure_of_50_Pa"], "Pa", digits=2)
-    return (
-        f"In this tube a column separated at {speed}, under {pressure}, would read as 50 whatever its own k."
-    )
-
-
-def _lead(liquids: list[Record]) -> str:
-    groups: dict[str, list[str]] = {}
-    for record in liquids:
-        groups.setdefault(verdict_on_fifty(record), []).append(record["name"])
-    told = {
-        "right": "it is right, within what can be told, for {}",
-        "too high": "too high for {}, whose velocity Eq. 19 then makes too small",
-        "too low": "too low for {}, whose velocity it makes too large",
-        "nothing flows": "without meaning for {}, which do not flow here",
-    }
-    if set(groups) == {"nothing flows"}:
-        return "Under the scene’s gas pressure nothing flows in this tube, so no k can be given for it."
-    parts = [text.format(series(groups[name])) for name, text in told.items() if name in groups]
-    return f"In this tube, with k = 50: {'; '.join(parts)}."
+def _view(found: Record, _evidence: Record) -> Record:
+    return {**drag_figures(found)}
 
 
 SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, apart=True, show=_view)

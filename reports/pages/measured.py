@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.section import Record, Section, Table
-from ringbalance.results.numbers import MISSING, number, short
+from ringbalance.reports.section import Record, Section
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.describe import usual_name
 
@@ -26,33 +25,12 @@ def _show(_own: Record, evidence: Record) -> Record | None:
     found = evidence["scene"].get("measured")
     if not found:
         return None
-    parts: list[tuple[str, Any]] = [
-        ("lead", _lead(found)),
-        ("table", _files(found)),
-        ("table", _quantities(found)),
-        ("figure", _intervals(found)),
-    ]
-    if any(len(each["profile"]) > 2 for each in found["quantities"]):
-        parts.append(("figure", _profiles(found)))
-    if found["findings"]:
-        parts.append(("items", [_sentence(each["text"], found) for each in found["findings"]]))
-    return {"parts": parts}
-
-
-def _lead(found: Record) -> str:
-    rows = sum(each["rows"] for each in found["files"])
-    measured = [each for each in found["quantities"] if each["verdict"] == "identified"]
-    others = (
-        ""
-        if len(measured) == len(found["quantities"])
-        else "; the others have the values that go with a combination that the data identify, or with what "
-        "was known before"
-    )
-    return (
-        f"This scene was fitted to {rows} measurements. They identify {len(measured)} of "
-        f"{len(found['quantities'])} fitted quantities{others}. Every uncertainty stands by itself: how the "
-        "errors of two quantities go together is not in the results of this report."
-    )
+    profiled = any(len(each["profile"]) > 2 for each in found["quantities"])
+    return {
+        "intervals": _intervals(found),
+        "profiles": _profiles(found) if profiled else None,
+        "findings": [_sentence(each["text"], found) for each in found["findings"]],
+    }
 
 
 def _sentence(text: str, found: Record) -> str:
@@ -61,41 +39,6 @@ def _sentence(text: str, found: Record) -> str:
         if "_" in each["quantity"]:
             text = text.replace(each["quantity"], usual_name(each["quantity"]))
     return f"{text[0].upper()}{text[1:]}.".replace(" -", " \N{MINUS SIGN}")
-
-
-def _files(found: Record) -> Table:
-    return Table(
-        caption="Measurements. The hash (SHA-256) names the file’s bytes.",
-        heads=("File", "Kind", "Rows", "SHA-256"),
-        rows=[
-            (each["file"], each["kind"].replace("_", " "), str(each["rows"]), each["sha256"][:12])
-            for each in found["files"]
-        ],
-    )
-
-
-def _quantities(found: Record) -> Table:
-    return Table(
-        caption="Fitted quantities, with intervals (95 %) before and after the fit.",
-        heads=("Quantity", "Unit", "Before", "Interval before", "Fitted", "Interval", "Verdict"),
-        rows=[
-            (
-                usual_name(each["quantity"]),
-                MISSING if each["unit"] == "1" else each["unit"],
-                short(each["before"]),
-                _interval(each["before_low"], each["before_high"]),
-                number(each["value"]),
-                _interval(each["low"], each["high"]),
-                each["verdict"],
-            )
-            for each in found["quantities"]
-        ],
-        style="dense",
-    )
-
-
-def _interval(low: float | None, high: float | None) -> str:
-    return MISSING if low is None or high is None else f"{number(low)} to {number(high)}"
 
 
 def _intervals(found: Record) -> Drawing:
@@ -126,8 +69,6 @@ def _intervals(found: Record) -> Drawing:
         wide=True,
         height=1.2 + _ROW * len(quantities),
         alt="Intervals of the fitted quantities before and after the fit.",
-        caption="Intervals (95 %) before and after the fit, in half-widths of the one after; cut off at "
-        f"{short(_FAR)}. A point without a line had no interval.",
     )
 
 
@@ -166,12 +107,7 @@ def _profiles(found: Record) -> Drawing:
         height=3.0,
         columns=3,
         alt="Profiles of the likelihood of the fitted quantities.",
-        caption="Profiles: minus two log likelihood above its least, all other quantities fitted again, over "
-        "the rise that bounds the interval (line at 1). A parabola through 1 at distance 1 is a quantity "
-        "in which the model is linear.",
     )
 
 
-SECTION: Final = Section(
-    name="measured", title="Measurements and fit", show=_show, always=True, in_parts=True
-)
+SECTION: Final = Section(name="measured", title="Measurements and fit", show=_show, always=True)

@@ -17,8 +17,7 @@ from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.reports.figures.paper import paper_figures
-from ringbalance.reports.section import Record, Section, Table, Work
-from ringbalance.results.numbers import given, number, percent, short, shown
+from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.models import Scene
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.loops import AMPLITUDES, GAINS, PHASES, calibration_of, loop_scene, run_loop
@@ -35,14 +34,15 @@ def _collect(work: Work) -> Record:
     own = work.scene.values_sha256 == scene.values_sha256
     calibration = work.calibration if own else calibration_of(scene)
     model = paper_model(scene)
+    gains = [_run(run_loop(_alone(scene, gain)), gain) for gain in GAINS]
+    amplitudes = [_run(run_loop(loop_scene(scene, kind="target_vector", amplitude=a)), a) for a in AMPLITUDES]
     return {
         "constants": _constants(scene, model),
         "velocity": _velocities(scene, calibration),
         "trial": [_run(run_loop(loop_scene(scene, kind="trial", phase=phase)), phase) for phase in PHASES],
-        "gains": [_run(run_loop(_alone(scene, gain)), gain) for gain in GAINS],
-        "amplitudes": [
-            _run(run_loop(loop_scene(scene, kind="target_vector", amplitude=a)), a) for a in AMPLITUDES
-        ],
+        "gains": gains,
+        "amplitudes": amplitudes,
+        "results": _results(gains, amplitudes),
         "limit_m": scene.controller.limit,
         "reading": _reading(scene, model),
     }
@@ -147,6 +147,7 @@ def _reading(scene: Scene, model: BalancerModel) -> Record:
     return {
         "chamber_moment_eq_7_kg_m": paper_numbers.CHAMBER_MOMENT.value,
         "chamber_moment_literal_kg_m": paper.PAPER_LAMBDA * float(mass),
+        "chamber_moment_transferred_kg_m": paper.PAPER_LAMBDA * float(mass) / 2,
         "onset_transferred_s_per_m": onset(model),
         "onset_literal_s_per_m": onset(literal),
         "figure_8": {
@@ -170,130 +171,25 @@ def literal_moment(model: BalancerModel) -> PaperMoment:
 
 
 def _view(found: Record, _evidence: Record) -> Record:
-    """The section's tables and figures."""
+    return paper_figures(found)
+
+
+def _results(gains: list[Record], amplitudes: list[Record]) -> Record:
+    """What the paper says of Figs. 7 and 8, as it comes out here; None where no run is such."""
+    quiet = [run["of"] for run in gains if not run["overshoots"]]
+    loud = [run["of"] for run in gains if run["overshoots"]]
+    turns = [_turn(run["phase_rad"]) for run in gains if run["overshoots"]]
     return {
-        "constants": _constant_table(found["constants"]),
-        "results": _results(found),
-        "reading": _reading_text(found),
-        **paper_figures(found),
+        "largest_quiet_gain_s_per_m": max(quiet, default=None),
+        "smallest_overshoot_gain_s_per_m": min(loud, default=None),
+        "turn_rad": [min(turns), max(turns)] if turns else None,
+        "misadjustments_of_figure_8": sum(run["misadjustments"] for run in amplitudes),
     }
 
 
-def _constant_table(told: Record) -> Table:
-    rate = shown(told["rate_m_per_s"], "m", digits=3)
-    bore, influence = given(told["bore_m"], "m"), given(told["influence_coefficient"], "m/(kg m)")
-    steps = ", ".join(given(told[f"{name}_s"], "s") for name in ("first_trial", "long_step", "short_step"))
-    rows = (
-        (
-            "fall of the vibration per second of gas, equal fills",
-            f"{rate}/s",
-            f"fitted to Fig. 7, as one number: bore ({bore}) and influence coefficient ({influence}) are not "
-            "in the paper and enter through it alone",
-        ),
-        ("period from one operation to the next sample", given(told["period_s"], "s"), "fitted to Fig. 8"),
-        (
-            "first trial, long step, short step",
-            steps,
-            "assumed; long enough to be seen, short enough to end below the limit",
-        ),
-        (
-            "lag angle",
-            given(told["lag_angle_rad"], "rad"),
-            "assumed; the controller knows it, it turns the axes against the phases",
-        ),
-        (
-            "gas pressure, k, λ per transferred mass",
-            f"{given(told['gas_pressure_Pa'], 'Pa')}, {short(told['drag_coefficient'])}, "
-            f"{given(told['lambda_m'], 'm')}",
-            "the paper’s",
-        ),
-        (
-            "Kp, Ti and Td of Fig. 8",
-            f"{given(told['proportional_s_per_m'], 's/m')}, "
-            f"{short(told['integral_time_s'] / 60)} min, {short(told['derivative_time_s'] / 60)} min",
-            "the paper’s; seconds per micrometre is inferred",
-        ),
-    )
-    return Table(
-        caption="The constants behind the four figures.", heads=("Constant", "Value", "Origin"), rows=rows
-    )
-
-
-def _results(found: Record) -> Table:
-    velocity = found["velocity"]
-    printed, levels = (
-        " and ".join(percent(v[f"departure_{name}"], digits=3) for v in velocity)
-        for name in ("printed", "levels")
-    )
-    trial, gains, amplitudes = found["trial"], found["gains"], found["amplitudes"]
-    rises = [run["misadjustments"] for run in trial]
-    quiet = [run["of"] for run in gains if not run["overshoots"]]
-    loud = [run["of"] for run in gains if run["overshoots"]]
-    return Table(
-        caption="What the paper says of its figures, and what comes out here.",
-        heads=("Figure", "The paper", "Here"),
-        rows=(
-            ("Fig. 4", f"the velocity falls by {printed}", f"{levels} with the finite elements’ levels"),
-            (
-                "Fig. 6",
-                "below 0.05 µm in about 40 s at four phases, with misadjustment",
-                f"{_span(trial)}; {min(rises)} to {max(rises)} misadjustments",
-            ),
-            (
-                "Fig. 7",
-                "no overshoot up to Kp = 0.12, overshoot from 0.16, the phase then flips by 180°",
-                f"none up to {_gain(max(quiet, default=None))}, overshoot from "
-                f"{_gain(min(loud, default=None))}, where the phase turns by {_turn(gains)}",
-            ),
-            (
-                "Fig. 8",
-                "2 to 10 µm within 5 s, without misadjustment",
-                f"{_span(amplitudes)}; {sum(run['misadjustments'] for run in amplitudes)} misadjustments",
-            ),
-        ),
-    )
-
-
-def _span(runs: list[Record]) -> str:
-    times = [run["settling_time_s"] for run in runs if run["settled"]]
-    if len(times) < len(runs):
-        return f"{len(times)} of {len(runs)} settle"
-    return f"settled after {shown(min(times), 's', digits=2)} to {shown(max(times), 's', digits=2)}"
-
-
-def _gain(value: float | None) -> str:
-    return given(value, "s/m")
-
-
-def _turn(gains: list[Record]) -> str:
-    """Turn of the phase at the first sample after an overshoot, nearest to half a turn first."""
-    turns = []
-    for run in gains:
-        if run["overshoots"]:
-            phase = run["phase_rad"]
-            steps = (math.remainder(b - a, 2 * math.pi) for a, b in pairwise(phase))
-            turns.append(max(abs(step) for step in steps))
-    if not turns:
-        return "nothing"
-    low, high = (f"{number(math.degrees(t), digits=3)}" for t in (min(turns), max(turns)))
-    return f"{low}° to {high}°"
-
-
-def _reading_text(found: Record) -> list[str]:
-    told = found["reading"]
-    own, literal = (told["figure_8"][name] for name in ("transferred", "literal"))
-    onsets = (_gain(told[f"onset_{name}_s_per_m"]) for name in ("literal", "transferred"))
-    moments = [told[f"chamber_moment_{name}_kg_m"] for name in ("eq_7", "literal")]
-    eq_7, twice, once = (shown(m, "kg m", digits=4) for m in (*moments, moments[1] / 2))
-    return [
-        "The loop takes λ per transferred mass, half of Eq. 21’s difference. Taken literally, Eqs. 21 and 22 "
-        "make every operation twice as strong: with the same constants overshoot then begins at "
-        f"Kp = {next(onsets)} instead of {next(onsets)}; overshoots in the run of Fig. 8 from its largest "
-        f"amplitude: {literal['overshoots']} instead of {own['overshoots']}.",
-        "Figs. 6 to 8 cannot distinguish the two readings: with half the fitted fall per second of gas the "
-        f"literal reading has the very same runs. Eq. 7 can: it gives a full chamber {eq_7}, the literal "
-        f"reading {twice}, the reading per transferred mass {once}.",
-    ]
+def _turn(phase: list[float]) -> float:
+    """Largest turn of the phase from one sample to the next, rad: that of the overshoot."""
+    return max(abs(math.remainder(b - a, 2 * math.pi)) for a, b in pairwise(phase))
 
 
 SECTION: Final = Section(

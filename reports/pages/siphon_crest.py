@@ -13,8 +13,8 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.section import Cells, Record, Section, Table, Work
-from ringbalance.results.numbers import MISSING, given, shown
+from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.numbers import given, shown
 from ringbalance.scene.models import Scene
 
 _POINTS: Final = 161
@@ -43,7 +43,6 @@ def _path_figure(found: Record) -> Drawing:
         axes.set_ylim(low - 0.04 * (high - low), high)
         axes.annotate("hump", (hump, high), xytext=(5, -9), textcoords="offset points", color=style.MUTED)
 
-    told = "; ".join(f"{_told(state)}" for state in states)
     return draw(
         columns=3,
         x="path along the tube from the driven chamber in mm",
@@ -53,19 +52,7 @@ def _path_figure(found: Record) -> Drawing:
         wide=True,
         height=4.0,
         alt="Pressure along the tube: it falls towards the siphon crest and rises behind it; in the "
-        "separated regime "
-        "it stays at the cavity pressure behind the siphon crest until the tube is full again.",
-        caption=f"Pressure along the path, siphon crest at a radius of {given(found['hump_radius_m'], 'm')}: "
-        f"{told}. "
-        "Dotted: where gas or a cavity fills the bore. Steps: the ends and the bends. The bends are taken as "
-        "evenly spread, the legs as straight in radius.",
-    )
-
-
-def _told(state: Record) -> str:
-    return (
-        f"{state['regime']} at a fill ratio of {state['fill_ratio']:.2f} and "
-        f"{given(state['gas_pressure_Pa'], 'Pa', digits=3)}"
+        "separated regime it stays at the cavity pressure behind it until the tube is full again.",
     )
 
 
@@ -143,46 +130,21 @@ def _record(scene: Scene, law: CalibratedLaw, fill: float, pressure: float, prim
         "cavity_pressure_Pa": found.cavity_pressure,
         "margin_Pa": found.cavitation_margin,
         "margin_uncertainty_Pa": found.cavitation_margin_uncertainty,
+        "column": column_code(found.cavitation_margin, found.cavitation_margin_uncertainty),
     }
 
 
-def _judged(state: Record) -> str:
-    margin, width = state["margin_Pa"], state["margin_uncertainty_Pa"]
+def column_code(margin: float | None, width: float | None) -> str:
+    """What a full column does, by its margin and half-width, Pa: none, undecided, holds or separates."""
     if margin is None:
-        return MISSING
+        return "none"
     if width is not None and abs(margin) <= width:
-        return "cannot be told"
+        return "undecided"
     return "holds" if margin > 0 else "separates"
 
 
-def _row(state: Record) -> Cells:
-    return (
-        state["regime"],
-        f"{state['fill_ratio']:.3f}, {state['opposite_fill_ratio']:.3f}",
-        given(state["gas_pressure_Pa"], "Pa", digits=3),
-        shown(state["velocity_m_s"], "m/s", digits=3),
-        shown(state["hump_pressure_Pa"], "Pa", digits=3),
-        shown(state["cavity_pressure_Pa"], "Pa", digits=3),
-        shown(state["margin_Pa"], "Pa", state["margin_uncertainty_Pa"]),
-        _judged(state),
-    )
-
-
 def _view(found: Record, _evidence: Record) -> Record | None:
-    if not found["states"]:
-        return None
-    table = Table(
-        caption="The states drawn. The margin is that of a full siphon under the same conditions, with its "
-        "expanded uncertainty (95 %); within it the regime is undecided. A blocked tube’s margin is what a "
-        "primed one would have.",
-        heads=(
-            *("Regime", "Fill, driven\nand opposite", "Gas", "Velocity", "Pressure\nover the siphon crest"),
-            *("Cavity\npressure", "Margin of a siphon", "A full column"),
-        ),
-        rows=[_row(state) for state in found["states"]],
-        style="dense",
-    )
-    return {"table": table, "absent": " and ".join(found["absent"]), "figure": _path_figure(found)}
+    return {"figure": _path_figure(found)} if found["states"] else None
 
 
 SECTION: Final = Section(name="hump", title="Pressure over the siphon crest", collect=_collect, show=_view)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +15,8 @@ from ringbalance.physics.sloshing.response import sloshing_response
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.results.numbers import number, percent, short, shown
+from ringbalance.results.numbers import short
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 _MODES: Final = 4
@@ -57,17 +59,24 @@ def _waves(scene: Scene) -> Record:
         gravity=scene.environment.gravity,
         cells=_COARSE,
     )
+    ratios, swing = modes.frequency_ratio.value.T, answer.amplification.value[:-1]
+    depth = scene.disc.outer_radius - answer.surface_radius[:-1]
+    near = abs(ratios[0][-1] - 1) <= _NEAR
     return {
         "fill_ratio": fills[:-1].tolist(),
-        "frequency_ratio": modes.frequency_ratio.value.T.tolist(),
+        "avoid": to_avoid(ratios, fills[:-1], [mode for mode, _ in met], imported=imported),
+        "near_from_fill_ratio": nearing(fills[:-1], swing) if near else None,
+        "frequency_uncertainty": FREQUENCY_UNCERTAINTY,
+        "largest_wave_over_depth": float(np.max(answer.surface_amplitude_interval[:-1, 1] / depth)),
+        "frequency_ratio": ratios.tolist(),
         "frequency_ratio_uncertainty": modes.frequency_ratio.uncertainty.T.tolist(),
-        "amplification": answer.amplification.value[:-1].tolist(),
+        "amplification": swing.tolist(),
         "amplification_interval": answer.amplification_interval[:-1].tolist(),
         "pressure_amplification": answer.pressure_amplification.value[:-1].tolist(),
         "pressure_amplification_interval": answer.pressure_amplification_interval[:-1].tolist(),
         "surface_amplitude_m": answer.surface_amplitude.value[:-1].tolist(),
         "largest_surface_amplitude_m": answer.surface_amplitude_interval[:-1, 1].tolist(),
-        "depth_m": (scene.disc.outer_radius - answer.surface_radius[:-1]).tolist(),
+        "depth_m": depth.tolist(),
         "imported": imported,
         "resonant": [{"mode": mode, "fill_ratio": x} for mode, x in met],
         "equal": {
@@ -86,79 +95,29 @@ def _waves(scene: Scene) -> Record:
 
 
 def _view(found: Record, _evidence: Record) -> Record:
-    """Sentences and figures."""
-    if "left_out" in found:
-        text = found["left_out"]
-        return {"findings": [f"{text[0].upper()}{text[1:]}."]}
-    return {
-        "findings": [_equal(found), _avoid(found), *_reservation(found)],
-        "frequencies": _frequencies(found),
-        "swing": _swing(found),
-    }
+    return {} if "left_out" in found else {"frequencies": _frequencies(found), "swing": _swing(found)}
 
 
-def _equal(found: Record) -> str:
-    equal = found["equal"]
-    moment, pressure = (_with_ends(equal, key) for key in ("amplification", "pressure_amplification"))
-    return (
-        f"At equal fills gravity swings a chamber’s moment {moment} times as much as a surface that followed "
-        f"at once would, and the wall pressure {pressure} times: the Coriolis force on the "
-        "liquid that runs along the wall presses on it, however thin the ring. "
-        f"The surface moves by {shown(equal['surface_amplitude_m'], 'm', digits=2)} each way, once a turn. "
-        f"Gravity is {number(equal['tilt_ratio'], digits=2)} of the centrifugal acceleration there."
-    )
+def to_avoid(ratios: FloatArray, fills: FloatArray, met: Sequence[int], *, imported: bool) -> list[Record]:
+    """Fills between which a mode that gravity drives meets the speed, for what its frequency may be.
 
-
-def _with_ends(equal: Record, key: str) -> str:
-    """Such as "0.79 (0.63 to 1.0)", by what natural frequencies may be."""
-    ends = " to ".join(short(end, digits=2) for end in equal[f"{key}_interval"])
-    return f"{short(equal[key], digits=2)} ({ends})"
-
-
-def _avoid(found: Record) -> str:
-    fills, top = np.asarray(found["fill_ratio"]), found["frequency_ratio"][0][-1]
-    # Even modes of a sector hardly feel gravity, which pulls the whole chamber one way.
-    strong = [mode for mode in _meeting(found) if found["imported"] or mode % 2]
-    if not strong and abs(top - 1) > _NEAR:
-        return f"No mode that gravity can drive meets the speed up to a fill ratio of {short(fills[-1])}."
-    told = [f"{' to '.join(_within(found, mode))} (mode {mode})" for mode in strong]
-    near = (
-        [f"from about {short(_nearing(found), digits=2)} up, where the first mode comes near the speed"]
-        if abs(top - 1) <= _NEAR
-        else []
-    )
-    return (
-        f"Fills to pass quickly, at any speed: {', '.join([*told, *near])}; natural frequencies count as "
-        f"known to {percent(FREQUENCY_UNCERTAINTY)}, as measured ones differ."
-    )
-
-
-def _meeting(found: Record) -> list[int]:
-    """Modes that meet the speed, or may meet it for what their frequencies may be."""
-    met = {item["mode"] for item in found["resonant"]}
+    Even modes of a sector hardly feel gravity, which pulls the whole chamber one way.
+    Args: `ratios`: frequencies over the speed, a row a mode. `met`: modes that meet the speed by theory.
+    """
     low, high = _MEETING
-    ratios = enumerate(found["frequency_ratio"], start=1)
-    return sorted(met | {mode for mode, s in ratios if s[0] < high and s[-1] > low})
+    within = [
+        mode
+        for mode, row in enumerate(ratios, start=1)
+        if (mode in met or (row[0] < high and row[-1] > low)) and (imported or mode % 2)
+    ]
+    ends = {mode: np.interp(_MEETING, ratios[mode - 1], fills) for mode in within}
+    return [{"mode": mode, "from_fill_ratio": a, "to_fill_ratio": b} for mode, (a, b) in ends.items()]
 
 
-def _within(found: Record, mode: int) -> list[str]:
-    """Fills between which a mode may meet the speed."""
-    ends = np.interp(_MEETING, found["frequency_ratio"][mode - 1], found["fill_ratio"])
-    return [short(float(end), digits=2) for end in ends]
-
-
-def _nearing(found: Record) -> float:
+def nearing(fills: FloatArray, swing: FloatArray) -> float:
     """Fill from which the swing is more than twice that of a surface that follows at once."""
-    fills, swing = np.asarray(found["fill_ratio"]), np.asarray(found["amplification"])
-    high = np.flatnonzero(swing < 2)
-    return float(fills[min(int(high[-1]) + 1, fills.size - 1)]) if high.size else float(fills[0])
-
-
-def _reservation(found: Record) -> list[str]:
-    if found["status"]["code"] == "ok":
-        share = max(np.asarray(found["largest_surface_amplitude_m"]) / np.asarray(found["depth_m"]))
-        return [f"The waves stay within {percent(share, digits=2)} of the ring’s depth: small, as assumed."]
-    return [found["status"]["text"][0].upper() + found["status"]["text"][1:] + "."]
+    quiet = np.flatnonzero(swing < 2)
+    return float(fills[min(int(quiet[-1]) + 1, fills.size - 1)]) if quiet.size else float(fills[0])
 
 
 def _frequencies(found: Record) -> Drawing:
@@ -191,19 +150,7 @@ def _frequencies(found: Record) -> Drawing:
         name="sloshing-frequencies",
         paint=paint,
         alt=f"Natural frequencies over the speed rise with the fill; they meet gravity's once a turn: {met}.",
-        caption="Natural frequencies of the liquid in a chamber, seen in the disc, over the speed: the "
-        "lowest four modes. They scale with the speed, so a fill where one is 1 is resonant at every speed.",
     )
-
-
-def _quiet(found: Record) -> str:
-    """Which modes count for little."""
-    if found["imported"]:
-        return (
-            "; solved in the chamber’s middle section: waves along the shaft, which gravity hardly drives, "
-            "and a section that changes along it are left out, and a peak between two points may be missed"
-        )
-    return "; even modes hardly feel gravity"
 
 
 def _swing(found: Record) -> Drawing:
@@ -231,8 +178,6 @@ def _swing(found: Record) -> Drawing:
         paint=paint,
         alt="Swing of a chamber's moment and of its wall pressure under gravity over those of a surface "
         "which follows gravity at once.",
-        caption="What inertia and Coriolis force make of gravity’s pull, over a surface that follows at "
-        f"once. Dotted: fills at which a mode meets the speed{_quiet(found)}.",
     )
 
 

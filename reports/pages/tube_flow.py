@@ -16,7 +16,6 @@ from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.pages.cases import anchor, case_view
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.results.numbers import number, percent
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.flow_fields import EndFlow, SectionFlow
 
@@ -91,7 +90,6 @@ def _section_figure(record: Record) -> Drawing:
     field, psi = _unpacked(record, "colour"), _unpacked(record, "stream_function")
     drift = _unpacked(record, "velocity").reshape(2, -1)
     mesh = _triangulation(record, order=(1, 0))
-    strongest = float(np.hypot(*drift).max())
 
     def paint(axes: Axes) -> None:
         levels = _levels(field)
@@ -113,8 +111,6 @@ def _section_figure(record: Record) -> Drawing:
         _place(axes, 1.0, 1.0)
         _colour_bar(axes, levels, "axial, over the mean")
 
-    re, rotation = (number(record[key], digits=3) for key in ("reynolds", "rotation_reynolds"))
-    more = percent(record["friction_ratio"] - 1, signed=True, digits=2)
     return draw(
         x="z/d, along the axis of rotation",
         y="y/d",
@@ -124,9 +120,6 @@ def _section_figure(record: Record) -> Drawing:
         height=4.6,
         alt="Section of the turning tube: two mirrored vortices across the axial flow, whose peak they move "
         "towards one wall.",
-        caption=f"Developed laminar flow in the turning tube’s section, Re {re}, ωd²/ν {rotation}: axial "
-        "velocity in colour, in-plane streamlines; arrow: the way of the core. In-plane it is at most "
-        f"{percent(strongest, digits=2)} of the mean velocity, yet friction changes by {more}.",
     )
 
 
@@ -155,7 +148,6 @@ def _end_figure(record: Record, end: str) -> Drawing:
         _place(axes, right - left, 2 * reach)
         _colour_bar(axes, levels, "speed over the mean")
 
-    re = number(record["reynolds"], digits=3)
     what = {
         "entrance": "Streamlines converge from all sides at the sharp edge",
         "exit": "The stream leaves as a jet that takes its kinetic energy along",
@@ -168,7 +160,6 @@ def _end_figure(record: Record, end: str) -> Drawing:
         paint=paint,
         height=_BOTTOM + _TOP + (style.NARROW - _LEFT - 0.1) * 2 * reach / (right - left),
         alt=f"Laminar flow at the tube’s {end}: speed and streamlines. {what}.",
-        caption=f"The tube’s {end}, laminar at Re {re}: speed in colour, streamlines. {what}.",
     )
 
 
@@ -181,10 +172,12 @@ def _collect(work: Work) -> Record | None:
     reynolds = float(loss.reynolds)
     drawn = min(reynolds, _LARGEST)
     rotation = loss.rotation_reynolds * drawn / reynolds
+    laminar = bool(loss.flow_state == FlowState.LAMINAR)
     return {
+        "drawn": "not laminar" if not laminar else "as it is" if drawn == reynolds else "too fast",
         "reynolds": reynolds,
         "rotation_reynolds": loss.rotation_reynolds,
-        "laminar": bool(loss.flow_state == FlowState.LAMINAR),
+        "laminar": laminar,
         "section": _section_record(SectionFlow.of(reynolds=drawn, rotation_reynolds=rotation)),
         "entrance": _end_record(EndFlow.entrance(reynolds=drawn)),
         "exit": _end_record(EndFlow.exit(reynolds=drawn)),
@@ -204,6 +197,8 @@ def _section_record(flow: SectionFlow) -> Record:
         "reynolds": flow.reynolds,
         "rotation_reynolds": flow.rotation_reynolds,
         "friction_ratio": flow.friction_ratio,
+        "friction_change": flow.friction_ratio - 1,
+        "largest_drift": float(np.hypot(*flow.velocity).max()),
         "points": packed(flow.points),
         "triangles": " ".join(str(node) for node in flow.triangles.ravel()),
         "colour": packed(flow.axial_velocity),
@@ -223,26 +218,12 @@ def _end_record(flow: EndFlow) -> Record:
 
 
 def _view(found: Record, evidence: Record) -> Record:
-    """The section's texts and figures."""
+    ends = {name: _end_figure(found[name], name) for name in ("entrance", "exit")}
     return {
-        "lead": _lead(found),
         "section": _section_figure(found["section"]),
-        "ends": [_end_figure(found[name], name) for name in ("entrance", "exit")],
+        **ends,
         "check": three_dimensional_check(evidence),
     }
-
-
-def _lead(found: Record) -> str:
-    asked, drawn = found["reynolds"], found["section"]["reynolds"]
-    rotation = number(found["rotation_reynolds"], digits=3)
-    told = f"At the operating point Re is {number(asked, digits=3)} and ωd²/ν {rotation}"
-    if found["laminar"] and drawn > 0.999 * asked:
-        return f"{told}: laminar, and drawn as it is."
-    why = "so fast a laminar flow is thin layers" if found["laminar"] else "there the flow is not laminar"
-    return (
-        f"{told}; {why}. Drawn is laminar flow at Re {number(drawn, digits=3)} with the same ratio of "
-        "ωd²/ν to Re: the pattern, not the flow of this tube."
-    )
 
 
 def three_dimensional_check(evidence: Record) -> Record | None:

@@ -136,7 +136,7 @@ def _dynamics(scene: Scene, model: BalancerModel, notes: list[str]) -> Dynamics 
 
 
 def _gain(scene: Scene, model: BalancerModel, dynamics: Dynamics | None, notes: list[str]) -> LoopGain | None:
-    found = None if dynamics is None else loop_gain(scene, model, dynamics=dynamics)
+    found = None if dynamics is None else loop_gain(scene, model)
     if found is None and dynamics is not None:
         notes.append(f"{model.name}: the gas drives no flow at equal fills, so the loop has no gain")
     return found

@@ -64,7 +64,7 @@ def test_the_third_balancer_is_tuned_and_compared(balls: BallScene) -> None:
     assert tuned.recommended_scene.balancer == "ball"
     paper = load_scene(bundled_scene("liquid_ring_paper"))
     ring = balancer_of(paper.with_values({"run.time_limit": "2 s"}), flow_law="paper")
-    found = compare(balancer_of(balls), ring, runs=1).document()
+    found = compare(balancer_of(balls), ring, runs=1).to_dict()
     assert found["balancer"] == ["ball", "liquid_ring"]
     assert found["settled"][0]
     assert found["rotor"]["unbalance_kg_m"] == pytest.approx([80e-6, 0.0])

@@ -12,7 +12,6 @@ import pytest
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Balancer, CommonRotor, balancer_of, takes
 from ringbalance.controller.compare import compare
-from ringbalance.controller.compare_cli import _tuned_text
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
@@ -149,7 +148,7 @@ def test_two_liquid_rings(paper_scene: Scene) -> None:
         sensor=replace(paper_scene.sensor, amplitude_noise=0.0, phase_noise=0.0),
         run=replace(paper_scene.run, time_limit=20.0),
     )
-    found = compare(under_paper_law(quiet), under_paper_law(quiet), runs=1).document()
+    found = compare(under_paper_law(quiet), under_paper_law(quiet), runs=1).to_dict()
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert {"scenes", "time_s", "residual_ratio", "energy_J", "worst_amplitude_m"} <= set(found)
     for key in ("time_s", "residual_ratio", "energy_J", "worst_amplitude_m", "settled"):
@@ -179,15 +178,15 @@ def test_a_comparison_has_both_tuned_over_one_span_and_several_seeds(
     assert ring.tuned == {"controller.proportional": gain}
     assert set(masses.tuned) == {"friction_filter.speed_gain", "friction_filter.drive_speed"}
     assert told.friction_filter.speed_gain < 2.0
-    assert _tuned_text(ring) == f'controller.proportional = "{1e-6 * gain:.4g} s/um"'
+    assert ring.tuned_text == f'controller.proportional = "{1e-6 * gain:.4g} s/um"'
     speed = f'"{told.friction_filter.drive_speed * 30 / math.pi:.4g} rpm"'
-    assert f"friction_filter.drive_speed = {speed}" in _tuned_text(masses)
+    assert f"friction_filter.drive_speed = {speed}" in masses.tuned_text
     low, high = ring.ends("energy")
     assert low <= ring.middle("energy") <= high
     assert low < high
     # The first injections, of a second, fill at least the 33.8 ml that a full chamber leaves, to 0.7 MPa.
     assert low > 2 * 0.801325e6 * 33.8e-6 * math.log(0.801325 / 0.101325)
-    document = found.document()
+    document = found.to_dict()
     assert document["runs"] == [2, 2]
     assert document["spread"][0]["energy_J"] == [low, high]
     json.dumps(document, allow_nan=False)

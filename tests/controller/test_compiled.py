@@ -11,8 +11,8 @@ from typing import Any, cast
 
 import numpy as np
 
+from ringbalance.controller import compiled_loop, moment_table
 from ringbalance.controller.compilation.compiled import compiled, compiled_sources
-from ringbalance.controller.ensemble import compiled_disc, compiled_motion, compiled_noise, compiled_sample
 
 
 def _sum_of_sines(values: np.ndarray[Any, np.dtype[np.float64]], factor: float) -> float:
@@ -67,12 +67,7 @@ PROGRAM = """
 import numba
 from numba.core import config
 from ringbalance.controller.compilation.compiled import compiled, compiled_sources
-from ringbalance.controller.ensemble import (
-    compiled_disc,
-    compiled_motion,
-    compiled_noise,
-    compiled_sample,
-)
+from ringbalance.controller import compiled_loop
 before = config.CACHE_DIR
 def twice(x):
     return 2 * x
@@ -98,7 +93,7 @@ def _run(tmp_path: Path, **more: str) -> str:
 
 
 def test_every_compiled_functions_source_tells_stale_code() -> None:
-    modules = (compiled_disc, compiled_motion, compiled_noise, compiled_sample)
+    modules = (compiled_loop, moment_table)
     functions = [
         one.py_func for module in modules for one in vars(module).values() if hasattr(one, "py_func")
     ]
@@ -111,11 +106,11 @@ def test_compiled_functions_are_kept_in_the_users_folder(tmp_path: Path) -> None
     home = tmp_path / "kept"
     folder = _run(tmp_path, NUMBA_CACHE_DIR=str(home))
     assert folder.startswith(str(home / "ringbalance"))
-    assert list(home.rglob("*.nbi")), "nothing was kept"
+    assert list(home.rglob("*.nbc")), "nothing was kept"
 
 
 def test_a_folder_that_cannot_be_written_is_no_obstacle(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     _run(tmp_path, NUMBA_CACHE_DIR=str(blocked))
-    assert not list(tmp_path.rglob("*.nbi")), "nor may another folder take its place"
+    assert not list(tmp_path.rglob("*.nbc")), "nor may another folder take its place"

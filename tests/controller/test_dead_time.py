@@ -157,7 +157,7 @@ def test_the_law_based_algorithm_does_not_count_on_the_offset(scene: Scene, mode
     for offset in (None, (0.2,)):
         algorithm = law_based_of(with_settings(scene, kind="law_based", gas_time_offset=offset), model)
         state, _ = algorithm.step(algorithm.start(), first)
-        expected.append(algorithm.step(state, second)[0].disc.fills())
+        expected.append(algorithm.step(state, second)[0].liquid["state"][:, 0])
     assert expected[0] == pytest.approx(expected[1])
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -16,15 +16,12 @@ from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
-from ringbalance.controller.algorithms.law_based import (
-    LawBased,
-    _InfluenceEstimate,
-    fill_for_moment,
-    pair_changes,
-)
+from ringbalance.controller.algorithms.law_based import LawBased, learnt
+from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
 from ringbalance.controller.liquid_ring.motion import PairState
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.loop_records import MOMENT_NODES, RUN
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -106,13 +103,24 @@ def test_the_papers_gas_time_by_hand(model: BalancerModel, ring_of: RingOf) -> N
 def test_the_fill_for_a_moment_goes_on_straight_beyond_the_ends() -> None:
     moment = PaperMoment(moment_per_transferred_mass=0.072, density=1000.0, chamber_volume=6e-5)
     per_fill = 0.072 * 1000.0 * 6e-5
+    fills = np.linspace(0.0, 0.5, MOMENT_NODES)
+    values = moment.pair_vector(fill_ratio=fills, opposite_fill_ratio=0.5 - fills)
+    nodes = np.stack([values, np.gradient(values)], axis=1)
     for x in (-0.2, 0.0, 0.1, 0.25, 0.5, 0.6):
         wanted = per_fill * (x - 0.25)
-        found = fill_for_moment(moment=moment, wanted=wanted, total=0.5, lowest=0.0, highest=0.5)
+        found = fill_for_moment(nodes, 0.0, 0.5 / (MOMENT_NODES - 1), wanted, 0.0, 0.5)
         assert found == pytest.approx(x, abs=1e-10)
 
 
 # --- pairs ---
+
+
+def pair_changes(*, wanted: complex, bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:
+    """What `split_change` asks of each pair, kg m."""
+    run, half = np.zeros(1, dtype=RUN), len(bounds)
+    run["least"][0, :half], run["most"][0, :half] = np.transpose(bounds)
+    split_change(wanted, run[0], np.array(chamber_directions(2 * half)[:half]), half)
+    return tuple(run["change"][0, :half].tolist())
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
@@ -155,13 +163,17 @@ def test_what_no_pair_can_give_is_asked_of_those_at_their_ends() -> None:
 # --- the influence coefficient ---
 
 
-def learn(*, k: complex, seen: complex, noise: float, standard_deviation: float = 0.0) -> _InfluenceEstimate:
-    return _InfluenceEstimate(value=k, variance=abs(0.5 * k) ** 2).updated(
-        moment_change=2e-4 + 1e-4j,
-        vibration_change=seen * (2e-4 + 1e-4j),
-        noise_variance=noise,
-        law_standard_deviation=standard_deviation,
-        assumed_magnitude=abs(k),
+class Estimate(NamedTuple):
+    value: complex
+    variance: float
+
+
+def learn(*, k: complex, seen: complex, noise: float, standard_deviation: float = 0.0) -> Estimate:
+    moment = 2e-4 + 1e-4j
+    return Estimate(
+        *learnt(
+            complex(k), abs(0.5 * k) ** 2, moment, complex(seen) * moment, noise, standard_deviation, abs(k)
+        )
     )
 
 
@@ -190,17 +202,12 @@ def test_the_estimate_stays_within_a_decade_and_goes_on_following() -> None:
 
 def test_the_average_of_many_noisy_responses_is_the_coefficient() -> None:
     random = np.random.default_rng(3)
-    true, estimate = 1.3 * K * cmath.exp(0.4j), _InfluenceEstimate(value=K, variance=abs(0.5 * K) ** 2)
+    true, estimate = 1.3 * K * cmath.exp(0.4j), Estimate(K, abs(0.5 * K) ** 2)
     for _ in range(400):
         change = complex(*random.standard_normal(2)) * 1e-4
         noise = complex(*random.standard_normal(2)) * 1e-6
-        estimate = estimate.updated(
-            moment_change=change,
-            vibration_change=true * change + noise,
-            noise_variance=2e-12,
-            law_standard_deviation=0.0,
-            assumed_magnitude=abs(K),
-        )
+        seen = true * change + noise
+        estimate = Estimate(*learnt(*estimate, change, seen, 2e-12, 0.0, abs(K)))
     assert abs(estimate.value / true - 1) < 0.06
     # The filter's own account of its error: sigma^2/sum |dU|^2.
     assert estimate.variance == pytest.approx(2e-12 / (400 * 2e-8), rel=0.15)

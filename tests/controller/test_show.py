@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from ringbalance.controller.document import _sparkline, show
+from ringbalance.controller.document import _sparkline
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene
@@ -17,7 +17,7 @@ from ringbalance.scene.models import Scene
 
 def printed(scene: Scene, model: BalancerModel) -> str:
     stream = io.StringIO()
-    show(simulate(scene, model), console=Console(file=stream, width=110))
+    Console(file=stream, width=110).print(simulate(scene, model).rows().view())
     return stream.getvalue()
 
 

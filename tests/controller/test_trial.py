@@ -7,9 +7,11 @@ import math
 import pytest
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.trial import Trial, _TrialState
+from ringbalance.controller.algorithms.built_in import Memory
+from ringbalance.controller.algorithms.trial import Trial
 
 TRIAL = Trial(
+    chambers=4,
     sequence=(0, 2, 1, 3),
     limit=0.05e-6,
     first_trial=0.05,
@@ -29,6 +31,14 @@ def run(amplitudes: list[float]) -> list[tuple[int, float] | None]:
         state, command = TRIAL.step(state, seen)
         answers.append((command.valves[0].chamber, command.valves[0].duration) if command.valves else None)
     return answers
+
+
+def tried(amplitudes: tuple[float, ...]) -> Memory:
+    """The state after some amplitudes, m."""
+    state = TRIAL.start()
+    for index, amplitude in enumerate(amplitudes):
+        state, _ = TRIAL.step(state, Measurement(time=float(index), amplitude=amplitude, phase=0.0))
+    return state
 
 
 def test_a_rise_moves_on_and_a_fall_stays() -> None:
@@ -57,17 +67,16 @@ def test_steps_are_short_near_the_goal_first_trials_too() -> None:
 
 
 def test_it_rests_at_the_limit_and_keeps_its_chamber() -> None:
-    state = _TrialState(position=2, previous=1e-7)
+    state = tried((1e-6, 2e-6, 3e-6))
     state, command = TRIAL.step(state, Measurement(time=0.0, amplitude=0.05e-6, phase=0.0))
     assert command == Command(resting=True)
-    assert state == _TrialState(position=2)
     _, again = TRIAL.step(state, Measurement(time=1.0, amplitude=0.2e-6, phase=0.0))
     assert (again.valves[0].chamber, again.valves[0].duration) == (1, 0.01)
 
 
 @pytest.mark.parametrize("bad", [None, Measurement(time=1.0, amplitude=math.nan, phase=0.0)])
 def test_a_bad_sample_holds_everything(bad: Measurement | None) -> None:
-    state = _TrialState(position=1, previous=1e-6)
+    state = tried((1e-6, 2e-6))
     held, command = TRIAL.step(state, bad)
     assert held is state
     assert command.valves == ()

@@ -48,10 +48,14 @@ def test_a_fraction_of_the_runs_is_printed_no_finer_than_their_number(count: int
         settled=Probability.counted(count=count, of=runs),
         quantiles={"p50": 1.0, "p95": None},
     )
-    assert times.rows(60.0) == {
-        "settling time": "50 % of runs within 1 s, 95 % of runs not reached",
-        "settled": f"{count} of {runs} runs within 60 s",
-    }
+    assert times.told(count / runs) == f"{count} of {runs} runs"
+    half, slow, fraction, number = times.quantities()
+    assert (half.value, half.status) == (1.0, "ok")
+    assert (slow.value, slow.status) == (None, "not_reached")
+    assert (fraction.value, number.value) == (count / runs, runs)
+    assert fraction.lower is not None
+    assert fraction.upper is not None
+    assert fraction.lower < count / runs <= fraction.upper
 
 
 def test_runs_that_need_more_moment_than_the_disc_has_are_counted_and_named(scene: Scene) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from ringbalance.controller.compilation.compiled import code_root
+from ringbalance.controller.compilation.cache import code_root
 from ringbalance.scene import bundled_scene
 
 pytestmark = pytest.mark.faults
@@ -76,7 +76,7 @@ FUNCTIONS = ("doubled", "paired")
 
 
 def _kept(path: Path) -> list[Path]:
-    return sorted(p for p in path.rglob("*") if p.suffix in {".nbi", ".nbc"})
+    return sorted(p for p in path.rglob("*") if p.suffix == ".nbc")
 
 
 def _program(tmp_path: Path, text: str = PROGRAM) -> list[str]:
@@ -101,7 +101,7 @@ DAMAGE = (
     + """
 import random, shutil
 from pathlib import Path
-from ringbalance.controller.compilation.compiled import code_root
+from ringbalance.controller.compilation.cache import code_root
 
 def flip(path):
     content = bytearray(path.read_bytes())
@@ -135,10 +135,9 @@ damages = {
 number = random.Random(12)
 assert misses() == 0
 for name, damage in damages.items():
-    for suffix in ("nbi", "nbc"):
-        damage(number.choice(sorted(p for p in code_root().rglob(f"*.{suffix}") if p.is_file())))
-        misses()
-        assert misses() == 0, (name, suffix)
+    damage(number.choice(sorted(p for p in code_root().rglob("*.nbc") if p.is_file())))
+    misses()
+    assert misses() == 0, name
 shutil.rmtree(code_root())
 assert misses() == 3 and misses() == 0
 """
@@ -269,7 +268,7 @@ def test_a_real_run_survives_a_damaged_cache_and_ctrl_c(tmp_path: Path) -> None:
     folder = tmp_path / "cache"
     shutil.copytree(code_root(), folder / "ringbalance")
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
-    for path in folder.rglob("run_loop.measure*.nbi"):
+    for path in folder.rglob("run_loop.measure*.nbc"):
         path.write_bytes(b"")
     again = subprocess.run(
         [*command, str(scene), "--json"], env=environment, capture_output=True, timeout=900, check=False

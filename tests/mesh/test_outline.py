@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ringbalance.mesh.geometry import liquid_area
-from ringbalance.mesh.outline import outlines
+from ringbalance.mesh.section import outlines
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 import pytest
+from golden_pages import page_text
 from matplotlib.figure import Figure
 
-from ringbalance.reports.render import render
+from ringbalance.reports.page import page_content
+from ringbalance.reports.render import render, render_pages
+from ringbalance.reports.sections import sections_of
 
 R1, R2, B, THETA, T = 0.0205, 0.0445, 0.062, math.pi / 2, 2.777e-3
 RHO, OMEGA, NU = 998.2, 10000 * math.pi / 30, 1.0e-6
@@ -330,6 +334,20 @@ def unwritten(monkeypatch: pytest.MonkeyPatch) -> None:
         buffer.write('<svg ><path d="M 0 0" /></svg>')
 
     monkeypatch.setattr(Figure, "savefig", savefig)
+
+
+@pytest.fixture
+def said(request: pytest.FixtureRequest) -> Callable[[dict[str, Any], str], str]:
+    """The text of one section's page, without the other sections."""
+    request.getfixturevalue("unwritten")
+
+    def text(evidence: dict[str, Any], name: str) -> str:
+        views = {s.name: s.view(evidence) if s.name == name else None for s in sections_of(evidence)}
+        content = page_content(evidence, sections_by=lambda _: views)
+        file = f"{content.context['sections'][0]['place']}.html"
+        return page_text(render_pages(content, documents=(file,))[file])
+
+    return text
 
 
 @pytest.fixture

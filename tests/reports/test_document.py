@@ -6,11 +6,15 @@ import csv
 import hashlib
 import io
 import json
+import re
 from pathlib import Path
 from typing import Any
 
-from ringbalance.reports.pages.document import NOMENCLATURE, SECTION, evidence_text
+import pytest
+
+from ringbalance.reports.pages.document import evidence_text, symbols_and_sources
 from ringbalance.reports.provenance import provenance
+from ringbalance.reports.render import render
 from ringbalance.reports.tables import LONG, csv_tables, is_long, table_file
 
 Record = dict[str, Any]
@@ -18,9 +22,9 @@ GLOSSARY = Path(__file__).resolve().parents[2] / "docs" / "glossary.md"
 
 
 def facts(evidence: Record) -> dict[str, str]:
-    view = SECTION.view(evidence)
-    assert view is not None
-    return dict(view["facts"])
+    page = render(evidence)["report.html"]
+    found = re.findall(r'<dt>([^<]+)</dt><dd class="hash">(.*?)</dd>', page, flags=re.DOTALL)
+    return {label: re.sub(r"<[^>]+>", "", text) for label, text in found}
 
 
 def test_symbols_are_those_of_the_glossary() -> None:
@@ -29,11 +33,13 @@ def test_symbols_are_those_of_the_glossary() -> None:
         for line in GLOSSARY.read_text(encoding="utf-8").splitlines()
         if line.startswith("|")
     ]
-    for symbols in NOMENCLATURE.values():
+    for balancer in ("liquid_ring", "eccentric_mass"):
+        symbols = symbols_and_sources()[balancer]["symbols"]
         assert len(symbols) > 5
         assert [entry for entry in symbols if (entry[2], entry[0], entry[1]) not in rows] == []
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_the_document_names_what_it_was_made_of(evidence: Record) -> None:
     told = facts(evidence)
     assert told["Commit"] == "0123456789abcdef"
@@ -44,6 +50,7 @@ def test_the_document_names_what_it_was_made_of(evidence: Record) -> None:
     assert facts(evidence)["Commit"].endswith("with local changes")
 
 
+@pytest.mark.usefixtures("unwritten")
 def test_kept_evidence_is_named_with_its_date_and_scene(evidence: Record) -> None:
     assert facts(evidence)["Kept evidence"].startswith("none")
     case = evidence["verification"][-1]

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from ringbalance.reports import extremes_cli
@@ -21,65 +22,30 @@ from ringbalance.verification.extremes.axes import places_of, varied
 Record = dict[str, Any]
 
 
-def waves(*, resonant: list[Record], top: float, code: str = "ok", text: str = "solved") -> Record:
-    return {
-        "fill_ratio": [0.1, 0.3, 0.5],
-        "frequency_ratio": [[0.3, 0.5, top], [0.8, 1.2, 1.5], [0.9, 1.1, 1.6]],
-        "amplification": [0.2, 1.0, 4.0],
-        "pressure_amplification": [3.1, 3.5, 6.0],
-        "surface_amplitude_m": [1e-6, 1e-6, 2e-6],
-        "largest_surface_amplitude_m": [2e-6, 2e-6, 4e-6],
-        "depth_m": [1e-3, 3e-3, 5e-3],
-        "resonant": resonant,
-        "imported": False,
-        "equal": {
-            "fill_ratio": 0.25,
-            "amplification": 0.8,
-            "pressure_amplification": 3.6,
-            "amplification_interval": [0.63, 1.02],
-            "pressure_amplification_interval": [3.1, 4.1],
-            "surface_amplitude_m": 1e-6,
-            "tilt_ratio": 2e-4,
-        },
-        "status": {"code": code, "text": text},
-    }
-
-
-def findings(record: Record) -> str:
-    view = sloshing.SECTION.view({"sloshing": record})
-    assert view is not None
-    return " ".join(view["findings"])
+def meeting(first: list[float], third: list[float], met: list[int]) -> Record:
+    """Fills at which mode 3 meets the speed, of three modes at three fills."""
+    ratios = np.array([first, [0.8, 1.2, 1.5], third])
+    fills = np.array([0.1, 0.3, 0.5])
+    avoided = {each["mode"]: each for each in sloshing.to_avoid(ratios, fills, met, imported=False)}
+    assert 2 not in avoided
+    return avoided.get(3, {})
 
 
 def test_fills_that_gravity_drives_are_named_and_others_are_not() -> None:
-    met = [{"mode": 2, "fill_ratio": 0.2}, {"mode": 3, "fill_ratio": 0.2}]
-    told = findings(waves(resonant=met, top=0.6))
+    found = meeting([0.3, 0.5, 0.6], [0.9, 1.1, 1.6], [2, 3])
     # A frequency known to 6 % meets the speed anywhere from 0.94 to 1.06 of it.
-    assert "0.14 to 0.26 (mode 3)" in told
-    assert "mode 2" not in told
-
-
-def test_a_first_mode_that_nears_the_speed_is_named() -> None:
-    assert "from about 0.5 up" in findings(waves(resonant=[], top=0.95))
-    assert "No mode" in findings(waves(resonant=[], top=0.6) | {"frequency_ratio": [[0.3, 0.5, 0.6]]})
+    assert (found["from_fill_ratio"], found["to_fill_ratio"]) == pytest.approx((0.14, 0.26), abs=0.01)
 
 
 def test_a_mode_that_only_may_meet_the_speed_is_named() -> None:
-    record = waves(resonant=[], top=0.6)
-    record["frequency_ratio"][2] = [0.7, 0.8, 0.97]
-    assert "0.47 to 0.5 (mode 3)" in findings(record)
+    found = meeting([0.3, 0.5, 0.6], [0.7, 0.8, 0.97], [])
+    assert (found["from_fill_ratio"], found["to_fill_ratio"]) == pytest.approx((0.47, 0.5), abs=0.005)
 
 
-def test_the_swing_of_the_pressure_is_reported_beside_that_of_the_moment() -> None:
-    told = findings(waves(resonant=[], top=0.6))
-    assert "0.8 (0.63 to 1" in told
-    assert "the wall pressure 3.6 (3.1 to 4.1) times" in told
-
-
-def test_waves_that_are_not_small_are_said() -> None:
-    assert "Avoid that fill" in findings(
-        waves(resonant=[], top=0.6, code="out_of_range", text="avoid that fill")
-    )
+def test_the_fill_at_which_the_swing_doubles_is_found() -> None:
+    fills = np.array([0.1, 0.3, 0.5])
+    assert sloshing.nearing(fills, np.array([0.2, 1.0, 4.0])) == 0.5
+    assert sloshing.nearing(fills, np.array([3.0, 3.0, 4.0])) == 0.1
 
 
 def test_no_gravity_no_waves(vertical_scene: Scene) -> None:

@@ -203,10 +203,14 @@ def test_no_result_is_typed_into_a_template() -> None:
     for item in files("ringbalance.reports").joinpath("templates").iterdir():
         if item.name.endswith(".html"):
             whole = re.sub(r"(?s)<(script|style)\b.*?</\1>", " ", item.read_text(encoding="utf-8"))
-            text = re.sub(r"\{[{%#].*?[}%#]\}|<[^>]+>", " ", whole)
-            numbers = re.findall(r"(?<!Eq\. )(?<!Fig\. )(?<![\w-])\d+(?:\.\d+)?(?![\w-])", text)
-            # The level of confidence and the numbers of dimensions are no results.
-            assert set(numbers) <= {"95", "3"}, (item.name, numbers)
+            # Quotations of the paper are marked as such.
+            whole = re.sub(r'(?s)<span class="printed">.*?</span>', " ", whole)
+            text = re.sub(r"(?s)\{[{%#].*?[}%#]\}|<[^>]+>", " ", whole)
+            # Nor are numbers of equations and figures, and the levels of a credibility assessment.
+            text = re.sub(r"(?:Eq|Fig)s?\. \d+(?: (?:and|to) \d+)?|\b\d ::", " ", text)
+            numbers = re.findall(r"(?<![\w-])\d+(?:\.\d+)?(?![\w-])", text)
+            # Levels of confidence and numbers of dimensions are no results.
+            assert set(numbers) <= {"95", "5", "3"}, (item.name, numbers)
 
 
 def test_every_verdict_is_a_word(pages: dict[str, str]) -> None:

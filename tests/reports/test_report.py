@@ -320,7 +320,7 @@ def test_exit_codes(
     finished = Report(
         page=tmp_path / "report.html", evidence=whole | {"closed_loop": loops, "verification": cases}
     )
-    monkeypatch.setattr(report_module, "write_report", lambda *_, **__: finished)
+    monkeypatch.setattr(cli, "write_report", lambda *_, **__: finished)
     assert cli.report(bundled_scene("liquid_ring_paper"), out=tmp_path) == code
     told = capsys.readouterr()
     assert told.out.strip() == str(finished.page)

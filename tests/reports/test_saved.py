@@ -15,7 +15,7 @@ from ringbalance.reports.saved import keep_cases, kept_cases, saved_cases
 def test_damaged_results_are_not_taken(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes
 ) -> None:
-    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
+    monkeypatch.setattr(saved_module, "code_root", lambda: tmp_path)
     assert kept_cases() == {}
     keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": saved_cases()[0]}})
     assert list(kept_cases()) == ["claim_01_volume"]
@@ -45,7 +45,7 @@ def test_results_of_another_form_are_not_taken(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes
 ) -> None:
     """Whole, with a checksum that holds, but nothing that a report could show."""
-    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
+    monkeypatch.setattr(saved_module, "code_root", lambda: tmp_path)
     keep_cases({})
     (path,) = tmp_path.iterdir()
     write_checked(path, content)
@@ -53,14 +53,12 @@ def test_results_of_another_form_are_not_taken(
     assert not path.exists()
 
 
-def test_results_of_another_program_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path)
+def test_results_of_another_program_are_not_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(saved_module, "code_root", lambda: tmp_path)
     monkeypatch.setattr(saved_module, "_program", lambda: "old")
     keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
     monkeypatch.setattr(saved_module, "_program", lambda: "new")
     assert kept_cases() == {}
-    keep_cases({})
-    assert [path.name for path in tmp_path.iterdir()] == ["cases-new.kept"]
 
 
 def test_another_file_of_the_program_or_package_counts_as_another_program(
@@ -78,6 +76,6 @@ def test_another_file_of_the_program_or_package_counts_as_another_program(
 
 def test_results_that_cannot_be_kept_cost_time_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("in the way")
-    monkeypatch.setattr(saved_module, "code_folder", lambda: tmp_path / "file")
+    monkeypatch.setattr(saved_module, "code_root", lambda: tmp_path / "file")
     keep_cases({"claim_01_volume": {"date": "2026-01-01", "record": {}}})
     assert kept_cases() == {}

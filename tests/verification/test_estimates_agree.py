@@ -52,7 +52,7 @@ def check_comparison(scene: Scene, calibration: Calibration) -> None:
     comparison = compare(ring, ring, runs=1)
     tuned = comparison.sides[0].scene
     assert isinstance(tuned, Scene)
-    assert comparison.document()["models_used"][0] == [asdict(used) for used in models_used(tuned)]
+    assert comparison.to_dict()["models_used"][0] == [asdict(used) for used in models_used(tuned)]
 
 
 @pytest.mark.parametrize("name", BUNDLED)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from scipy.integrate import solve_ivp
 
 from ball_balancer.scene_keys import BallScene
@@ -28,6 +27,9 @@ from ringbalance.controller.balancer import (
     with_settings,
 )
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
+from ringbalance.results.findings import Finding
+from ringbalance.results.result import Rows
+from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.uncertain import NORMAL_95
 
@@ -89,6 +91,10 @@ class BallTuning:
     def recommended_scene(self) -> BallScene:
         """With that drag."""
         return self.scene
+
+    def rows(self) -> Rows:
+        """Its status."""
+        return _rows(self.status, self.succeeded)
 
     def to_dict(self) -> dict[str, Any]:
         """As a JSON document in SI."""
@@ -220,17 +226,19 @@ class BallBalancer:
             found, key=lambda each: (each.times.settled.value, -(each.times.quantiles["p50"] or math.inf))
         )
 
-    def show(self, run: BallRun, console: Console) -> None:
-        """Print its status."""
-        console.print(run.status)
-
-    def show_recommendation(self, recommendation: BallTuning, console: Console) -> None:
-        """Print its status."""
-        console.print(recommendation.status)
+    def rows(self, run: BallRun) -> Rows:
+        """Its amplitude and how it ended."""
+        return _rows(run.status, run.settled, float(run.amplitude[-1]))
 
     def history(self, run: BallRun) -> Mapping[str, Sequence[Any]]:
         """Amplitude over time."""
         return {"time_s": run.time.tolist(), "amplitude_m": run.amplitude.tolist()}
+
+
+def _rows(status: str, settled: bool, amplitude: float | None = None) -> Rows:
+    found = Finding(code="tuned" if settled else "not_tuned", values={"text": status})
+    last = Quantity(key="final_amplitude", name="amplitude at the end", unit="m", value=amplitude)
+    return Rows(title="Two balls", quantities=(last,), findings=(found,))
 
 
 def _rolled(scene: BallScene) -> BallRun:

@@ -1,0 +1,255 @@
+"""The closed loop in plain numbers: sample, command, gas on, gas off, wait, sample again.
+
+One source for one run and for a thousand: runs are continued sample by sample, so that between two samples
+Python can look at a run, note its trace, or be its sensor and its algorithm.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy.typing as npt
+
+from ringbalance.controller.algorithms.law_based import law_based_step
+from ringbalance.controller.algorithms.target_vector import target_vector_step
+from ringbalance.controller.algorithms.trial import trial_step
+from ringbalance.controller.compilation.compiled import in_place
+from ringbalance.controller.compiled_stretch import (
+    keep_injections,
+    keep_instant,
+    limit_to_time,
+    look,
+    move,
+    note_stretch,
+    vibration,
+)
+from ringbalance.controller.formulas import (
+    NONE,
+    SAMPLES,
+    has_held,
+    has_risen,
+    has_turned,
+    stop_cause,
+)
+from ringbalance.controller.liquid_ring.compiled_events import rests, would_start
+from ringbalance.controller.liquid_ring.compiled_gas import gas_volume
+from ringbalance.controller.liquid_ring.records import P, X
+from ringbalance.controller.loop_records import (
+    LAW_BASED,
+    NO_PHASE,
+    OWN,
+    TAIL_POINTS,
+    TARGET_VECTOR,
+    TOO_SHORT,
+    TRIAL,
+    UNUSABLE,
+    USABLE,
+    Record,
+)
+from ringbalance.scene.arrays import FloatArray
+
+_has_held: Final = in_place(has_held)
+_has_risen: Final = in_place(has_risen)
+_has_turned: Final = in_place(has_turned)
+_stop_cause: Final = in_place(stop_cause)
+
+
+@in_place
+def continue_runs(
+    loop: Record,
+    plant: Record,
+    assumed: Record,
+    runs: Record,
+    motions: Record,
+    liquid: Record,
+    noise: npt.NDArray[Any],
+    instants: FloatArray,
+    injections: Record,
+    samples: Record,
+    notes: FloatArray,
+    w: FloatArray,
+) -> None:
+    """Continue each run by as many samples as there is noise for, unless it ends.
+
+    Args:
+        loop: of type `LOOP`. plant: of type `PLANT`; it is given each run's gas line. assumed: the same as
+            the law-based algorithm has it.
+        runs: of type `RUN`, shape (n,), changed.
+        motions, liquid: of type `MOTION`, shape (n, pairs), (n, pairs or 0): the pairs as they are and, with
+            one more, as the law-based algorithm believes them to be.
+        noise: of amplitude and phase in standard deviations, shape (n, samples, 2); without samples runs
+            begin.
+        instants, injections, samples: rows of the first run's trace (time and every pair's fill; `INJECTION`;
+            `SAMPLE`); none are kept where they have no rows.
+        notes: shape (2, 1 + pairs, points), room for the instants of a valve-open time and of a wait.
+        w: a workspace.
+    """
+    for i in range(runs.size):
+        run = runs[i]
+        plant.passing, plant.critical_ratio = run.gas_line[0], run.gas_line[1]
+        plant.dead_volume, plant.valve_lag = run.gas_line[2], run.gas_line[3]
+        if noise.shape[1] == 0:
+            _begin(loop, plant, run, motions[i], instants)
+        for k in range(noise.shape[1]):
+            if run.cause == NONE and run.samples >= loop.most_samples:
+                run.cause = SAMPLES
+            if run.cause != NONE:
+                break
+            run.samples += 1
+            if loop.sensed == 0:
+                _sense(loop, run, noise[i, k, 0], noise[i, k, 1])
+            if loop.algorithm != OWN:
+                _decide(loop, assumed, run, liquid[i], notes[0], w)
+            _watch(loop, run)
+            run.cause = _cause(loop, plant, run, motions[i])
+            _keep_sample(loop, run, samples)
+            if run.cause == NONE:
+                _act(loop, plant, run, motions[i], instants, injections, notes, w)
+
+
+@in_place
+def _begin(loop: Record, plant: Record, run: Record, motions: Record, instants: FloatArray) -> None:
+    """Level chambers, vented, no tube full."""
+    half, ambient, fill = loop.chambers // 2, plant.ambient_pressure, loop.initial_fill
+    for i in range(motions.size):
+        motion = motions[i]
+        y = motion.state
+        y[X], y[P], y[P + 1] = fill, ambient, ambient
+        y[P + 2] = ambient * gas_volume(plant, fill) / plant.temperature
+        y[P + 3] = ambient * gas_volume(plant, plant.total - fill) / plant.temperature
+        motion.opens, motion.closes, motion.log_speed = math.inf, math.inf, math.log(run.speed)
+        motion.length, motion.started, motion.residual = plant.first_step, fill, run.residual_fill
+        motion.fill_before, motion.least_fill = fill, fill
+    for i in range(half):
+        run.fill[i] = fill
+    lowest = max(0.0, plant.total - plant.max_fill_ratio)
+    run.floods = 1 if would_start(plant, (lowest, 0.0, ambient, ambient), False) != 0 else 0
+    run.vibration = vibration(loop, run)
+    run.amplitude = abs(run.vibration)
+    run.initial_amplitude, run.first_seen, run.last_seen = run.amplitude, math.nan, math.nan
+    run.last_phase, run.held_since = math.nan, math.inf
+    run.since = 0.0 if run.amplitude <= loop.limit else math.inf
+    keep_instant(loop, run, instants, 0.0)
+
+
+@in_place
+def _sense(loop: Record, run: Record, amplitude_noise: float, phase_noise: float) -> None:
+    """What a sensor shows; an amplitude that noise would make negative is folded back."""
+    run.seen_amplitude = abs(run.amplitude + loop.amplitude_noise * amplitude_noise)
+    run.seen_phase = math.atan2(run.vibration.imag, run.vibration.real) + loop.phase_noise * phase_noise
+    run.usable = USABLE
+
+
+@in_place
+def _decide(
+    loop: Record, assumed: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
+) -> None:
+    """One step of the algorithm on what the sensor shows."""
+    half, opened = loop.chambers // 2, False
+    for i in range(half):
+        run.asked[i] = 0.0
+    run.resting, run.reason = 0, 0
+    if run.usable < (NO_PHASE if loop.algorithm == TRIAL else USABLE):
+        run.reason = UNUSABLE
+        return
+    if loop.algorithm == TARGET_VECTOR:
+        target_vector_step(loop, run)
+    elif loop.algorithm == TRIAL:
+        trial_step(loop, run)
+    elif loop.algorithm == LAW_BASED:
+        law_based_step(loop, assumed, run, liquid, notes, w)
+    for i in range(half):
+        opened = opened or run.asked[i] > 0.0
+    run.reason = 0 if opened or run.resting > 0 else TOO_SHORT
+
+
+@in_place
+def _watch(loop: Record, run: Record) -> None:
+    """Count overshoots, rises in a row and misadjustments; a sample that shows nothing is passed over."""
+    if run.usable >= NO_PHASE:
+        if run.samples == 1:
+            run.first_seen = run.seen_amplitude
+        if run.operated > 0 and not math.isnan(run.last_seen):
+            higher = _has_risen(run.last_seen, run.seen_amplitude, loop.noise_floor)
+            run.rises = run.rises + 1 if higher else 0
+            run.misadjustments += 1 if higher else 0
+        run.last_seen, run.operated = run.seen_amplitude, 0
+    if run.usable == USABLE:
+        if run.seen_amplitude > loop.limit and not math.isnan(run.last_phase):
+            run.overshoots += 1 if _has_turned(run.last_phase, run.seen_phase) else 0
+        run.last_phase = run.seen_phase
+
+
+@in_place
+def _cause(loop: Record, plant: Record, run: Record, motions: Record) -> int:
+    """Why the loop stops cycling, if it does."""
+    held = run.cut == 0 and _has_held(run.time, run.since, loop.hold_time) and run.drains == 0
+    if held and run.held_since == math.inf:
+        run.held_since = run.since
+    ends = run.cut == 0 and loop.to_time_limit == 0 and run.resting > 0 and loop.exact > 0
+    return int(
+        _stop_cause(
+            held and run.stays > 0 and loop.to_time_limit == 0,
+            run.rises,
+            loop.rises_tolerated,
+            _has_risen(run.first_seen, run.last_seen, loop.noise_floor),
+            run.idle,
+            loop.idle_tolerated,
+            ends and _rests(loop, plant, run, motions),
+            loop.time_limit - run.time,
+        )
+    )
+
+
+@in_place
+def _rests(loop: Record, plant: Record, run: Record, motions: Record) -> bool:
+    """Whether no liquid can move until a valve is commanded to open."""
+    found = run.floods == 0
+    for i in range(loop.chambers // 2):
+        found = found and rests(plant, motions[i])
+    return bool(found)
+
+
+@in_place
+def _act(
+    loop: Record,
+    plant: Record,
+    run: Record,
+    motions: Record,
+    instants: FloatArray,
+    injections: Record,
+    notes: FloatArray,
+    w: FloatArray,
+) -> None:
+    """All valves of the command open together; after the last one has closed the loop waits."""
+    commanded, before, start = limit_to_time(loop, run), run.vibration, run.time
+    left = commanded
+    if commanded > 0 or not _rests(loop, plant, run, motions):
+        left = move(loop, plant, run, motions, commanded, notes, w)
+        note_stretch(loop, run, notes[0], run.on_points, start, instants)
+        note_stretch(loop, run, notes[1], run.off_points, start + run.on, instants)
+        look(loop, plant, run, motions)
+    else:
+        run.on, run.off = 0.0, min(loop.period, loop.time_limit - start)
+        for k in range(1, TAIL_POINTS + 1):
+            keep_instant(loop, run, instants, start + run.off * k / TAIL_POINTS)
+    run.time = start + run.on + run.off
+    run.cut = 1 if run.off < loop.period else run.cut
+    if left > 0:
+        run.operated = 1
+        moved = keep_injections(loop, run, motions, start, injections)
+        run.idle = 0 if moved or abs(run.vibration - before) > loop.limit else run.idle + 1
+    elif commanded > 0:
+        run.idle += 1
+
+
+@in_place
+def _keep_sample(loop: Record, run: Record, samples: Record) -> None:
+    place = run.samples - 1 - run.samples_before
+    if place < samples.size:
+        row = samples[place]
+        row.time, row.resting, row.reason = run.time, run.resting, run.reason
+        row.amplitude, row.phase = run.seen_amplitude, run.seen_phase
+        for i in range(loop.chambers // 2):
+            row.asked[i], row.side[i] = run.asked[i], run.side[i]

@@ -1,0 +1,237 @@
+"""From a command to the next sample in plain numbers: valves, liquid, and what is noted of it."""
+
+from __future__ import annotations
+
+import math
+
+from ringbalance.controller.compilation.compiled import in_place
+from ringbalance.controller.formulas import NOTICEABLE
+from ringbalance.controller.liquid_ring.compiled_events import command
+from ringbalance.controller.liquid_ring.compiled_lift import shown
+from ringbalance.controller.liquid_ring.compiled_march import advance, least_later, opening_within
+from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
+from ringbalance.controller.liquid_ring.records import WORK, X
+from ringbalance.controller.loop_records import GAS_POINTS, TAIL_POINTS, Record
+from ringbalance.controller.moment_table import pair_moment
+from ringbalance.scene.arrays import FloatArray
+
+
+@in_place
+def vibration(loop: Record, run: Record) -> complex:
+    """With the disc's liquid, m."""
+    moment = 0j
+    for i in range(loop.chambers // 2):
+        moment += loop.axis[i] * pair_moment(loop.moment, loop.lowest, loop.moment_step, run.fill[i])
+    return complex(loop.start + run.gain * moment)
+
+
+@in_place
+def limit_to_time(loop: Record, run: Record) -> int:
+    """Cut what is asked to the time left. Returns: the number of valves."""
+    half, left, count = loop.chambers // 2, loop.time_limit - run.time, 0
+    for i in range(half):
+        if run.asked[i] > 0.0:
+            if count == 0:
+                for chamber in range(loop.chambers):
+                    run.refused[chamber] = 0
+            count += 1
+            run.at_residual[i], run.at_residual[i + half] = 0, 0
+            run.cut = 1 if run.asked[i] > left else run.cut
+            run.asked[i] = min(run.asked[i], left)
+    return count
+
+
+@in_place
+def move(
+    loop: Record,
+    plant: Record,
+    run: Record,
+    motions: Record,
+    commanded: int,
+    notes: FloatArray,
+    w: FloatArray,
+) -> int:
+    """Let time pass to the next sample, with valve-open times that leave each chamber its residual fill.
+
+    The motion is tried as commanded, and made again where that falls short.
+    Returns: the number of valves that opened.
+    """
+    half = loop.chambers // 2
+    guarded = commanded > 0 and run.residual_fill > 0.0
+    if guarded:
+        for i in range(half):
+            motions[half + i] = motions[i]
+        if not _above_residual(loop, run):
+            guarded = _shorten(loop, plant, run, motions, w)
+    drift = _pass(loop, plant, run, motions, notes, w)
+    if guarded and not _keeps_residual(loop, plant, run, motions, w):
+        for i in range(half):
+            motions[i] = motions[half + i]
+        _shorten(loop, plant, run, motions, w)
+        drift = _pass(loop, plant, run, motions, notes, w)
+    run.drift = max(run.drift, drift)
+    count = 0
+    for i in range(half):
+        count += 1 if run.asked[i] > 0.0 else 0
+    return count
+
+
+@in_place
+def _above_residual(loop: Record, run: Record) -> bool:
+    """Whether every driven chamber is above its residual fill."""
+    found = True
+    for i in range(loop.chambers // 2):
+        found = found and (
+            run.asked[i] == 0.0 or _driven_fill(loop, run, i) > run.residual_fill + NEAR_RESIDUAL
+        )
+    return found
+
+
+@in_place
+def _driven_fill(loop: Record, run: Record, pair: int) -> float:
+    return float(loop.total - run.fill[pair] if run.side[pair] else run.fill[pair])
+
+
+@in_place
+def _keeps_residual(loop: Record, plant: Record, run: Record, motions: Record, w: FloatArray) -> bool:
+    """Whether each driven chamber has kept its residual fill and will, with the tail of its injection."""
+    spare, found = loop.chambers // 2 * 2, True
+    for i in range(loop.chambers // 2):
+        if run.asked[i] > 0.0 and found:
+            motions[spare] = motions[i]
+            found = least_later(plant, motions, spare, w) >= run.residual_fill
+    return found
+
+
+@in_place
+def _shorten(loop: Record, plant: Record, run: Record, motions: Record, w: FloatArray) -> bool:
+    """Shorten the valve-open times to what leaves the residual fill; those below the minimum are left out.
+
+    Returns: False, for there is nothing left to guard.
+    """
+    half = loop.chambers // 2
+    for i in range(half):
+        if run.asked[i] > 0.0:
+            asked, time = run.asked[i], 0.0
+            if _driven_fill(loop, run, i) > run.residual_fill + NEAR_RESIDUAL:
+                time = opening_within(plant, motions, i, 2 * half, run.side[i], asked, w)
+            if time != asked:
+                chamber = i + half * run.side[i]
+                run.shortened += 1
+                run.at_residual[chamber], run.refused[chamber] = 1, 1
+                run.asked[i] = time if time >= loop.shortest[chamber] else 0.0
+    return False
+
+
+@in_place
+def _pass(
+    loop: Record, plant: Record, run: Record, motions: Record, notes: FloatArray, w: FloatArray
+) -> float:
+    """Carry all pairs through the valve-open times and the wait, with their fills at the instants in `notes`.
+
+    Returns: how far liquid ran back with the gas off, the most of any pair and stretch.
+    """
+    half, on, drift = loop.chambers // 2, 0.0, 0.0
+    for i in range(half):
+        on = max(on, run.asked[i])
+    off = max(min(loop.period, loop.time_limit - (run.time + on)), 0.0)
+    run.on, run.off, run.off_points = on, off, TAIL_POINTS if off > 0.0 else 0
+    run.on_points = _gas_instants(loop, run, notes) if on > 0.0 else 0
+    for k in range(run.off_points):
+        notes[1, 0, k] = off * (k + 1) / TAIL_POINTS
+    for i in range(half):
+        motion, ran_back = motions[i], 0.0
+        if run.asked[i] > 0.0:
+            command(plant, motion, run.side[i], run.asked[i])
+        if on > 0.0:
+            motion.steps, motion.ran_back = 0, 0.0
+            advance(plant, motion, on, notes[0], i + 1, run.on_points, w)
+            ran_back = motion.ran_back
+        if off > 0.0:
+            motion.steps, motion.ran_back = 0, 0.0
+            advance(plant, motion, off, notes[1], i + 1, run.off_points, w)
+        drift = max(drift, ran_back, motion.ran_back)
+    return float(drift)
+
+
+@in_place
+def _gas_instants(loop: Record, run: Record, notes: FloatArray) -> int:
+    """Equally spaced instants of the valve-open time and the closing of each valve, ascending."""
+    count = GAS_POINTS
+    for k in range(count):
+        notes[0, 0, k] = run.on * (k + 1) / GAS_POINTS
+    for i in range(loop.chambers // 2):
+        if 0.0 < run.asked[i] < run.on:
+            place = count
+            while place > 0 and notes[0, 0, place - 1] > run.asked[i]:
+                notes[0, 0, place] = notes[0, 0, place - 1]
+                place -= 1
+            notes[0, 0, place] = run.asked[i]
+            count += 1
+    return count
+
+
+@in_place
+def note_stretch(
+    loop: Record, run: Record, notes: FloatArray, count: int, start: float, instants: FloatArray
+) -> None:
+    """Since when the amplitude is not above the limit, and the trace, from a stretch begun at `start`."""
+    largest = loop.total - loop.lowest
+    for k in range(count):
+        for i in range(loop.chambers // 2):
+            run.fill[i] = min(max(notes[i + 1, k], loop.lowest), largest)
+        time = start + notes[0, k]
+        above = abs(vibration(loop, run)) > loop.limit
+        run.since = math.inf if above else min(run.since, time)
+        keep_instant(loop, run, instants, time)
+
+
+@in_place
+def look(loop: Record, plant: Record, run: Record, motions: Record) -> None:
+    """The disc at the next sample, and whether liquid still runs back that would take it above the limit."""
+    half, back = loop.chambers // 2, False
+    for i in range(half):
+        motion = motions[i]
+        moves = motion.primed > 0 or motion.direction != 0 or (run.floods > 0 and plant.inertia == 0)
+        run.runs_back[i] = 1 if moves and motion.ran_back > NOTICEABLE else 0
+        run.fill[i] = loop.total / 2.0 if run.runs_back[i] > 0 else shown(plant, motion, motion.state[X])
+        back = back or run.runs_back[i] > 0
+    run.drains = 1 if back and abs(vibration(loop, run)) > loop.limit else 0
+    for i in range(half):
+        run.fill[i] = shown(plant, motions[i], motions[i].state[X])
+    run.vibration = vibration(loop, run)
+    run.amplitude = abs(run.vibration)
+
+
+@in_place
+def keep_instant(loop: Record, run: Record, instants: FloatArray, time: float) -> None:
+    """A valve may open for less than the clock resolves: the trace has one row for one time."""
+    if run.instants < instants.shape[0] and (time > run.kept or run.samples == 0):
+        instants[run.instants, 0] = time
+        for i in range(loop.chambers // 2):
+            instants[run.instants, 1 + i] = run.fill[i]
+        run.instants, run.kept = run.instants + 1, time
+
+
+@in_place
+def keep_injections(loop: Record, run: Record, motions: Record, start: float, injections: Record) -> bool:
+    """Rows of the last command. Returns: whether the injection that should do the work has moved liquid."""
+    half, longest, working = loop.chambers // 2, 0.0, False
+    for chamber in range(loop.chambers):
+        pair = chamber % half
+        if run.asked[pair] == 0.0 or run.side[pair] != chamber // half:
+            continue
+        motion, fill = motions[pair], _driven_fill(loop, run, pair)
+        moved = abs(fill - motion.fill_before) > NOTICEABLE
+        # Noise keeps opening the other valve a little.
+        if run.asked[pair] > longest:
+            longest, working = run.asked[pair], moved
+        if run.injections < injections.size:
+            row = injections[run.injections]
+            row.time, row.chamber, row.duration = start, chamber, run.asked[pair]
+            row.fill_before, row.fill_after = motion.fill_before, fill
+            row.regime_start, row.regime_end = motion.regime_start, motion.regime_end
+            row.event, row.energy = motion.event, motion.state[WORK + motion.chamber]
+            row.closing_pressure, row.run_dry = motion.closing_pressure, motion.run_dry
+            run.injections += 1
+    return working

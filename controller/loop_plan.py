@@ -1,0 +1,220 @@
+"""The closed loop of a scene, ready to run: once with its trace, or for many draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.algorithms.algorithm import Controller
+from ringbalance.controller.algorithms.built_in import BuiltIn
+from ringbalance.controller.algorithms.law_based import LawBased
+from ringbalance.controller.compiled_loop import continue_runs
+from ringbalance.controller.formulas import NONE
+from ringbalance.controller.liquid_ring.motion import Dynamics
+from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
+from ringbalance.controller.loop_records import (
+    GAS_LINE,
+    GAS_POINTS,
+    INJECTION,
+    LOOP,
+    NOTES,
+    OWN,
+    RUN,
+    SAMPLE,
+    TAIL_POINTS,
+)
+from ringbalance.controller.moment_table import MomentTable
+from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.simulation import noise_floor
+from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+
+CHUNK: Final = 128
+"""Samples for which runs are continued at once."""
+GROUP: Final = 256
+"""Runs that are continued together."""
+IDLE_OPERATIONS: Final = 3
+"""Commands in a row, beyond one for each chamber, whose longest injection may move nothing."""
+Records = npt.NDArray[np.void]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """What happened in one run, or in a part of it."""
+
+    instants: FloatArray
+    """Time, s, and the fill of every pair's positive chamber, shape (m, 1 + pairs)."""
+    injections: Records
+    """Type `INJECTION`."""
+    samples: Records
+    """Type `SAMPLE`."""
+
+    @classmethod
+    def room(cls, samples: int, pairs: int) -> Trace:
+        """For some samples; for none: none is kept."""
+        rows = (GAS_POINTS + TAIL_POINTS + pairs) * samples + (1 if samples else 0)
+        return cls(
+            instants=np.empty((rows, 1 + pairs)),
+            injections=np.zeros(pairs * samples, dtype=INJECTION),
+            samples=np.zeros(samples, dtype=SAMPLE),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoopPlan:
+    """What all runs of a scene share, ready for compiled code."""
+
+    loop: Records
+    """Type `LOOP`, shape (1,)."""
+    plant: Records
+    """Type `PLANT`, shape (1,)."""
+    assumed: Records
+    """The same as the law-based algorithm has it."""
+    memory: Records
+    """Type `RUN`, shape (1,), with what the algorithm remembers at the start."""
+    liquid: Records
+    """Type `MOTION`: the pairs as the law-based algorithm believes them to be, and one more; else empty."""
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        scene: Scene,
+        model: BalancerModel,
+        dynamics: Dynamics,
+        controller: Controller[Any] | BuiltIn,
+        relative_error: float,
+        most_samples: int,
+        sensed: bool = False,
+        to_time_limit: bool = False,
+    ) -> LoopPlan:
+        """Prepare the runs of a scene.
+
+        Args:
+            relative_error: allowed to one step of a pair's states.
+            most_samples: after which a run ends undecided.
+            sensed: whether the caller's sensor writes its samples into the run.
+            to_time_limit: whether a settled run continues.
+        """
+        loop, memory = np.zeros(1, dtype=LOOP), np.zeros(1, dtype=RUN)
+        total, chambers = 2 * scene.disc.initial_fill, scene.disc.chambers
+        plant = dynamics.plant(total=total, relative_error=relative_error)
+        built_in = isinstance(controller, BuiltIn)
+        loop["algorithm"] = OWN
+        if isinstance(controller, BuiltIn):
+            controller.fill(loop[0], memory[0])
+        for name, value in _settings(scene).items():
+            loop[name] = value
+        loop["lowest"], loop["moment_step"], loop["moment"][0] = MomentTable.of(model=model, total=total)
+        loop["axis"][0, : chambers // 2] = chamber_directions(chambers)[: chambers // 2]
+        offsets = np.array(scene.controller.offsets(chambers))
+        loop["shortest"][0, :chambers] = scene.controller.minimum_gas_time + offsets
+        loop["rises_tolerated"], loop["most_samples"] = controller.rises_tolerated, most_samples
+        loop["sensed"], loop["to_time_limit"] = sensed or not built_in, to_time_limit
+        loop["exact"] = not sensed and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0
+        assumed = controller.plant.copy() if isinstance(controller, LawBased) else plant
+        liquid = controller.liquid() if isinstance(controller, BuiltIn) else np.zeros(0, dtype=MOTION)
+        return cls(loop=loop, plant=plant, assumed=assumed, memory=memory, liquid=liquid)
+
+    @property
+    def pairs(self) -> int:
+        """Number of pairs of chambers."""
+        return int(self.loop["chambers"][0]) // 2
+
+    def runs(self, size: int) -> Records:
+        """Runs with the scene's own gas line and velocity, to be given the rest; type `RUN`."""
+        runs = np.repeat(self.memory, size)
+        runs["speed"] = 1.0
+        runs["gas_line"] = [float(self.plant[name][0]) for name in GAS_LINE]
+        return runs
+
+    def begin(self, runs: Records) -> RunsInHand:
+        """Runs before their first sample."""
+        motions = np.zeros((runs.size, 2 * self.pairs + 1), dtype=MOTION)
+        liquid = np.tile(self.liquid, (runs.size, 1))
+        return RunsInHand(self, runs, motions, liquid)
+
+    def finish(self, runs: Records, noise: Callable[[int], np.random.Generator]) -> None:
+        """Carry runs to their ends, without traces. Args: `noise`: makes the random numbers of a run."""
+        quiet = bool(self.loop["exact"][0])
+        for first in range(0, runs.size, GROUP):
+            group = runs[first : first + GROUP]
+            hand = self.begin(group)
+            random = [] if quiet else [noise(first + i) for i in range(group.size)]
+            values = np.zeros((group.size, CHUNK, 2))
+            hand.go_on(values[:, :0])
+            while np.any(group["cause"] == NONE):
+                for i in np.flatnonzero(group["cause"] == NONE) if not quiet else ():
+                    values[i] = random[i].standard_normal((CHUNK, 2))
+                hand.go_on(values)
+
+
+class RunsInHand:
+    """Runs of a plan with their liquid, to be continued by some samples at a time."""
+
+    def __init__(self, plan: LoopPlan, runs: Records, motions: Records, liquid: Records) -> None:
+        self.plan, self.runs, self._motions, self._liquid = plan, runs, motions, liquid
+        self._plant, self._notes, self._room = plan.plant.copy(), np.zeros(NOTES), np.zeros(WORKSPACE)
+
+    def go_on(self, noise: FloatArray, *, traced: bool = False) -> Trace:
+        """Continue by as many samples as there is noise for, in standard deviations, shape (n, samples, 2).
+
+        Without samples the runs begin. Returns: the trace of the first run; empty where none is asked for.
+        """
+        run, plan = self.runs[0], self.plan
+        trace = Trace.room(noise.shape[1] + 1 if traced else 0, plan.pairs)
+        run["instants"], run["injections"], run["samples_before"] = 0, 0, run["samples"]
+        continue_runs(
+            plan.loop[0],
+            self._plant[0],
+            plan.assumed[0],
+            self.runs,
+            self._motions,
+            self._liquid,
+            noise,
+            trace.instants,
+            trace.injections,
+            trace.samples,
+            self._notes,
+            self._room,
+        )
+        return Trace(
+            instants=trace.instants[: run["instants"]],
+            injections=trace.injections[: run["injections"]],
+            samples=trace.samples[: run["samples"] - run["samples_before"]],
+        )
+
+
+def joined(parts: list[Trace]) -> Trace:
+    """Parts of one run's trace, one after the other."""
+    return Trace(
+        instants=np.concatenate([part.instants for part in parts]),
+        injections=np.concatenate([part.injections for part in parts]),
+        samples=np.concatenate([part.samples for part in parts]),
+    )
+
+
+def _settings(scene: Scene) -> dict[str, Any]:
+    """Rotor, sensor, clock and bounds."""
+    settings, sensor = scene.controller, scene.sensor
+    return {
+        "chambers": scene.disc.chambers,
+        "total": 2 * scene.disc.initial_fill,
+        "initial_fill": scene.disc.initial_fill,
+        "start": scene.rotor.initial_vibration,
+        "limit": settings.limit,
+        "period": settings.period,
+        "hold_time": settings.hold_time,
+        "time_limit": scene.run.time_limit,
+        "amplitude_noise": sensor.amplitude_noise,
+        "phase_noise": sensor.phase_noise,
+        "noise_floor": noise_floor(
+            amplitude_noise=sensor.amplitude_noise, initial_amplitude=scene.rotor.initial_amplitude
+        ),
+        "idle_tolerated": IDLE_OPERATIONS + scene.disc.chambers,
+    }

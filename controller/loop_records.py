@@ -1,0 +1,195 @@
+"""What the closed loop works on: one record of what all runs share, one for each run, and rows of a trace.
+
+Compiled functions take a record as a single pointer, where arrays and tuples of arrays are taken apart and
+counted at every call, which costs more than the work itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.rotor import MAX_CHAMBERS
+
+GAS_POINTS: Final = 8
+"""Instants recorded within one command's valve-open time, beside the closing of each valve."""
+TAIL_POINTS: Final = 12
+"""Instants recorded within a wait, in which an operation continues after its valve has closed."""
+MOMENT_NODES: Final = 4097
+"""Of the table of a pair's moment."""
+PAIRS: Final = MAX_CHAMBERS // 2
+Record = Any
+"""One element of an array with one of the types below; compiled code changes it in place."""
+TARGET_VECTOR: Final = 0
+TRIAL: Final = 1
+LAW_BASED: Final = 2
+OWN: Final = 3
+"""Algorithms by number; the last is the caller's, who writes its command into the run."""
+NO_PHASE: Final = 1
+USABLE: Final = 2
+"""What a sample shows: nothing (0), an amplitude, or a phase as well."""
+UNUSABLE: Final = 1
+TOO_SHORT: Final = 2
+"""Why no valve opens though the algorithm is not content."""
+
+_REAL: Final = (
+    "total",  # x_A + x_C
+    "initial_fill",
+    "lowest",  # smallest x
+    "moment_step",  # between the nodes of the moment's table, in x
+    "limit",  # m
+    "period",  # s
+    "hold_time",  # s
+    "time_limit",  # s
+    "amplitude_noise",  # standard deviation, m
+    "phase_noise",  # standard deviation, rad
+    "noise_floor",  # m
+    "rest_limit",  # algorithm: amplitude at which it is content, m
+    "minimum_gas_time",  # s
+    "maximum_gas_time",  # s
+    "assumed_lag",  # target vector: rad
+    "integral_time",  # s, infinite for no integral part
+    "derivative_time",  # s
+    "first_trial",  # trial: s
+    "long_step",  # s
+    "short_step",  # s
+    "fine_below",  # m
+    "probe",  # law-based: valve-open time where the law says that nothing flows, s
+    "least_fill",  # to which a pair is driven
+    "assumed_amplitude_noise",  # standard deviation, m
+    "assumed_phase_noise",  # standard deviation, rad
+    "law_deviation",  # standard deviation of the law's velocity, relative
+    "assumed_lowest",  # as above, of the disc that is assumed
+    "assumed_step",
+)
+_WHOLE: Final = (
+    "algorithm",
+    "sensed",  # whether the caller's sensor writes its sample into the run
+    "exact",  # whether the sensor is without noise
+    "to_time_limit",  # whether a settled run continues
+    "chambers",
+    "rises_tolerated",
+    "idle_tolerated",
+    "most_samples",
+    "resets",  # target vector: whether the integral is dropped when the residual turns round
+    "trials",  # trial: chambers in the sequence
+)
+LOOP: Final = np.dtype(
+    [(name, np.float64) for name in _REAL]
+    + [(name, np.int64) for name in _WHOLE]
+    + [
+        ("start", np.complex128),  # vibration with level chambers, m
+        ("influence", np.complex128),  # that is assumed, m/(kg m)
+        ("sequence", np.int64, (MAX_CHAMBERS,)),
+        ("offset", np.float64, (MAX_CHAMBERS,)),  # that the algorithm adds to a valve's share, s
+        ("shortest", np.float64, (MAX_CHAMBERS,)),  # valve-open time that is left of a shortened one, s
+        ("axis", np.complex128, (PAIRS,)),  # directions of the pairs
+        ("moment", np.complex128, (MOMENT_NODES, 2)),  # of a pair, along and across: value, slope per step
+        ("assumed_moment", np.complex128, (MOMENT_NODES, 2)),
+    ]
+)
+"""What all runs of a scene share."""
+
+_RUN_REAL: Final = (
+    "speed",  # factor of the flow's velocity
+    "residual_fill",  # of a driven chamber, that no command goes below
+    "proportional",  # Kc, s/m
+    "time",  # s
+    "since",  # s, from which on the amplitude was not above the limit; infinite while it is
+    "held_since",  # the same of the first time that it held
+    "amplitude",  # true, m
+    "initial_amplitude",  # m
+    "drift",  # how far liquid has run back with the gas off
+    "on",  # s, from the last command to the closing of its last valve
+    "off",  # s, from then to the next sample
+    "kept",  # s, of the last instant of the trace
+    "seen_amplitude",  # of this sample, m
+    "seen_phase",  # rad
+    "first_seen",  # m, of the first sample; not a number where that showed none
+    "last_seen",  # m, of the last sample that showed one
+    "last_phase",  # rad, of the last one with a phase
+    "integral",  # target vector: m s
+    "before_time",  # of its last sample above the limit, s, infinite for none; law-based: last sample
+    "before_amplitude",  # m
+    "before_phase",  # rad
+    "variance",  # law-based: mean square of the error of its influence coefficient, (m/(kg m))^2
+)
+_RUN_WHOLE: Final = (
+    "stays",  # whether an amplitude within its limit is expected to stay there
+    "usable",
+    "resting",  # whether the algorithm is content
+    "reason",
+    "position",  # trial: index into the sequence
+    "tried",  # whether a chamber has been tried
+    "floods",  # whether liquid runs through an empty tube with the gas off
+    "cut",  # whether the time limit has shortened a valve-open time or a wait
+    "operated",  # whether a valve has opened since the last sample with an amplitude
+    "rises",
+    "idle",
+    "overshoots",
+    "misadjustments",
+    "shortened",  # injections, to keep the residual fill
+    "samples",
+    "samples_before",  # those before the first row of the trace
+    "cause",
+    "drains",  # whether what still runs back would take the vibration above the limit
+    "on_points",  # instants noted within each of these
+    "off_points",
+    "instants",  # rows of the trace in use
+    "injections",
+)
+_RUN_PAIRS: Final = (
+    "fill",  # x of the chamber on the positive side
+    "asked",  # valve-open time of the command, s, zero for none
+    "given",  # law-based: valve-open time of the last command, s
+    "change",  # law-based: wanted of the pair's moment, kg m
+    "least",  # law-based: bounds of that
+    "most",
+)
+_RUN_FLAGS: Final = (
+    "side",  # which chamber is driven: 0 the positive one, 1 the other
+    "given_side",
+    "runs_back",  # whether liquid still ran back as the last wait ended
+    "fixed",  # law-based: whether a pair is at a bound
+)
+GAS_LINE: Final = ("passing", "critical_ratio", "dead_volume", "valve_lag")
+"""Constants of a `PLANT` that belong to a chamber's gas line."""
+RUN: Final = np.dtype(
+    [(name, np.float64) for name in _RUN_REAL]
+    + [(name, np.int64) for name in _RUN_WHOLE]
+    + [(name, np.complex128) for name in ("gain", "vibration", "influence")]
+    + [(name, np.float64, (PAIRS,)) for name in _RUN_PAIRS]
+    + [(name, np.int64, (PAIRS,)) for name in _RUN_FLAGS]
+    + [("gas_line", np.float64, (len(GAS_LINE),))]
+    + [(name, np.int64, (MAX_CHAMBERS,)) for name in ("at_residual", "refused")]
+)
+"""One run: what differs between runs, its state and what its algorithm remembers.
+
+`gain`: vibration per balancing moment, m/(kg m). `gas_line`: its own values of `GAS_LINE`. `at_residual`: of
+every chamber, whether its last injection was shortened to keep its residual fill, and none has filled it
+since; `refused`: the same of the last command alone.
+"""
+INJECTION: Final = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            "time",  # s, of the command
+            "duration",  # s
+            "fill_before",  # of the driven chamber
+            "fill_after",
+            "energy",  # J
+            "closing_pressure",  # gauge, Pa
+            "run_dry",  # s
+        )
+    ]
+    + [(name, np.int64) for name in ("chamber", "regime_start", "regime_end", "event")]
+)
+SAMPLE: Final = np.dtype(
+    [(name, np.float64) for name in ("time", "amplitude", "phase")]
+    + [(name, np.int64) for name in ("resting", "reason")]
+    + [("asked", np.float64, (PAIRS,)), ("side", np.int64, (PAIRS,))]
+)
+"""Rows of a trace; those of its instants are the time and every pair's fill."""
+NOTES: Final = 2, 1 + PAIRS, PAIRS + GAS_POINTS + TAIL_POINTS
+"""Shape of the room for what is noted between two samples, with the gas on and off."""

@@ -1,0 +1,261 @@
+"""The evidence as templates see it, and the one filter that formats, typesets and traces what they print.
+
+A number taken out of the evidence knows its place there, so a template that prints it need not repeat it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import Any, Final, Literal, overload
+
+from markupsafe import Markup, escape
+
+from ringbalance.reports.prose import marked_up
+from ringbalance.reports.section import Table
+from ringbalance.results import numbers
+from ringbalance.results.numbers import believed
+
+Form = Literal["measured", "given", "percent", "change", "fixed"]
+
+UNITS: Final = MappingProxyType(
+    {
+        "s_per_m": "s/m",
+        "kg_m3": "kg/m^3",
+        "m2_s": "m^2/s",
+        "rad_s": "rad/s",
+        "kg_m": "kg m",
+        "m_s": "m/s",
+        "m3": "m^3",
+        "Pa": "Pa",
+        "rad": "rad",
+        "kg": "kg",
+        "m": "m",
+        "s": "s",
+        "J": "J",
+        "V": "V",
+    }
+)
+"""Units by the endings of the evidence's keys, the longest first."""
+EXACT: Final = 1e-6
+"""Relative total below which a number is a closed form of inputs that are taken as exact."""
+
+
+class Number(float):
+    """A number of the evidence with its dotted place there."""
+
+    __slots__ = ("path",)
+    path: str
+
+    def __new__(cls, value: float, path: str) -> Number:
+        number = super().__new__(cls, value)
+        number.path = path
+        return number
+
+
+class Count(int):
+    """A whole number of the evidence with its dotted place there."""
+
+    path: str
+
+    def __new__(cls, value: int, path: str) -> Count:
+        number = super().__new__(cls, value)
+        number.path = path
+        return number
+
+
+class Items(Sequence[Any]):
+    """A list of the evidence; of cases, the place is by `id`."""
+
+    def __init__(self, values: Sequence[Any], path: str) -> None:
+        self._values, self._path = values, path
+
+    @overload
+    def __getitem__(self, index: int) -> Any: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Any]: ...
+    def __getitem__(self, index: int | slice) -> Any:
+        if isinstance(index, slice):
+            return [self[place] for place in range(*index.indices(len(self)))]
+        return placed(self._values[index], f"{self._path}.{index}")
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+
+class Part(Mapping[str, Any]):
+    """A record of the evidence."""
+
+    def __init__(self, record: Mapping[str, Any], path: str) -> None:
+        self._record, self._path = record, path
+
+    def __getitem__(self, key: str) -> Any:
+        if "." in key:
+            # A quantile's name, which no dotted place can hold.
+            return self._record[key]
+        return placed(self._record[key], f"{self._path}.{key}" if self._path else key)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._record)
+
+    def __len__(self) -> int:
+        return len(self._record)
+
+
+def placed(value: Any, path: str = "") -> Any:
+    """A value of the evidence that knows its dotted place, with all that is in it; texts as they are."""
+    if isinstance(value, Mapping):
+        return Part(value, path)
+    if isinstance(value, list | tuple):
+        return Items(value, path)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return value
+    return Number(value, path) if isinstance(value, float) else Count(value, path)
+
+
+def unit_of(path: str) -> str:
+    """The SI unit that the ending of a key says; "1" where it says none."""
+    key = next((part for part in reversed(path.split(".")) if not part.lstrip("-").isdigit()), "")
+    return next((unit for ending, unit in UNITS.items() if key.endswith(f"_{ending}")), "1")
+
+
+def printed(
+    value: float | None,
+    width: float | None = None,
+    *,
+    digits: int | None = None,
+    unit: str | None = None,
+    form: Form = "measured",
+) -> str:
+    """A number as a reader meets it, traced to its place in the evidence.
+
+    Args: `width`: half-width (95 %) in SI, which decides the digits. `digits`: significant ones, without a
+        width; decimals of "fixed". `unit`: SI; by default what the evidence's key says. `form`: "given" for
+        prescribed numbers, "percent" for fractions, "change" for signed ones, "fixed" for decimals.
+    Raises: ValueError: a number that is not finite.
+    """
+    if value is None:
+        return numbers.MISSING
+    path = getattr(value, "path", "")
+    text = _text(float(value), width, digits, unit_of(path) if unit is None else unit, form)
+    return _marked(text, path)
+
+
+def _marked(text: str, path: str) -> str:
+    return Markup('<span data-from="{}">{}</span>').format(path, text) if path else text
+
+
+def _text(value: float, width: float | None, digits: int | None, unit: str, form: Form) -> str:
+    if form == "given":
+        return numbers.given(value, unit, digits=digits or 6)
+    if form == "fixed":
+        return numbers.fixed(value, digits or 0)
+    if form != "measured":
+        return numbers.percent(value, digits=digits or 2, signed=form == "change")
+    return numbers.shown(value, unit, None if width is None else float(width), digits=digits or 4)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """Numbers in one unit and to one decimal place, that of the last digit of the largest."""
+
+    symbol: str
+    texts: list[str]
+
+
+def column(values: Items, digits: int = 6) -> Column:
+    """A column of the evidence in the unit that suits its largest value, which has so many digits."""
+    numbers_of = list(values)
+    display = numbers.display_unit(unit_of(numbers_of[0].path), *numbers_of)
+    largest = max(abs(value) for value in numbers_of) * display.factor
+    decimals = max(digits - 1 - math.floor(math.log10(largest)), 0) if largest else 0
+    texts = [_marked(numbers.fixed(value * display.factor, decimals), value.path) for value in numbers_of]
+    return Column(symbol=display.symbol, texts=texts)
+
+
+def span(ends: Sequence[float] | None, unit: str | None = None, digits: int = 3) -> str:
+    """Both ends of an interval in one unit; empty without one, or with none that so many digits show."""
+    if ends is None:
+        return ""
+    low, high = ends
+    display = numbers.display_unit(unit or "1", low, high)
+    texts = [numbers.number(end * display.factor, digits=digits) for end in (low, high)]
+    if texts[0] == texts[1]:
+        return ""
+    least, most = (
+        _marked(text, getattr(end, "path", "")) for text, end in zip(texts, (low, high), strict=True)
+    )
+    both = Markup("up to {}").format(most) if low == 0 else Markup("{} to {}").format(least, most)
+    return both + escape(numbers.with_unit("", display.symbol))
+
+
+def table_of(texts: Sequence[str], caption: str = "", style: str = "narrow") -> Table:
+    """A table of which each text is a row: a line `Head :: cell` for each column.
+
+    Columns that say nothing in any row are left out.
+    """
+    rows = [_cells(text) for text in texts]
+    heads = [head for head, _ in rows[0]] if rows else []
+    kept = [place for place in range(len(heads)) if any(row[place][1] for row in rows)]
+    return Table(
+        caption=caption,
+        heads=[heads[place] for place in kept],
+        rows=[[row[place][1] for place in kept] for row in rows],
+        style=style,
+    )
+
+
+def listing_of(text: str, heads: Sequence[str], caption: str = "", style: str = "narrow") -> Table:
+    """A table of the lines `Label :: cell :: cell` of a text; an empty one is left out."""
+    rows = [[cell.strip() for cell in line.split("::")] for line in text.splitlines() if "::" in line]
+    said = [row for row in rows if any(cell not in {"", numbers.MISSING} for cell in row[1:])]
+    return Table(caption=caption, heads=[Markup(head) for head in heads], rows=said, style=style)
+
+
+def known_width(value: float | None, width: float | None, *, stated: bool) -> float | None:
+    """The half-width to print: none of a closed form of exact inputs, or finer than unstated inputs leave.
+
+    Args: `stated`: whether the scene states the uncertainty of any input.
+    """
+    total = believed(value, width, stated=stated)
+    return None if value is None or total is None or total < EXACT * abs(value) else total
+
+
+def part_of(part: float, budget: Mapping[str, Any], total: float | None) -> str:
+    """A part of an uncertainty to the place of the second digit of the total, in the value's unit.
+
+    One that is smaller than that is so named.
+    """
+    if total is None:
+        return numbers.MISSING
+    factor = numbers.display_unit(budget["unit"], budget["value"], total).factor
+    place = math.floor(math.log10(total * factor)) - 1
+    decimals = max(-place, 0)
+    if round(part * factor, -place) == 0:
+        return f"< {numbers.fixed(10.0**place, decimals)}"
+    text = numbers.fixed(round(part * factor, -place), decimals)
+    return _marked(text, getattr(part, "path", ""))
+
+
+def _cells(text: str) -> list[tuple[str, str]]:
+    """Heads and cells of a row's lines; both stay markup."""
+    lines = [line.partition("::") for line in text.splitlines() if "::" in line]
+    return [(head.strip(), cell.strip()) for head, _, cell in lines]
+
+
+def finished(value: object) -> object:
+    """What a template prints: text typeset, counts traced; other numbers must have passed the filter."""
+    if isinstance(value, float):
+        raise TypeError(f"{getattr(value, 'path', value)} is printed without a filter")
+    return _marked(str(value), value.path) if isinstance(value, Count) else marked_up(value)
+
+
+_FORMS: Final[tuple[Form, ...]] = ("given", "percent", "change", "fixed")
+FILTERS: Final = MappingProxyType(
+    {"q": printed, "part_of": part_of, "column": column, "span": span}
+    | {form: partial(printed, form=form) for form in _FORMS}
+)
+"""Filters of the templates: each formats, and traces what it prints."""

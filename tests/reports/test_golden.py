@@ -1,0 +1,53 @@
+"""Two kept reports say what they said, word for word, and every number that they trace is the evidence's."""
+
+from __future__ import annotations
+
+import json
+import random
+from functools import cache
+from typing import Any
+
+import pytest
+from check_traces import apart, traces, untrue
+from golden_pages import FOLDER, NAMES, kept_evidence, report_text
+
+from ringbalance.reports.prose import evidence_at
+from ringbalance.reports.render import render
+
+FEWEST_TRACES = {"ring": 490, "masses": 60}
+
+
+@cache
+def evidence_of(name: str) -> dict[str, Any]:
+    return kept_evidence(name)
+
+
+@pytest.mark.usefixtures("unwritten")
+@pytest.mark.parametrize("name", NAMES)
+def test_the_pages_say_what_they_said(name: str) -> None:
+    golden = (FOLDER / f"{name}.txt").read_text(encoding="utf-8")
+    assert report_text(evidence_of(name)) == golden, "run tools/golden_pages.py, if meant"
+
+
+@pytest.mark.usefixtures("unwritten")
+@pytest.mark.parametrize("name", NAMES)
+def test_every_traced_number_is_the_evidence_s(name: str) -> None:
+    evidence = evidence_of(name)
+    pages = render(evidence).values()
+    found = traces(pages)
+    assert len(found) >= FEWEST_TRACES[name]
+    assert untrue(pages, evidence) == []
+    assert apart(evidence) == []
+
+
+@pytest.mark.usefixtures("unwritten")
+def test_a_changed_number_changes_what_is_printed() -> None:
+    evidence = json.loads(json.dumps(evidence_of("ring")))
+    before = dict(traces(render(evidence).values()))
+    for path in random.Random(3).sample(sorted(before), 60):
+        owner, _, key = path.rpartition(".")
+        holder, value = evidence_at(evidence, owner), evidence_at(evidence, path)
+        if isinstance(value, float) and value and not isinstance(holder, list):
+            holder[key] = 1.37 * value
+    after = dict(traces(render(evidence).values()))
+    assert sum(before[path] != after.get(path) for path in before) >= 25

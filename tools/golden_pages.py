@@ -1,0 +1,93 @@
+"""What the pages of two kept reports say, as plain text: what tests compare the templates' words with.
+
+python tools/golden_pages.py              after a change of words: rewrites tests/reports/golden/*.txt
+python tools/golden_pages.py RING MASSES  after a change of evidence: of two folders of `ringbalance report`
+"""
+
+from __future__ import annotations
+
+import json
+import lzma
+import re
+import sys
+from html import unescape
+from pathlib import Path
+from typing import Any, Final
+
+from ringbalance.reports.render import render
+
+FOLDER: Final = Path(__file__).resolve().parents[1] / "tests" / "reports" / "golden"
+NAMES: Final = ("ring", "masses")
+CASES: Final = {
+    "claim_01_volume",
+    "claim_09_drag_coefficient",
+    "claim_10_working_pressure",
+    "bent_tube_3d",
+    "extremes",
+    "manufactured_2d",
+    "measured_smooth_tubes",
+    "driven_stability",
+    "driven_fig7_positioning",
+}
+"""Cases that are kept: their own words are not the templates'."""
+_DIGITS: Final = 6
+_BLOCKS: Final = "p|li|tr|h\\d|figure|table|caption|section|dt|dd|ul|ol|article|details|summary|div"
+
+
+def kept_evidence(name: str) -> dict[str, Any]:
+    """The evidence of a kept report."""
+    document: dict[str, Any] = json.loads(lzma.decompress((FOLDER / f"{name}.json.xz").read_bytes()))
+    return document
+
+
+def page_text(page: str) -> str:
+    """What a page says, a line for each block, cells between bars."""
+    bare = re.sub(r"(?s)<(svg|style|script|head)\b.*?</\1>", " ", page)
+    blocks = re.sub(rf"</?(?:{_BLOCKS})\b[^>]*>", "\n", bare)
+    cells = re.sub(r"</?(?:td|th)\b[^>]*>", " | ", blocks)
+    plain = unescape(re.sub(r"<[^>]+>", "", cells.replace("<br>", " ")))
+    lines = (re.sub(r"\s+", " ", line) for line in plain.split("\n"))
+    kept = (re.sub(r"[ |]*\|[ |]*", " | ", line).strip() for line in lines if line.strip(" |"))
+    return "\n".join(kept) + "\n"
+
+
+def report_text(evidence: dict[str, Any]) -> str:
+    """What report and annex say, but the hash of the evidence."""
+    text = "\n".join(page_text(page) for page in render(evidence).values())
+    return re.sub(r"(?<=evidence\.json\n)SHA-256 \w+", "SHA-256 ...", text)
+
+
+def _shortened(value: Any) -> Any:
+    """Six digits, and of the verification the cases kept."""
+    if isinstance(value, dict):
+        return {key: _shortened(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_shortened(each) for each in value if not _left_out(each)]
+    return float(f"{value:.{_DIGITS}g}") if isinstance(value, float) else value
+
+
+def _left_out(value: Any) -> bool:
+    return isinstance(value, dict) and "verdict" in value and "claim" in value and value["id"] not in CASES
+
+
+def _keep(name: str, folder: Path) -> None:
+    document = _shortened(json.loads((folder / "evidence.json").read_bytes()))
+    # Three dates and a commit that change from day to day.
+    document["times"] |= {"date": "2030-01-02", "kept_cases": {}}
+    document["provenance"] |= {"commit": "0123456789abcdef", "dirty": False, "machine": "a machine"}
+    document["pictures"] |= {"drawn": False, "files": []}
+    packed = lzma.compress(json.dumps(document).encode(), preset=9)
+    (FOLDER / f"{name}.json.xz").write_bytes(packed)
+
+
+def main(folders: list[Path]) -> None:
+    """Keep evidence, if any is given, and write what the pages say of it."""
+    FOLDER.mkdir(exist_ok=True)
+    for name, folder in zip(NAMES, folders, strict=False):
+        _keep(name, folder)
+    for name in NAMES:
+        (FOLDER / f"{name}.txt").write_text(report_text(kept_evidence(name)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main([Path(argument) for argument in sys.argv[1:]])

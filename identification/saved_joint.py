@@ -17,10 +17,10 @@ from ringbalance.scene.fitted import MODEL, NO_UNIT
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import scene_kind
+from ringbalance.scene.model_errors import ERROR_NAME, ModelError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.registry import balancers
-from ringbalance.scene.tube_models import ERROR_NAME, ModelError
 from ringbalance.scene.uncertain import NORMAL_95
 from ringbalance.scene.units import DIMENSIONS, format_quantity, unit_factor, unit_of
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ringbalance.scene.registry import register
+from ringbalance.scene.registry import register, register_function
 
 if TYPE_CHECKING:
     from ringbalance.calibration import calibrate as calibrate
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from ringbalance.studies import trade as trade
     from ringbalance.studies import write_report as write_report
     from ringbalance.verification.extremes.study import Extremes as Extremes
-    from ringbalance.verification.selection_studies.study import TradeStudy as TradeStudy
+    from ringbalance.verification.trade import TradeStudy as TradeStudy
 
 __version__ = "0.1.0"
 
@@ -62,6 +62,8 @@ register(
     scene="ringbalance.controller.eccentric_mass.scene_rules:KIND",
     balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
 )
+register_function("with_values", place="ringbalance.scene.changes:with_values")
+register_function("scene_lines", place="ringbalance.scene.describe:scene_lines")
 
 _HOME = {
     "Calibration": "ringbalance.reduced_model.calibration",
@@ -83,7 +85,7 @@ _HOME = {
     "SceneError": "ringbalance.scene",
     "Sensor": "ringbalance.controller.rotor",
     "Simulation": "ringbalance.controller.simulation",
-    "TradeStudy": "ringbalance.verification.selection_studies.study",
+    "TradeStudy": "ringbalance.verification.trade",
     "Tuning": "ringbalance.controller.tuning.tune",
     "ValveCommand": "ringbalance.controller.algorithms.algorithm",
     "bundled_scene": "ringbalance.scene",

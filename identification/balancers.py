@@ -15,8 +15,11 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.eccentric_mass.inputs import eccentric_value, eccentric_with
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.scene_records import (
+    EccentricScene,
+    eccentric_value,
+    eccentric_with,
+)
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.device import Models
@@ -24,10 +27,10 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.scene.joint import with_model_error
+from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.uncertain import (
     NORMAL_95,
     UNCERTAIN_QUANTITIES,

@@ -30,9 +30,9 @@ from ringbalance.scene.keys.fields import (
     number,
     quantity,
 )
-from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
+from ringbalance.scene.loop_models import ControllerSettings, Environment, RequirementSettings, Rotor, Sensor
+from ringbalance.scene.model_errors import DrawDownFactor, ExtraLoss, ModelErrors
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.tube_models import FINEST_MODELS, DrawDownFactor, ExtraLoss, ModelErrors, TubeModels
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -270,8 +270,6 @@ class Tube:
     ]
     draw_down_factor: DrawDownFactor = 1.0
     model_errors: ModelErrors = ()
-    models: TubeModels = FINEST_MODELS
-    """Of its loss; no key."""
 
     @property
     def area(self) -> float:
@@ -371,7 +369,7 @@ class Scene(SceneFile):
     rotor: Rotor
     sensor: Sensor
     controller: ControllerSettings
-    requirement: Requirement = field(default_factory=Requirement)
+    requirement: RequirementSettings = field(default_factory=RequirementSettings)
 
     balancer: ClassVar[str] = "liquid_ring"
 

@@ -8,6 +8,7 @@ mean over the axial width B, and alpha(r) the half-angle of the sector whose fre
 from __future__ import annotations
 
 from functools import partial
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,9 @@ from ringbalance.mesh.cut.table import ChamberTable, chamber_table
 from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.keys.derivations import swept_area
 from ringbalance.scene.models import Disc
+
+_LAST_STEP: Final = 1e-9
+"""Of the square of the surface's radius, relative to that of the outer wall."""
 
 
 def imported_table(disc: Disc) -> ChamberTable | None:
@@ -135,7 +139,8 @@ def surface_radius(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
     whole = within(radius=r2)
     target = x * (whole - within(radius=r1))
     # The depth form keeps full relative accuracy for a film of a micrometre, where a^2 = R2^2 - ... cancels.
-    squared, enough = r2**2 - x * (r2**2 - r1**2), 4 * np.finfo(np.float64).eps * r2**2
+    # Newton's steps square the error, so the last of this size leaves rounding alone.
+    squared, enough = r2**2 - x * (r2**2 - r1**2), _LAST_STEP * r2**2
     for _ in range(60):
         a = np.sqrt(squared)
         step = (whole - within(radius=a) - target) / half_angle(disc=disc, radius=a)

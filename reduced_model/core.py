@@ -33,8 +33,8 @@ _ROUNDING: Final = 1e-12
 _NOTHING: Final = 1e-9
 """Below this a fill ratio is not told from zero."""
 _SCAN: Final = 17
-_REFINEMENTS: Final = 5
-"""Of a scan, each to a sixteenth: 1e-7 of a fill is left."""
+_REFINEMENTS: Final = 6
+"""Of a scan, each to a sixteenth: 1e-8 of a fill is left."""
 NEARLY_EMPTY: Final = 1e-6
 """Share of a pair's liquid with which a chamber's last liquid is looked at."""
 

@@ -35,8 +35,8 @@ _NODES: Final = np.linspace(-8.0, 0.2, 22)
 """ln u of the nodes from which roots start, from that of a loss of all the pressure in one velocity head."""
 _SLOPES: Final = (0.3, 5.0)
 """d ln(head)/d ln u, between which steps are taken."""
-_ENOUGH: Final = 1e-8
-"""Relative error of a head that belongs to a velocity, of which the last step leaves a hundredth."""
+_ENOUGH: Final = 1e-6
+"""Relative error of a head that belongs to a velocity, of which the last step leaves a thousandth."""
 _TINY: Final = 1e-14
 _STEPS: Final = 80
 
@@ -172,7 +172,7 @@ class TubeFlow:
     def flow(
         self, ends: TubeEnds[FloatArray], *, primed: bool | BoolArray, exactly: bool = True
     ) -> ColumnFlow[FloatArray]:
-        """Flow out of the driven chambers. Args: `exactly`: to 1e-10 of a head, else to about a hundredth."""
+        """Flow out of the driven chambers. Args: `exactly`: to 1e-9 of a head, else to about a hundredth."""
         return column_flow(
             ends=ends,
             crest=self.path.crest,
@@ -226,7 +226,7 @@ def growing_root(
     """Where growing functions reach values, by safeguarded secant steps.
 
     Args: `function_of`: y(x) of some rows, by number. `slope`: dy/dx about `start`. `where`: rows that count.
-    Returns: x, of y to 1e-10, each row by itself; elsewhere `start`.
+    Returns: x, of y to 1e-9, each row by itself; elsewhere `start`.
     """
     x, rows = start.copy(), np.flatnonzero(where)
     low, high = np.full(start.shape, _LEAST), np.full(start.shape, _MOST)

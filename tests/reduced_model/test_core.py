@@ -98,7 +98,7 @@ def test_a_full_siphon_balances_its_driving_pressure(
 
         u = math.exp(float(brentq(excess, math.log(1e-6), math.log(1e4), xtol=1e-13)))
         covered = answers.priming_pressure_vented[row] > 0
-        assert answers.velocity[row] == pytest.approx(u, rel=1e-9) or not covered
+        assert answers.velocity[row] == pytest.approx(u, rel=1e-8) or not covered
         assert answers.drag_coefficient[row] == pytest.approx(2 * drive / answers.velocity[row] ** 2 - 1)
 
 
@@ -165,4 +165,4 @@ def test_roots_of_growing_functions_are_found_from_bad_starts(
     )
     low, high = (wanted - 4) / power - 2, (wanted + 4) / power + 2
     exact = float(brentq(lambda x: float(function(np.array([x]))[0]) - wanted, low, high, xtol=1e-14))
-    assert found[0] == pytest.approx(exact, abs=1e-8)
+    assert found[0] == pytest.approx(exact, abs=1e-7)

@@ -131,9 +131,8 @@ def _mapping(inner: Any, value: Any, place: str, errors: list[str]) -> Any:
     if not isinstance(value, Mapping):
         errors.append(f"{place}: a table is needed")
         return None
-    return MappingProxyType(
-        {key: _value(inner, each, f"{place}.{key}", errors) for key, each in value.items()}
-    )
+    # A plain one: results of cases go from process to process, and a proxy cannot.
+    return {key: _value(inner, each, f"{place}.{key}", errors) for key, each in value.items()}
 
 
 _PLAIN: Mapping[Any, tuple[tuple[type, ...], str]] = MappingProxyType(

@@ -28,9 +28,9 @@ from rich.console import Console
 
 from ringbalance.controller.ensemble.monte_carlo import ensemble_dynamics, simulate_ensemble, simulate_members
 from ringbalance.controller.ensemble.run import RELATIVE_ERROR
-from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.models import Scene

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from ringbalance.controller.algorithms.law_based import law_based_step
 from ringbalance.controller.algorithms.target_vector import target_vector_step
 from ringbalance.controller.algorithms.trial import trial_step
-from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.compiled_stretch import (
     keep_injections,
     keep_instant,
@@ -32,9 +31,6 @@ from ringbalance.controller.formulas import (
     has_turned,
     stop_cause,
 )
-from ringbalance.controller.liquid_ring.compiled_events import rests, would_start
-from ringbalance.controller.liquid_ring.compiled_gas import gas_volume
-from ringbalance.controller.liquid_ring.records import P, X
 from ringbalance.controller.loop_records import (
     LAW_BASED,
     NO_PHASE,
@@ -47,7 +43,11 @@ from ringbalance.controller.loop_records import (
     USABLE,
     Record,
 )
+from ringbalance.reduced_model.injection.events import rests, would_start
+from ringbalance.reduced_model.injection.gas import gas_volume
+from ringbalance.reduced_model.injection.records import P, X
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import in_place
 
 _has_held: Final = in_place(has_held)
 _has_risen: Final = in_place(has_risen)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.formulas import NOTICEABLE
-from ringbalance.controller.liquid_ring.compiled_events import command
-from ringbalance.controller.liquid_ring.compiled_lift import shown
-from ringbalance.controller.liquid_ring.compiled_march import advance, least_later, opening_within
 from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
-from ringbalance.controller.liquid_ring.records import WORK, X
 from ringbalance.controller.loop_records import GAS_POINTS, TAIL_POINTS, Record
 from ringbalance.controller.moment_table import pair_moment
+from ringbalance.reduced_model.injection.events import command
+from ringbalance.reduced_model.injection.lift import shown
+from ringbalance.reduced_model.injection.march import advance, least_later, opening_within
+from ringbalance.reduced_model.injection.records import WORK, X
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import in_place
 
 
 @in_place

@@ -1,9 +1,8 @@
 """Pure functions of numbers that a single run interprets and an ensemble compiles.
 
 One formula, one place: each calls nothing but `math`, so that it is compiled as it stands.  Tables are cubic
-between two nodes; the target-vector
-algorithm goes from what a sensor shows to valve-open times; gas flows through a valve or line by ISO 6358;
-and the loop stops cycling for a cause, by what counts as a rise, a turn and a movement.
+between two nodes; the target-vector algorithm goes from what a sensor shows to valve-open times; and the loop
+stops cycling for a cause, by what counts as a rise, a turn and a movement.
 """
 
 from __future__ import annotations
@@ -91,31 +90,6 @@ def valve_time(share: float, offset: float, minimum_gas_time: float, maximum_gas
     the minimum.
     """
     return min(share + offset, maximum_gas_time) if share > 0.0 and share >= minimum_gas_time else 0.0
-
-
-LAMINAR_RATIO: Final = 0.999
-"""Pressure ratio above which the conductance is taken as laminar."""
-
-
-def flow_shape(ratio: float, critical_ratio: float) -> float:
-    """phi(r), the mass flow over its choked value: 1 up to b, 0 at r = 1.
-
-    An ellipse above b, and straight from r = 0.999 on, where the flow is laminar and its slope infinite.
-    """
-    if ratio <= critical_ratio:
-        return 1.0
-    held = min(ratio, max(LAMINAR_RATIO, critical_ratio))
-    ellipse = math.sqrt(max(1.0 - ((held - critical_ratio) / (1.0 - critical_ratio)) ** 2, 0.0))
-    return ellipse if ratio == held else ellipse * (1.0 - ratio) / (1.0 - held)
-
-
-def flow_shape_slope(ratio: float, critical_ratio: float, shape: float) -> float:
-    """dphi/dr, with phi(r) given."""
-    if ratio <= critical_ratio:
-        return 0.0
-    if ratio > max(LAMINAR_RATIO, critical_ratio):
-        return -shape / max(1.0 - ratio, 1e-300)
-    return -(ratio - critical_ratio) / (1.0 - critical_ratio) ** 2 / max(shape, 1e-300)
 
 
 NOTICEABLE: Final = 1e-12

@@ -14,9 +14,7 @@ from ringbalance.controller.algorithms.built_in import BuiltIn, command_of, show
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.checks import check_fit, check_settings
 from ringbalance.controller.formulas import Cause
-from ringbalance.controller.liquid_ring.motion import RELATIVE_ERROR
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, Operation
-from ringbalance.controller.liquid_ring.records import EVENTS
 from ringbalance.controller.loop_plan import CHUNK, LoopPlan, RunsInHand, Trace, joined
 from ringbalance.controller.outcome import Facts
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
@@ -25,6 +23,8 @@ from ringbalance.controller.simulation import Injection, Outcome, Sample, Simula
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.injection.dynamics import RELATIVE_ERROR
+from ringbalance.reduced_model.injection.records import EVENTS
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio

@@ -14,8 +14,6 @@ from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.compiled_loop import continue_runs
 from ringbalance.controller.formulas import NONE
-from ringbalance.controller.liquid_ring.motion import Dynamics
-from ringbalance.controller.liquid_ring.records import MOTION, WORKSPACE
 from ringbalance.controller.loop_records import (
     GAS_LINE,
     GAS_POINTS,
@@ -30,6 +28,8 @@ from ringbalance.controller.loop_records import (
 from ringbalance.controller.moment_table import MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.records import MOTION, WORKSPACE
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene

@@ -11,7 +11,6 @@ import numpy as np
 from ringbalance.controller.algorithms.built_in import BELOW_MINIMUM, NO_SAMPLE
 from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.simulation import (
     NOISE_DEVIATIONS,
@@ -21,6 +20,7 @@ from ringbalance.controller.simulation import (
     noise_floor,
 )
 from ringbalance.controller.tuning.loop_factor import LoopFactor
+from ringbalance.reduced_model.injection.records import Event
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

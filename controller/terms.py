@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from ringbalance.controller.liquid_ring.motion import Column, Dynamics, Lift, gives_forces
-from ringbalance.physics.gas import VENTED, GasLine
+from ringbalance.physics.gas import GasLine
+from ringbalance.reduced_model.injection.dynamics import Dynamics, gives_forces
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import (
@@ -54,21 +54,14 @@ def dynamics_of(
     """
     if not checked:
         _check(scene, model, modelled)
-    line = GasLine.of(scene.gas) if FILLING in modelled else None
-    gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
-    return Dynamics(
-        column=Column.of(law=model.flow, tube=scene.tube, gas_off=gas_off),
+    return Dynamics.of(
+        scene,
+        model,
         inertia=INERTIA in modelled,
-        line=line,
+        line=GasLine.of(scene.gas) if FILLING in modelled else None,
         valve_lag=(scene.gas.valve_lag or 0.0) if LAG in modelled else 0.0,
-        gas_pressure=scene.gas.pressure,
-        ambient_pressure=scene.gas.ambient_pressure,
-        dead_volume=scene.gas.dead_volume or 0.0,
-        tube_area=model.tube_area,
-        chamber_volume=model.chamber_volume,
-        max_fill_ratio=model.flow.max_fill_ratio,
+        lifts=HELD in modelled,
         residual=residual_fill,
-        lift=Lift.of(scene, law=model.flow) if HELD in modelled else None,
     )
 
 

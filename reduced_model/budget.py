@@ -12,8 +12,7 @@ import numpy as np
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.core import Answers
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.operating.crest_margin import DirectedState
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, DirectedState
 from ringbalance.reduced_model.operating.point import OperatingPoint
 from ringbalance.reduced_model.operating.residual import ResidualLiquid
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty

@@ -27,9 +27,8 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.loading import load_law
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law, paper_model
-from ringbalance.reduced_model.operating.holding import Holding
 from ringbalance.reduced_model.operating.point import OperatingPoint
-from ringbalance.reduced_model.operating.residual import ResidualLiquid
+from ringbalance.reduced_model.operating.residual import Holding, ResidualLiquid
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
 from ringbalance.reduced_model.terms import ModelUsed, models_used
 from ringbalance.reduced_model.tube.heads import TubeHeads

@@ -3,7 +3,8 @@
 A line that a scene does not give is a range, not an absence: conductances of small valves behind a rotary
 distributor and their switching times, of which both ends are answered for.
 
-The liquid that an opening moves is that of `short_injection`.
+What an opening moves is that of one run of the march, with the lift to the crest and, by the calibrated law,
+the liquid's mass.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
 from typing import Any, Final
 
 from ringbalance.physics.gas import GasLine
+from ringbalance.reduced_model.injection.dynamics import Dynamics, gives_forces
+from ringbalance.reduced_model.injection.injections import Injections
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.short_injection import Fills, ShortInjection, short_injections
+from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Gas, Scene
 
@@ -99,11 +102,26 @@ def _end(gas: Gas, name: str, place: int) -> _LineEnd:
 
 def line_answers(scene: Scene, model: BalancerModel) -> tuple[LineAnswer, ...]:
     """What the balancer's gas line can deliver, for each of `line_ends`, at equal fills of a pair."""
-    fill = model.flow.max_fill_ratio / 2
-    fills = Fills(model=model, driven=fill, opposite=fill)
-    ends = line_ends(scene)
-    injections = short_injections(scene, [end.line for end in ends], fills)
-    return tuple(_answer(scene, end, fills, one) for end, one in zip_longest(ends, injections))
+    return tuple(_answer(scene, end, model) for end in line_ends(scene))
+
+
+def _injections(scene: Scene, line: GasLine, model: BalancerModel) -> Injections:
+    """At equal fills; a law that gives no forces fills gas at once."""
+    dynamics = Dynamics.of(
+        scene,
+        model,
+        inertia=isinstance(model.flow, CalibratedLaw),
+        line=line if gives_forces(model.flow) else None,
+        lifts=True,
+    )
+    total = model.flow.max_fill_ratio
+    return Injections.of(dynamics, model, fill=total / 2, total=total)
+
+
+def _holds(model: BalancerModel) -> bool:
+    """Whether what an injection moves at equal fills stays moved with the gas off."""
+    law = model.flow
+    return not isinstance(law, CalibratedLaw | PaperLaw) or law.holds(law.max_fill_ratio / 2)
 
 
 def largest_correction(limit: float, *, chambers: int) -> float:
@@ -116,13 +134,10 @@ def largest_correction(limit: float, *, chambers: int) -> float:
     return 2 * limit / _largest_standing([1.0] * chambers)
 
 
-def _vibration(scene: Scene, fills: Fills, metres: float) -> float:
-    """By which a column that has moved between equal fills changes the vibration, m."""
-    model = fills.model
-    moved = metres * model.tube_area / model.chamber_volume
-    moment = model.moment.pair_moment(
-        fill_ratio=fills.driven - moved, opposite_fill_ratio=fills.opposite + moved
-    )
+def _vibration(scene: Scene, model: BalancerModel, moved: float) -> float:
+    """By which a fill ratio that has moved between equal fills changes the vibration, m."""
+    fill = model.flow.max_fill_ratio / 2
+    moment = model.moment.pair_moment(fill_ratio=fill - moved, opposite_fill_ratio=fill + moved)
     return abs(float(moment)) * scene.rotor.influence_coefficient
 
 
@@ -160,18 +175,20 @@ def _largest_standing(times: Sequence[float]) -> float:
     return max(abs(one + other * turn) for one, other in zip(times, [*times[1:], times[0]], strict=True))
 
 
-def _answer(scene: Scene, end: _LineEnd, fills: Fills, injection: ShortInjection | None) -> LineAnswer:
-    line, limit, volume = end.line, scene.controller.limit, fills.gas_volume(scene)
+def _answer(scene: Scene, end: _LineEnd, model: BalancerModel) -> LineAnswer:
+    line, limit, holds = end.line, scene.controller.limit, _holds(model)
+    volume = (1 - model.flow.max_fill_ratio / 2) * model.chamber_volume + (scene.gas.dead_volume or 0.0)
+    injections = _injections(scene, line, model) if holds else None
     opening = correction = dead = standing = None
-    if injection is not None:
-        shortest = injection.shortest(end.valve_lag)
-        opening, correction = shortest.time, _vibration(scene, fills, shortest.metres)
+    if injections is not None and injections.shortest is not None:
+        opening = max(injections.shortest, end.valve_lag)
+        moved = injections.moved(opening)
+        correction = _vibration(scene, model, moved)
         # Under extreme laws the shortest injection may move nothing: then no vibration belongs to a way.
         if correction > 0:
-            metres = limit * shortest.metres / correction
-            dead = float(injection.dead_time(metres, least=end.valve_lag))
-            rate = limit / metres * fills.steady_velocity(scene.gas.pressure)
-            standing = _at_equal_fills(scene, dead, rate=rate)
+            amount = limit * moved / correction
+            dead = injections.dead_time(amount, least=end.valve_lag)
+            standing = _at_equal_fills(scene, dead, rate=limit / amount * injections.steady)
     return LineAnswer(
         end=end.name,
         conductance=line.conductance,
@@ -185,7 +202,7 @@ def _answer(scene: Scene, end: _LineEnd, fills: Fills, injection: ShortInjection
         limit=limit,
         largest_correction=largest_correction(limit, chambers=scene.disc.chambers),
         dead_time=dead,
-        holds=fills.hold,
+        holds=holds,
         standing_amplitude=standing,
     )
 

@@ -17,7 +17,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from ringbalance.controller.compilation.cache import (
+from ringbalance.reports.provenance import versions
+from ringbalance.scene.faults import toml_text
+from ringbalance.scene.platform.compilation.cache import (
     OTHER,
     checked_content,
     code_root,
@@ -25,8 +27,6 @@ from ringbalance.controller.compilation.cache import (
     trusted,
     write_checked,
 )
-from ringbalance.reports.provenance import versions
-from ringbalance.scene.faults import toml_text
 
 Record = dict[str, Any]
 

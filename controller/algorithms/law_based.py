@@ -15,19 +15,18 @@ import numpy.typing as npt
 
 from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
 from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
-from ringbalance.controller.compilation.compiled import in_place
-from ringbalance.controller.liquid_ring.compiled_column import steady
-from ringbalance.controller.liquid_ring.compiled_events import command
-from ringbalance.controller.liquid_ring.compiled_lift import shown
-from ringbalance.controller.liquid_ring.compiled_march import advance
-from ringbalance.controller.liquid_ring.interval import packed
-from ringbalance.controller.liquid_ring.motion import Motion
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.records import EVENTS, WORKSPACE, Event, X
 from ringbalance.controller.loop_records import LAW_BASED, Record
 from ringbalance.controller.moment_table import MomentTable, pair_moment
 from ringbalance.controller.rotor import chamber_directions
+from ringbalance.reduced_model.injection.column import steady
+from ringbalance.reduced_model.injection.events import command
+from ringbalance.reduced_model.injection.lift import shown
+from ringbalance.reduced_model.injection.march import advance
+from ringbalance.reduced_model.injection.pair import Motion, packed
+from ringbalance.reduced_model.injection.records import EVENTS, WORKSPACE, Event, X
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import in_place
 
 PRIOR_STANDARD_DEVIATION: Final = 0.5
 """Standard deviation, relative, of the assumed influence coefficient before the first operation."""

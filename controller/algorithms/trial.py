@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
-from ringbalance.controller.compilation.compiled import in_place
 from ringbalance.controller.loop_records import NO_PHASE, TRIAL, Record
+from ringbalance.scene.platform.compilation.compiled import in_place
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.plant.integrate import plant_step
 from ringbalance.controller.eccentric_mass.plant.open_loop import Progress, run_plant, stretches
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at, turned
@@ -28,6 +27,7 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 NOISES = 8
 """Random numbers that one sample takes: four of vibration, two angles, two rates."""

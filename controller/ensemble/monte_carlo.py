@@ -13,9 +13,9 @@ import numpy as np
 from ringbalance.controller.checks import check_fit
 from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns
 from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
-from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.describe import scene_fault

@@ -11,9 +11,9 @@ from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.ensemble.samples import LARGEST_RATIO, Members
 from ringbalance.controller.formulas import AT_REST, HELD, IDLE, NOTICEABLE, RISING
-from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.loop_plan import LoopPlan, Records
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
+from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import Drawing
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray

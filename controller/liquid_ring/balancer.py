@@ -28,7 +28,6 @@ from ringbalance.controller.document import simulation_history
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
 from ringbalance.controller.line_runs import line_runs, line_runs_table
-from ringbalance.controller.liquid_ring.motion import gives_forces
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
 from ringbalance.controller.simulation import Simulation
@@ -39,9 +38,9 @@ from ringbalance.controller.tuning.settling import drawn_run
 from ringbalance.controller.tuning.tune import Tuning, tune
 from ringbalance.reduced_model.calibration import calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.injection.dynamics import gives_forces
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.completing import completed_model, lacking
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.model import BalancerModel, completed_model, lacking
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
 from ringbalance.results.findings import Finding

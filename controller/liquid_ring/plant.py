@@ -12,11 +12,18 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ringbalance.controller.formulas import NOTICEABLE
-from ringbalance.controller.liquid_ring.interval import Passage, longest_opening, opened, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, PairState, Record
 from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
-from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.rotor import chamber_directions, disc_unbalance
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.pair import (
+    PairState,
+    Passage,
+    Record,
+    longest_opening,
+    opened,
+    pass_time,
+)
+from ringbalance.reduced_model.injection.records import Event
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import stalled_fill_ratio

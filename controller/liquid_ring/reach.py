@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
 from ringbalance.reduced_model.law.flow_law import FlowLaw
-from ringbalance.reduced_model.short_injection import least_pressure
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
 NEAR_RESIDUAL: Final = 1e-6
@@ -15,6 +15,9 @@ NEAR_RESIDUAL: Final = 1e-6
 what is left above it changes no vibration."""
 _MAX_DOUBLINGS: Final = 40
 _REFINEMENTS: Final = 6
+"""Each leaves a 256th of the range."""
+_PRESSURES: Final = 257
+"""Few calls of the law with many pressures cost least."""
 NEARLY_EMPTY: Final = 1e-6
 """Fill ratio at which a chamber's last liquid is looked at."""
 LEAST_PRESSURE: Final = 1.0
@@ -49,7 +52,20 @@ def starting_pressure(
         return above
     for doubled in range(_MAX_DOUBLINGS):
         low = above * 2.0**doubled
-        found = least_pressure(flows, low, 2.0 * low, refinements=_REFINEMENTS)
+        found = _least_pressure(flows, low, 2.0 * low)
         if found is not None:
             return found
     return None
+
+
+def _least_pressure(flows: Callable[[FloatArray], BoolArray], low: float, high: float) -> float | None:
+    """Smallest pressure from `low` on from which on liquid flows up to `high`; None where it does not."""
+    for _ in range(_REFINEMENTS):
+        p = np.linspace(low, high, _PRESSURES)
+        dry = np.flatnonzero(~flows(p))
+        if dry.size == 0:
+            return low
+        if dry[-1] == p.size - 1:
+            return None
+        low, high = float(p[dry[-1]]), float(p[dry[-1] + 1])
+    return high

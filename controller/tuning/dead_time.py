@@ -13,23 +13,16 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy.optimize import brentq
 
-from ringbalance.controller.liquid_ring.interval import pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Switch
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
-from ringbalance.reduced_model.gas_line import line_ends, standing_amplitude
+from ringbalance.reduced_model.gas_line import standing_amplitude
+from ringbalance.reduced_model.injection.injections import Injections
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.short_injection import Fills, short_injections
 from ringbalance.reduced_model.terms import FILLING, HELD
 from ringbalance.results.findings import Finding
 from ringbalance.scene.models import Scene
 
-_TAIL: Final = 0.5
-"""s, in which a vented column has come to rest."""
-_LONGEST: Final = 0.1
-"""s, that a lift can take."""
 _DIGITS: Final = 4
 """Of an offset in s: a tenth of a millisecond."""
 
@@ -43,42 +36,24 @@ def dead_times(scene: Scene, model: BalancerModel) -> tuple[float, ...]:
     modelled = terms_modelled(run_models(scene=scene, model=model))
     if not {FILLING, HELD} & set(modelled):
         return ()
-    dynamics = None if FILLING in modelled else dynamics_of(scene=scene, model=model, modelled=modelled)
-    total, fills = 2 * scene.disc.initial_fill, balanced_fills(scene, model)
-    driven, rates = np.concatenate([fills, total - fills]), vibration_rates(scene, model)
+    dynamics = dynamics_of(scene=scene, model=model, modelled=modelled)
+    total, half = 2 * scene.disc.initial_fill, scene.disc.chambers // 2
+    fills, rates = balanced_fills(scene, model), vibration_rates(scene, model)
+    driven = np.concatenate([fills, total - fills])
+    injections = (
+        Injections.of(dynamics, model, fill=float(x), total=total, chamber=i // half)
+        for i, x in enumerate(driven)
+    )
     return tuple(
-        _dead_time(
-            scene, Fills(model=model, driven=float(x), opposite=float(total - x)), dynamics, rate=float(b)
-        )
-        for x, b in zip(driven, rates.T.ravel(), strict=True)
+        _dead_time(scene, each, rate=float(b)) for each, b in zip(injections, rates.T.ravel(), strict=True)
     )
 
 
-def _dead_time(scene: Scene, fills: Fills, dynamics: Dynamics | None, *, rate: float) -> float:
-    injections = short_injections(scene, [line_ends(scene)[0].line], fills)
-    if not injections or rate == 0.0:
+def _dead_time(scene: Scene, injections: Injections, *, rate: float) -> float:
+    if rate <= 0.0:
         return 0.0
-    steady = scene.controller.limit / rate
-    metres = steady * fills.steady_velocity(scene.gas.pressure)
-    lost = injections[0].dead_time(metres) if dynamics is None else _lost(fills, dynamics, metres, steady)
-    return round(max(float(lost), 0.0), _DIGITS)
-
-
-def _lost(fills: Fills, dynamics: Dynamics, metres: float, steady: float) -> float:
-    """Valve-open time that the plant loses of the injection that moves the column by `metres`, s."""
-    total, lag = fills.driven + fills.opposite, dynamics.valve_lag
-    per_metre = dynamics.tube_area / dynamics.chamber_volume
-
-    def short(opening: float) -> float:
-        valve = tuple(Switch(after=lag + after, chamber=0, opens=after == 0.0) for after in (0.0, opening))
-        pair = PairState(fill=fills.driven, total=total, motion=Motion(pending=valve))
-        end = pass_time(dynamics, pair, instants=np.array([lag + opening + _TAIL]))
-        return (fills.driven - end.fill) / per_metre - metres
-
-    longest = steady + _LONGEST
-    if not short(steady) < 0 < short(longest):
-        return 0.0
-    return float(brentq(short, steady, longest, xtol=1e-5 * _LONGEST)) - steady
+    lost = injections.dead_time(scene.controller.limit / rate * injections.steady)
+    return round(max(lost, 0.0), _DIGITS)
 
 
 def compensated(scene: Scene, model: BalancerModel, dead: tuple[float, ...]) -> Scene:

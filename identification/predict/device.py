@@ -16,17 +16,16 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.compiled_events import command
-from ringbalance.controller.liquid_ring.compiled_march import advance
-from ringbalance.controller.liquid_ring.interval import packed
-from ringbalance.controller.liquid_ring.motion import Motion
-from ringbalance.controller.liquid_ring.records import WORKSPACE, X
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.data.measurements import Observations
+from ringbalance.reduced_model.injection.events import command
+from ringbalance.reduced_model.injection.march import advance
+from ringbalance.reduced_model.injection.pair import Motion, packed
+from ringbalance.reduced_model.injection.records import WORKSPACE, X
 from ringbalance.reduced_model.law.building import nominal_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.holding import Holding
+from ringbalance.reduced_model.operating.residual import Holding
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene

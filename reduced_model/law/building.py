@@ -10,8 +10,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes
-from ringbalance.reduced_model.chamber.pressure_table import pressure_table
+from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_table
 from ringbalance.reduced_model.chamber.range import mean_gravity
 from ringbalance.reduced_model.chamber.values import RingValues, share_across
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment

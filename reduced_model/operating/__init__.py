@@ -1,5 +1,5 @@
 """What a flow law says at single states: operating point, thresholds, pressure profile, residual liquid.
 
-A new limit of the liquid column goes into `crest_margin`, a new pressure that starts or stops a flow into
+A new pressure that starts or stops a flow into
 `point`.
 """

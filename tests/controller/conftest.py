@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from ringbalance.controller.liquid_ring import compiled_column
-from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Switch
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.injection import column
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage, Switch, pass_time
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
@@ -221,15 +221,15 @@ class Forces:
         """Velocity out of chamber 0, whether separated, whether the tube holds a column."""
         known = self.dynamics.kept_plant(total=0.5)[0]
         given = (known, *fills, *gases, primed, 0.0)
-        return *compiled_column.steady(*given), compiled_column.holds(*given)
+        return *column.steady(*given), column.holds(*given)
 
     def accelerations(
         self, fills: tuple[float, float], gases: tuple[float, float], *, speed: float, primed: bool = True
     ) -> tuple[float, float]:
         """Of a full and of a separated column that flows out of chamber 0."""
         known = self.dynamics.kept_plant(total=0.5)[0]
-        at = compiled_column.ends(known, *fills, *gases, 1)
-        return compiled_column.accelerations(known, at, speed, 1, primed, 0.0)[:2]
+        at = column.ends(known, *fills, *gases, 1)
+        return column.accelerations(known, at, speed, 1, primed, 0.0)[:2]
 
 
 @pytest.fixture(scope="session")

@@ -9,10 +9,10 @@ import pytest
 
 from ringbalance import bundled_scene, load_scene
 from ringbalance.controller.ensemble.samples import MemberUncertainty
-from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.injection.records import Event
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.scene.models import Scene

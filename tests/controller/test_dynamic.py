@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from ringbalance.controller.formulas import flow_shape
-from ringbalance.controller.liquid_ring import compiled_column
-from ringbalance.controller.liquid_ring.compiled_gas import line_rates
-from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState
-from ringbalance.physics.gas import GasLine
+from ringbalance.physics.gas import GasLine, flow_shape
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.injection import column
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.gas import line_rates
+from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage, pass_time
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -92,9 +91,9 @@ def test_the_derivatives_of_the_column_are_those_of_its_acceleration(
         speed = float(random.uniform(0.5, 20.0))
 
         def smaller(speed: float, at: FloatArray) -> float:
-            return min(compiled_column.accelerations(known, tuple(at), speed, 1, primed, 0.0)[:2])
+            return min(column.accelerations(known, tuple(at), speed, 1, primed, 0.0)[:2])
 
-        found = compiled_column.accelerations(known, tuple(at), speed, 1, primed, 0.0)
+        found = column.accelerations(known, tuple(at), speed, 1, primed, 0.0)
         seen.add(found[0] < found[1])
         slopes = [(smaller(speed * (1 + 1e-6), at) - smaller(speed * (1 - 1e-6), at)) / (2e-6 * speed)]
         for place in (0, 2, 1, 3):

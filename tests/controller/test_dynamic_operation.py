@@ -12,12 +12,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ringbalance.controller.liquid_ring.interval import Passage, pass_time
-from ringbalance.controller.liquid_ring.motion import Dynamics, PairState
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.pair import PairState, Passage, pass_time
+from ringbalance.reduced_model.injection.records import Event
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.model import BalancerModel
@@ -279,7 +279,7 @@ def test_the_opposite_chamber_can_be_full(model: BalancerModel, plant: Plant, pu
 def test_work_bounds_the_integrators_steps(
     calibrated: BalancerModel, plant: Plant, monkeypatch: pytest.MonkeyPatch, pulse: Pulse
 ) -> None:
-    monkeypatch.setattr("ringbalance.controller.liquid_ring.motion.MOST_STEPS", 20)
+    monkeypatch.setattr("ringbalance.reduced_model.injection.dynamics.MOST_STEPS", 20)
     found = pulse(plant(calibrated, "tube inertia", "gas filling", **PIPED), 0.5, np.array([0.6]))
     assert found.motion.record.event is Event.UNFINISHED
     assert 0 <= found.fill <= 0.5
@@ -296,7 +296,7 @@ def test_a_creep_through_a_narrow_tube_takes_few_steps(
         environment=replace(scene.environment, gravity=0.0),
     )
     own = plant(calibrate(thick).model, "tube inertia")
-    monkeypatch.setattr("ringbalance.controller.liquid_ring.motion.MOST_STEPS", 5000)
+    monkeypatch.setattr("ringbalance.reduced_model.injection.dynamics.MOST_STEPS", 5000)
     instants = np.array([0.5, 5.0, 50.0])
     found = pass_time(own, PairState(fill=0.3, total=0.5, primed=True), instants=instants)
 
@@ -325,7 +325,7 @@ def test_a_creep_near_its_balance_takes_few_steps(
         environment=replace(scene.environment, gravity=0.0),
     )
     own = plant(calibrate(thick).model, "tube inertia")
-    monkeypatch.setattr("ringbalance.controller.liquid_ring.motion.MOST_STEPS", 5000)
+    monkeypatch.setattr("ringbalance.reduced_model.injection.dynamics.MOST_STEPS", 5000)
     left = []
     for offset in (1e-5, 1e-7):
         found = pass_time(

@@ -12,10 +12,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.interval import Passage
-from ringbalance.controller.liquid_ring.motion import Dynamics
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.records import Event
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import GasUse
 from ringbalance.mesh.geometry import surface_radius
@@ -23,12 +20,14 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import (
     largest_correction,
     line_answers,
-    line_ends,
     line_text,
     line_warning,
 )
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.injections import Injections
+from ringbalance.reduced_model.injection.pair import Passage
+from ringbalance.reduced_model.injection.records import Event
 from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.short_injection import Fills, short_injections
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.models import Scene
 
@@ -48,7 +47,6 @@ def _change(calibrated: BalancerModel, scene: Scene, moved: float) -> float:
 def test_the_smallest_correction_is_that_of_the_plant(
     calibrated: BalancerModel, plant: Plant, pulse: Pulse, scene: Scene
 ) -> None:
-    """Within 10 %: the estimate takes the fills as constant while the chamber vents."""
     for answer in line_answers(scene, calibrated):
         line = {"conductance": answer.conductance, "critical_ratio": answer.critical_ratio}
         dynamics = plant(calibrated, "gas filling", LIFT, "tube inertia", **line)
@@ -59,7 +57,7 @@ def test_the_smallest_correction_is_that_of_the_plant(
         # Before the tube is primed liquid at most spills over the crest.
         spilled, moved = (0.25 - pulse(dynamics, part * opening, end).fill for part in (0.99, 1.01))
         assert 0 <= spilled < moved
-        assert answer.smallest_correction == pytest.approx(_change(calibrated, scene, moved), rel=0.1)
+        assert answer.smallest_correction == pytest.approx(_change(calibrated, scene, moved), rel=0.05)
 
 
 def test_the_mass_of_the_column_counts_in_a_short_injection(
@@ -74,30 +72,8 @@ def test_the_mass_of_the_column_counts_in_a_short_injection(
     moved, at_once = (
         0.25 - pulse(each, answer.shortest_opening, np.array([3.0])).fill for each in (heavy, light)
     )
-    assert answer.smallest_correction == pytest.approx(_change(calibrated, scene, moved), rel=0.1)
+    assert answer.smallest_correction == pytest.approx(_change(calibrated, scene, moved), rel=1e-3)
     assert moved > 1.1 * at_once
-
-
-@pytest.mark.parametrize("pressure", [0.7e6, 1.05e6])
-@pytest.mark.parametrize("conductance", [0.6e-8, 2e-8, 5e-8, 20e-8])
-def test_a_fast_line_moves_as_much_as_in_the_plant(
-    calibrated: BalancerModel,
-    plant_of: Plant,
-    pulse: Pulse,
-    scene: Scene,
-    conductance: float,
-    pressure: float,
-) -> None:
-    """Within 10 % to either side, just primed and open for 5 ms longer; separated columns start and stop."""
-    gas = replace(scene.gas, conductance=conductance, critical_ratio=0.3, valve_lag=0.0, pressure=pressure)
-    given = replace(scene, gas=gas)
-    dynamics = plant_of(given, calibrated, "gas filling", "tube inertia", LIFT)
-    (end,) = line_ends(given)
-    (estimate,) = short_injections(given, [end.line], Fills(model=calibrated, driven=0.25, opposite=0.25))
-    primed, volume = estimate.shortest(0.0).time, calibrated.chamber_volume / calibrated.tube_area
-    for opening in (1.02 * primed, primed + 5e-3):
-        moved = (0.25 - pulse(dynamics, opening, np.array([3.0])).fill) * volume
-        assert estimate.shortest(opening).metres == pytest.approx(moved, rel=0.1)
 
 
 @pytest.mark.parametrize("fill", [0.15, 0.25, 0.35])
@@ -108,17 +84,13 @@ def test_the_dead_time_is_that_of_the_plant(
     gas = replace(scene.gas, conductance=0.6e-8, critical_ratio=0.3, valve_lag=4e-3, pressure=0.9e6)
     given = replace(scene, gas=gas)
     dynamics = plant_of(given, calibrated, "gas filling", "tube inertia", "valve lag", LIFT)
-    fills = Fills(model=calibrated, driven=fill, opposite=0.5 - fill)
-    (end,) = line_ends(given)
-    (estimate,) = short_injections(given, [end.line], fills)
-    wanted = 0.02 * fills.steady_velocity(0.9e6)
-    opening = estimate.dead_time(wanted) + 0.02
+    injections = Injections.of(dynamics, calibrated, fill=fill, total=0.5)
+    wanted = 0.02 * injections.steady
+    opening = injections.dead_time(wanted) + 0.02
     moved = fill - pulse(dynamics, opening, np.array([3.0]), fill=fill).fill
-    metres = moved * calibrated.chamber_volume / calibrated.tube_area
-    assert metres == pytest.approx(wanted, rel=0.1)
+    assert moved == pytest.approx(wanted, rel=1e-3)
     # Without it most of the injection only fills gas.
-    short = fill - pulse(dynamics, 0.02, np.array([3.0]), fill=fill).fill
-    assert short * calibrated.chamber_volume / calibrated.tube_area < 0.5 * wanted
+    assert fill - pulse(dynamics, 0.02, np.array([3.0]), fill=fill).fill < 0.5 * wanted
 
 
 def test_a_line_that_is_not_given_is_a_range(calibrated: BalancerModel, scene: Scene) -> None:
@@ -147,7 +119,8 @@ def test_up_to_the_largest_correction_every_vibration_is_brought_to_the_limit(ch
 def test_a_fast_line_delivers_what_its_lag_lets_it(calibrated: BalancerModel, scene: Scene) -> None:
     """As C grows the chamber fills at once, and a valve open for its lag moves u S T less half of the arc.
 
-    The mass of the column takes its start-up time, 2 L/((k + 1) u), of it, of which 0.2 s has little.
+    The mass of the column takes its start-up time, 2 L/((k + 1) u), of it, of which 0.2 s has little;
+    the levels shift meanwhile.
     """
     gas = replace(scene.gas, conductance=1e-4, critical_ratio=0.3, valve_lag=2e-1)
     (given,) = line_answers(replace(scene, gas=gas), calibrated)
@@ -159,7 +132,7 @@ def test_a_fast_line_delivers_what_its_lag_lets_it(calibrated: BalancerModel, sc
     moved = way * calibrated.tube_area / calibrated.chamber_volume
     moment = calibrated.moment.pair_moment(fill_ratio=0.25 - moved, opposite_fill_ratio=0.25 + moved)
     change = abs(float(moment)) * scene.rotor.influence_coefficient
-    assert given.smallest_correction == pytest.approx(change, rel=1e-2)
+    assert given.smallest_correction == pytest.approx(change, rel=2e-2)
     assert line_warning((replace(given, largest_correction=1.1 * change),)) == ""
     weak = replace(scene, gas=replace(gas, pressure=0.05e6))
     (none,) = line_answers(weak, calibrated)

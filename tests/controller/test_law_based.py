@@ -18,12 +18,12 @@ from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
 from ringbalance.controller.algorithms.law_based import LawBased, learnt
 from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
-from ringbalance.controller.liquid_ring.motion import PairState
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.loop_records import MOMENT_NODES, RUN
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
+from ringbalance.reduced_model.injection.pair import PairState
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.scene.models import Scene

@@ -11,13 +11,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ringbalance.controller.liquid_ring.compiled_column import ends
-from ringbalance.controller.liquid_ring.compiled_lift import crest_start, crest_stop, lift_rates, shown
-from ringbalance.controller.liquid_ring.interval import Passage, packed
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion
 from ringbalance.physics.tube.state import tube_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import line_ends
+from ringbalance.reduced_model.injection.column import ends
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.lift import crest_start, crest_stop, lift_rates, shown
+from ringbalance.reduced_model.injection.pair import Motion, Passage, packed
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_span

@@ -13,7 +13,6 @@ import pytest
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.liquid_ring.motion import PairState
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import disc_unbalance
@@ -27,6 +26,7 @@ from ringbalance.controller.tuning.loop_factor import (
     vibration_rates,
 )
 from ringbalance.controller.tuning.recommendation import recommended_gain
+from ringbalance.reduced_model.injection.pair import PairState
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio

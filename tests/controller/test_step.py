@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ringbalance.controller.liquid_ring import compiled_column, compiled_step
-from ringbalance.controller.liquid_ring.motion import Dynamics
-from ringbalance.controller.liquid_ring.records import HEAD, TO_CREST
+from ringbalance.reduced_model.injection import column, step
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.records import HEAD, TO_CREST
 from ringbalance.reduced_model.law.model import BalancerModel
 
 
@@ -19,10 +19,10 @@ def plain_form() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     The program's own are transformed so that no product with the Jacobian is needed.
     """
     a, c = np.zeros((4, 4)), np.zeros((4, 4))
-    a[:, :2], c[:, :3] = compiled_step._A[[0, 1, 2, 2]], compiled_step._C
-    gamma = np.linalg.inv(np.eye(4) / compiled_step._GAMMA - c)
+    a[:, :2], c[:, :3] = step._A[[0, 1, 2, 2]], step._C
+    gamma = np.linalg.inv(np.eye(4) / step._GAMMA - c)
     alpha = a @ gamma
-    return alpha, alpha + gamma, compiled_step._B @ gamma, compiled_step._E @ gamma
+    return alpha, alpha + gamma, step._B @ gamma, step._E @ gamma
 
 
 def test_the_step_has_order_four_and_its_error_is_that_of_order_three() -> None:
@@ -50,5 +50,5 @@ def test_the_inverse_of_a_table_finds_what_the_table_gives(
         start = known["table_start"][which]
         end = start + known["pieces"][which] / known["nodes_per"][which]
         for x in [start - 3.0, start, *np.linspace(start, end, 300), end, end + 2.0]:
-            value = compiled_column.table(known, which, float(x))[0]
-            assert compiled_column._inverse(known, which, value) == pytest.approx(x, abs=1e-11)
+            value = column.table(known, which, float(x))[0]
+            assert column._inverse(known, which, value) == pytest.approx(x, abs=1e-11)

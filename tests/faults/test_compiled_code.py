@@ -13,15 +13,15 @@ from pathlib import Path
 
 import pytest
 
-from ringbalance.controller.compilation.cache import code_root
 from ringbalance.scene import bundled_scene
+from ringbalance.scene.platform.compilation.cache import code_root
 
 pytestmark = pytest.mark.faults
 
 PROGRAM = """
 import sys
 from typing import NamedTuple
-from ringbalance.controller.compilation.compiled import compiled
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 class Pair(NamedTuple):
     one: float
@@ -101,7 +101,7 @@ DAMAGE = (
     + """
 import random, shutil
 from pathlib import Path
-from ringbalance.controller.compilation.cache import code_root
+from ringbalance.scene.platform.compilation.cache import code_root
 
 def flip(path):
     content = bytearray(path.read_bytes())

@@ -10,7 +10,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.reduced_model import estimates
-from ringbalance.reduced_model.short_injection import _ridden
 from ringbalance.reduced_model.time_scales import (
     deciding_gas_time,
     long_start_up_loss,
@@ -81,19 +80,3 @@ def test_a_line_that_is_not_given_is_a_range_and_not_unknown(table_1_scene: Scen
     given = estimates.lag(dataclasses.replace(table_1_scene, gas=own))
     assert given.value == pytest.approx(0.25)
     assert given.default_range is None
-
-
-@pytest.mark.parametrize("push", [300.0, 0.0, -200.0])
-def test_a_column_rides_as_its_equation_of_motion_says(push: float) -> None:
-    path = solve_ivp(
-        lambda _, y: [push - 40 * y[0] ** 2, y[0]], (0, 5e-3), [2.0, 0.0], rtol=1e-10, atol=1e-12
-    )
-    expected = pytest.approx([float(values[-1]) for values in path.y], rel=1e-8)
-    assert list(_ridden(velocity=2.0, push=push, friction=40.0, time=5e-3)) == expected
-
-
-@pytest.mark.parametrize("velocity", [0.0, 2.0])
-@pytest.mark.parametrize("push", [-1e-323, 1e-323])
-def test_a_push_too_small_for_numbers_is_none(velocity: float, push: float) -> None:
-    plain, tiny = (_ridden(velocity=velocity, push=p, friction=1e9, time=0.01) for p in (0.0, push))
-    assert tiny == plain

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
     FilterMatrices,
     ProcessNoise,
@@ -23,6 +22,7 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
     sandwich,
 )
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 Pair = tuple[float, float]
 

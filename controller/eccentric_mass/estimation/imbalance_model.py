@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 _GAUSS_POINTS: FloatArray
 _GAUSS_WEIGHTS: FloatArray

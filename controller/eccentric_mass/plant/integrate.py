@@ -15,7 +15,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.plant.plant import (
     HELD,
@@ -32,6 +31,7 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     write_derivative,
 )
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 LONGEST: Final = 0.1
 """Greatest product of a substep and the plant's fastest rate."""

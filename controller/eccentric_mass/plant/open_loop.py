@@ -12,13 +12,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.plant.integrate import LONGEST, fastest_rate, plant_step
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.plant.plant import LOCKED, SIZE, STUCK, rest_state, stuck_flags
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.platform.compilation.compiled import compiled
 from ringbalance.scene.units import format_quantity
 
 MOST_SUBSTEPS: Final = 30_000_000

@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, Motor
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 
 class PlantParameters(NamedTuple):

@@ -40,9 +40,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 SLIDING: Final = 0
 STUCK: Final = 1

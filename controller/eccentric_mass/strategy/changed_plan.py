@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.strategy.correction import Correction
 from ringbalance.controller.eccentric_mass.strategy.plan import (
     MOVING,
@@ -15,6 +14,7 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
     Progress,
 )
 from ringbalance.controller.eccentric_mass.strategy.targets import Tuning
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 
 @compiled

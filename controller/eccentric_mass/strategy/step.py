@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
     FrictionEstimate,
     friction_restart,
@@ -59,6 +58,7 @@ from ringbalance.controller.eccentric_mass.strategy.supervisor import (
     supervise,
 )
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 _LARGEST_TURN: Final = 0.05
 """Of a mass within one step of the imbalance filter, rad, which takes its path as straight."""

@@ -6,7 +6,6 @@ import cmath
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import compiled
 from ringbalance.controller.eccentric_mass.strategy.changed_plan import (
     averaging_from,
     enter,
@@ -56,6 +55,7 @@ from ringbalance.controller.eccentric_mass.strategy.targets import (
     tuning_place,
     tuning_start,
 )
+from ringbalance.scene.platform.compilation.compiled import compiled
 
 # Plain numbers: the compiler takes enumerations, but not as fast.
 WAITING, IMBALANCE, FRICTION, POSITIONING, CHECK, CORRECTION, FINE_TUNING, REST, FAILED = map(int, Stage)

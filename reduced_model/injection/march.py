@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import in_place
-from ringbalance.controller.liquid_ring.compiled_column import open_to_gas
-from ringbalance.controller.liquid_ring.compiled_events import (
+from ringbalance.reduced_model.injection.column import open_to_gas
+from ringbalance.reduced_model.injection.events import (
     EMPTY,
     FULL,
     NONE,
@@ -35,9 +34,10 @@ from ringbalance.controller.liquid_ring.compiled_events import (
     starts,
     would_start,
 )
-from ringbalance.controller.liquid_ring.compiled_gas import end_pressure, near_end
-from ringbalance.controller.liquid_ring.compiled_lift import arrived, front, set_out, shown
-from ringbalance.controller.liquid_ring.compiled_step import (
+from ringbalance.reduced_model.injection.gas import end_pressure, near_end
+from ringbalance.reduced_model.injection.lift import arrived, front, set_out, shown
+from ringbalance.reduced_model.injection.records import EVENTS, Event, P, Record, U, X
+from ringbalance.reduced_model.injection.step import (
     BETWEEN,
     END,
     between,
@@ -45,8 +45,8 @@ from ringbalance.controller.liquid_ring.compiled_step import (
     shorten,
     take,
 )
-from ringbalance.controller.liquid_ring.records import EVENTS, Event, P, Record, U, X
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import in_place
 
 _ROUND_OFF: Final = 1e-12
 """s, of the clock of a valve."""
@@ -110,8 +110,7 @@ def advance(
 def _pause(plant: Record, motion: Record) -> None:
     """Liquid without mass has no motion of its own: the next instant finds it again."""
     if motion.direction != 0 and not (plant.inertia or motion.lifting):
-        motion.primed = 1 if holds_column(plant, motion, now(motion)) else 0
-        motion.direction = 0
+        motion.primed, motion.direction = 1 if holds_column(plant, motion, now(motion)) else 0, 0
 
 
 @in_place
@@ -169,6 +168,8 @@ def _march(
     while left > 0.0:
         if not goes_on:
             _settle(plant, motion)
+        if motion.primed and motion.filled < 0.0:
+            motion.filled = motion.now
         if motion.steps >= plant.most_steps:
             motion.event = _UNFINISHED
             _pass(plant, motion, left, notes, row, count)

@@ -111,6 +111,7 @@ _MOTION_REAL: Final = (
     "residual",  # fill of a driven chamber that no command goes below
     "closing_pressure",  # of the driven chamber's gas when its valve closed, gauge, Pa
     "ended",  # s since the interval began, at which the flow out of the driven chamber last ended
+    "filled",  # s since the interval began, at which the tube was first primed; below zero for not yet
     "run_dry",  # time for which its valve stays open to the empty chamber, s
     "front",  # fraction of the path up to which liquid stood in the tube at `started`, from chamber `side`
 )

@@ -18,8 +18,8 @@ import numba
 from numba.core import registry, sigutils, types
 from numba.core.compiler_lock import global_compiler_lock
 
-from ringbalance.controller.compilation.cache import KeptCode
-from ringbalance.controller.compilation.signals import signals_deferred, signals_live
+from ringbalance.scene.platform.compilation.cache import KeptCode
+from ringbalance.scene.platform.compilation.signals import signals_deferred, signals_live
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -174,11 +174,14 @@ def _digest() -> str:
     return total.hexdigest()[:16]
 
 
+_COMPILED: Final = ("controller", "reduced_model/injection")
+"""Folders whose functions are compiled, from the package's root."""
+
+
 def compiled_sources() -> tuple[Path, ...]:
-    """Every source of this room that holds functions that are compiled, and the machinery's own."""
-    machinery = Path(__file__).parent
-    formulas = machinery.parent / "formulas.py"
-    sources = sorted(machinery.parent.rglob("*.py"))
-    return tuple(
-        path for path in sources if path.parent == machinery or path == formulas or _MARK in path.read_bytes()
-    )
+    """Every source that holds functions that are compiled, and the machinery's own."""
+    machinery, root = Path(__file__).parent, Path(__file__).parents[3]
+    plain = {root / "controller/formulas.py", root / "physics/gas.py"}
+    sources = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
+    marked = [path for path in sources if _MARK in path.read_bytes()]
+    return tuple(sorted([*machinery.glob("*.py"), *plain, *marked]))

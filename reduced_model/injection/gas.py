@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import in_place, inlined
-from ringbalance.controller.formulas import LAMINAR_RATIO, flow_shape, flow_shape_slope
-from ringbalance.controller.liquid_ring.records import P, Record, X
+from ringbalance.physics.gas import LAMINAR_RATIO, flow_shape, flow_shape_slope
+from ringbalance.reduced_model.injection.records import P, Record, X
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compilation.compiled import in_place, inlined
 
 _LEAST_GAS: Final = 1e-3
 """Fraction of a chamber that liquid never takes from its gas."""

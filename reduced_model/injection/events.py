@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import in_place
-from ringbalance.controller.liquid_ring.compiled_column import (
+from ringbalance.reduced_model.injection.column import (
     accelerations,
     can_flow,
     clearance,
@@ -20,9 +19,10 @@ from ringbalance.controller.liquid_ring.compiled_column import (
     steady,
     tabled,
 )
-from ringbalance.controller.liquid_ring.compiled_lift import arrived, crest_stop, lift_push, shown
-from ringbalance.controller.liquid_ring.records import EVENTS, WORK, Event, P, Record, U, X
+from ringbalance.reduced_model.injection.lift import arrived, crest_stop, lift_push, shown
+from ringbalance.reduced_model.injection.records import EVENTS, WORK, Event, P, Record, U, X
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.scene.platform.compilation.compiled import in_place
 
 NONE: Final = EVENTS.index(Event.NONE)
 STALLED: Final = EVENTS.index(Event.STALLED)
@@ -52,7 +52,7 @@ def now(motion: Record) -> Four:
 
 @in_place
 def pair_ends(plant: Record, state: Four, direction: int) -> Four:
-    """Pressures at the tube's ends in a state, as `compiled_column.ends`."""
+    """Pressures at the tube's ends in a state, as `column.ends`."""
     x, _, p, q = state
     ambient = plant.ambient_pressure
     return ends(plant, x, plant.total - x, p - ambient, q - ambient, direction)
@@ -60,7 +60,7 @@ def pair_ends(plant: Record, state: Four, direction: int) -> Four:
 
 @in_place
 def _pair_steady(plant: Record, motion: Record, state: Four) -> tuple[float, bool]:
-    """Quasi-steady flow in a state, as `compiled_column.steady`."""
+    """Quasi-steady flow in a state, as `column.steady`."""
     x, _, p, q = state
     ambient, primed = plant.ambient_pressure, motion.primed > 0
     return steady(plant, x, plant.total - x, p - ambient, q - ambient, primed, motion.log_speed)

@@ -18,8 +18,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.controller.compilation.compiled import in_place, inlined
-from ringbalance.controller.liquid_ring.compiled_column import (
+from ringbalance.reduced_model.injection.column import (
     crest_margins,
     crest_slopes,
     crest_table,
@@ -29,8 +28,9 @@ from ringbalance.controller.liquid_ring.compiled_column import (
     quasi_steady,
     tube_loss,
 )
-from ringbalance.controller.liquid_ring.compiled_gas import gas_volume, line_rates
-from ringbalance.controller.liquid_ring.records import P, Record, U, X
+from ringbalance.reduced_model.injection.gas import gas_volume, line_rates
+from ringbalance.reduced_model.injection.records import P, Record, U, X
+from ringbalance.scene.platform.compilation.compiled import in_place, inlined
 
 _BEHIND: Final = 0.54956
 _ARRIVES: Final = 0.62435

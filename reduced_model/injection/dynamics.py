@@ -1,9 +1,9 @@
-"""One pair of chambers with moving liquid, filling gas and late valves: its state and what moves it."""
+"""What moves the liquid of a pair: a law's column, gas lines and valves, as a record for compiled code."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -11,15 +11,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from ringbalance.controller.liquid_ring.records import FLOWS, PIECES, PLANT, Event
 from ringbalance.physics.gas import (
     HEAT_CAPACITY_RATIO,
     REFERENCE_PRESSURE,
     REFERENCE_TEMPERATURE,
+    VENTED,
     GasLine,
 )
+from ringbalance.reduced_model.injection.records import FLOWS, PIECES, PLANT
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
+from ringbalance.reduced_model.law.flow_law import FlowLaw
+from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.heads import entrance_fraction
@@ -53,7 +55,7 @@ class Lift:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Column:
-    """What `compiled_column` takes its forces from: a law's own tables."""
+    """What `column` takes its forces from: a law's own tables."""
 
     density: float
     """rho, kg/m^3."""
@@ -146,90 +148,12 @@ def _straight(value: float, slope: float) -> HermiteTable:
     )
 
 
-Two = tuple[float, float]
-
 RELATIVE_ERROR: Final = 1e-9
 """Of each state, allowed to one step of a single run."""
 MOST_STEPS: Final = 200_000
 """Within one interval of time."""
 _FIRST_STEP: Final = 1e-4
 """s, at the most after a jump of the rates, at `RELATIVE_ERROR`; it grows as the method's order lets it."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Switch:
-    """A valve that has been commanded to move and has not moved yet."""
-
-    after: float
-    """s from now."""
-    chamber: int
-    """0 or 1."""
-    opens: bool
-
-
-@dataclass(frozen=True, kw_only=True)
-class Record:
-    """What the last command to a pair has done so far."""
-
-    chamber: int = 0
-    """0 or 1: the driven one."""
-    fill: float = 0.0
-    """x of the driven chamber at the command."""
-    work: float = 0.0
-    """Of the driven chamber's gas, integral of (p - ambient) dV, J."""
-    regime_start: Regime = Regime.BLOCKED
-    regime_end: Regime = Regime.BLOCKED
-    event: Event = Event.BLOCKED
-    closing_pressure: float = 0.0
-    """Gauge, of the driven chamber's gas when its valve closed, Pa."""
-    run_dry: float = 0.0
-    """Time for which the valve stayed open to an empty chamber, s."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Motion:
-    """State of a chamber pair other than its fills."""
-
-    velocity: float = 0.0
-    """In the tube, m/s, positive out of chamber 0."""
-    gases: Two = (0.0, 0.0)
-    """Gauge pressure in chambers 0 and 1, Pa."""
-    contents: Two | None = None
-    """m R = p V/T of the gas in chambers 0 and 1, J/K; None: at ambient pressure and temperature."""
-    valves: tuple[bool, bool] = (False, False)
-    """Which valves are open."""
-    pending: tuple[Switch, ...] = ()
-    """At most an opening and a closing of one valve."""
-    record: Record = field(default_factory=Record)
-    lifted: tuple[float, float, int] = (0.0, 0.0, 0)
-    """Fractions of the path up to which liquid stood in the tube as it began to move, and stands now, and the
-    direction in which they count; 0: both legs stand at their chambers' levels."""
-
-    @property
-    def rests(self) -> bool:
-        """Whether nothing moves, no gas is under pressure, and no valve is about to move."""
-        return self.velocity == 0 and self.gases == (0.0, 0.0) and not any(self.valves) and not self.pending
-
-
-@dataclass(frozen=True, kw_only=True)
-class PairState:
-    """Liquid of two opposite chambers: one fill is stored, the other follows from the total."""
-
-    fill: float
-    """x of the chamber on the positive side of the pair's axis (A, B, ...)."""
-    total: float
-    """Sum of the two fill ratios, constant."""
-    primed: bool = False
-    """Whether the connecting tube holds a continuous column."""
-    driven_first: bool = True
-    """Whether the last gas went into the chamber on the positive side."""
-    motion: Motion = field(default_factory=Motion)
-    """Velocity, gas and valves, where the plant models them; at rest otherwise."""
-
-    @property
-    def opposite_fill(self) -> float:
-        """x of the chamber on the negative side, total - x."""
-        return self.total - self.fill
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -259,15 +183,46 @@ class Dynamics:
     """Fill of a driven chamber that no command goes below."""
     lift: Lift | None = None
     """None: liquid passes the crest as soon as the gas can hold it there."""
+    relative_error: float = RELATIVE_ERROR
+    """Of each state, allowed to one step."""
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        model: BalancerModel,
+        *,
+        inertia: bool = False,
+        line: GasLine | None = None,
+        valve_lag: float = 0.0,
+        lifts: bool = False,
+        residual: float = 0.0,
+    ) -> Dynamics:
+        """By the flow law alone, or with terms beyond it; `lifts`: a dry tube fills up to its crest."""
+        gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
+        return cls(
+            column=Column.of(law=model.flow, tube=scene.tube, gas_off=gas_off),
+            inertia=inertia,
+            line=line,
+            valve_lag=valve_lag,
+            gas_pressure=scene.gas.pressure,
+            ambient_pressure=scene.gas.ambient_pressure,
+            dead_volume=scene.gas.dead_volume or 0.0,
+            tube_area=model.tube_area,
+            chamber_volume=model.chamber_volume,
+            max_fill_ratio=model.flow.max_fill_ratio,
+            residual=residual,
+            lift=Lift.of(scene, law=model.flow) if lifts else None,
+        )
 
     @property
     def quasi_steady(self) -> bool:
         """Whether the flow law alone moves the liquid."""
         return not self.inertia and self.line is None and self.valve_lag == 0 and self.lift is None
 
-    def plant(self, *, total: float, relative_error: float = RELATIVE_ERROR) -> npt.NDArray[np.void]:
+    def plant(self, *, total: float, relative_error: float | None = None) -> npt.NDArray[np.void]:
         """Record of type `PLANT`, shape (1,), of a pair with a sum of fill ratios."""
-        return _filled(self, total, relative_error)
+        return _filled(self, total, self.relative_error if relative_error is None else relative_error)
 
     @cached_property
     def _plants(self) -> dict[float, npt.NDArray[np.void]]:

@@ -1,23 +1,102 @@
-"""A pair of chambers through an interval of time with moving liquid, filling gas and late valves."""
+"""State of one pair of chambers, and its way through an interval of time."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.liquid_ring.compiled_lift import resume, stands
-from ringbalance.controller.liquid_ring.compiled_march import carry
-from ringbalance.controller.liquid_ring.motion import Dynamics, Motion, PairState, Record, Switch
-from ringbalance.controller.liquid_ring.records import EVENTS, MOTION, WORK, WORKSPACE, P, U
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.lift import resume, stands
+from ringbalance.reduced_model.injection.march import carry
+from ringbalance.reduced_model.injection.records import EVENTS, MOTION, WORK, WORKSPACE, Event, P, U
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.arrays import FloatArray
 
 _NONE: Final = -1
 """Instead of a driven chamber."""
+
+
+Two = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Switch:
+    """A valve that has been commanded to move and has not moved yet."""
+
+    after: float
+    """s from now."""
+    chamber: int
+    """0 or 1."""
+    opens: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """What the last command to a pair has done so far."""
+
+    chamber: int = 0
+    """0 or 1: the driven one."""
+    fill: float = 0.0
+    """x of the driven chamber at the command."""
+    work: float = 0.0
+    """Of the driven chamber's gas, integral of (p - ambient) dV, J."""
+    regime_start: Regime = Regime.BLOCKED
+    regime_end: Regime = Regime.BLOCKED
+    event: Event = Event.BLOCKED
+    closing_pressure: float = 0.0
+    """Gauge, of the driven chamber's gas when its valve closed, Pa."""
+    run_dry: float = 0.0
+    """Time for which the valve stayed open to an empty chamber, s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """State of a chamber pair other than its fills."""
+
+    velocity: float = 0.0
+    """In the tube, m/s, positive out of chamber 0."""
+    gases: Two = (0.0, 0.0)
+    """Gauge pressure in chambers 0 and 1, Pa."""
+    contents: Two | None = None
+    """m R = p V/T of the gas in chambers 0 and 1, J/K; None: at ambient pressure and temperature."""
+    valves: tuple[bool, bool] = (False, False)
+    """Which valves are open."""
+    pending: tuple[Switch, ...] = ()
+    """At most an opening and a closing of one valve."""
+    record: Record = field(default_factory=Record)
+    lifted: tuple[float, float, int] = (0.0, 0.0, 0)
+    """Fractions of the path up to which liquid stood in the tube as it began to move, and stands now, and the
+    direction in which they count; 0: both legs stand at their chambers' levels."""
+
+    @property
+    def rests(self) -> bool:
+        """Whether nothing moves, no gas is under pressure, and no valve is about to move."""
+        return self.velocity == 0 and self.gases == (0.0, 0.0) and not any(self.valves) and not self.pending
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairState:
+    """Liquid of two opposite chambers: one fill is stored, the other follows from the total."""
+
+    fill: float
+    """x of the chamber on the positive side of the pair's axis (A, B, ...)."""
+    total: float
+    """Sum of the two fill ratios, constant."""
+    primed: bool = False
+    """Whether the connecting tube holds a continuous column."""
+    driven_first: bool = True
+    """Whether the last gas went into the chamber on the positive side."""
+    motion: Motion = field(default_factory=Motion)
+    """Velocity, gas and valves, where the plant models them; at rest otherwise."""
+
+    @property
+    def opposite_fill(self) -> float:
+        """x of the chamber on the negative side, total - x."""
+        return self.total - self.fill
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +112,8 @@ class Passage:
     """At the end; its record's event is UNFINISHED when the bound on the number of steps was reached."""
     ended: float
     """s, at which the flow out of the chamber that was driven last ended; zero where it has not."""
+    filled: float | None
+    """s, at which the tube was first primed; None where it has not been."""
     ran_back: float
     """Change of x by flow out of the chamber that was not driven last, with both valves closed."""
 
@@ -51,6 +132,7 @@ def pass_time(dynamics: Dynamics, pair: PairState, *, instants: FloatArray) -> P
         primed=bool(state["primed"][0]),
         motion=_unpacked(plant, state),
         ended=float(state["ended"][0]),
+        filled=float(state["filled"][0]) if state["filled"][0] >= 0 else None,
         ran_back=float(state["ran_back"][0]),
     )
 
@@ -98,6 +180,7 @@ def packed(plant: npt.NDArray[np.void], *, fill: float, primed: bool, motion: Mo
         "residual": known["residual"],
         "closing_pressure": record.closing_pressure,
         "run_dry": record.run_dry,
+        "filled": -1.0,
         "primed": primed,
         "valve_0": motion.valves[0],
         "valve_1": motion.valves[1],

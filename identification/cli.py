@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.reading import read_observations
-from ringbalance.identification.documents import fit_document, fit_view
+from ringbalance.identification.documents import fit_document, fit_rows
 from ringbalance.identification.fitting import Loss, problem_of
 from ringbalance.identification.fitting import fit as fit_scene
 from ringbalance.identification.next_measurement import next_measurement
@@ -63,7 +63,8 @@ def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tupl
         document = fit_document(result, data=observations, told=told, following=following)
         print(json_format.dumps(document, allow_nan=False))
     else:
-        results_console().print(fit_view(result, data=observations, told=told, following=following))
+        rows = fit_rows(result, data=observations, told=told, following=following)
+        results_console().print(rows.view(headline=False))
     if asked.save is not None:
         save_result(
             asked.save, text=text, result=result, data=observations, folder=scene.parent, said=told.sentences

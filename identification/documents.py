@@ -8,10 +8,6 @@ from dataclasses import asdict
 from typing import Any, Final
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.console import Group, RenderableType
-from rich.table import Table
-from rich.text import Text
 
 from ringbalance.identification.against_fit import against_fit
 from ringbalance.identification.balancers import MODEL_ERRORS, exact_inputs
@@ -22,9 +18,13 @@ from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Verdict
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
+from ringbalance.results.findings import Finding, Value
 from ringbalance.results.numbers import rounded
+from ringbalance.results.result import Rows
+from ringbalance.results.rows import Quantity
+from ringbalance.results.table import Table
 from ringbalance.scene.arrays import finite
-from ringbalance.scene.describe import in_usual_unit, usual_unit
+from ringbalance.scene.describe import in_usual_unit, si_unit, usual_unit
 from ringbalance.scene.units import format_quantity
 
 
@@ -60,6 +60,7 @@ def fit_document(
         "log_likelihood": result.log_likelihood,
         "criticism": _criticism(told),
         "next_measurement": _following(following),
+        **fit_rows(result, data=data, told=told, following=following).document(),
     }
 
 
@@ -153,57 +154,66 @@ def _residuals(found: FileResiduals) -> dict[str, Any]:
 _STRONG: Final = 0.9
 """Correlation from which two parameters are named together."""
 _MOST_LINES: Final = 10
-_NARROW: Final = 8
-"""Characters of a number and its sign of plus or minus."""
 _WORDS: Final = {
-    Verdict.IDENTIFIED: ("yes", "green"),
-    Verdict.PRACTICALLY: ("hardly", "yellow"),
-    Verdict.STRUCTURALLY: ("no", "yellow"),
+    Verdict.IDENTIFIED: "yes",
+    Verdict.PRACTICALLY: "hardly",
+    Verdict.STRUCTURALLY: "no",
 }
 _FAR: Final = 3.0
 """Normalised residual of a row that is named."""
 
 
-def fit_view(
+def fit_rows(
     result: FitResult, *, data: Sequence[Observations], told: Review, following: NextMeasurement
-) -> RenderableType:
-    """Parameters, whether the fit holds, and what else the data say, for a rich console."""
-    remarks = [*_review(told), *_remarks(result), Text(_sentence(following.text))]
-    return Group(_heading(result, data), _parameters(result), *remarks)
+) -> Rows:
+    """Parameters with their intervals, whether the fit holds, and what else the data say."""
+    scene, count = result.optimum.residuals.problem.scene, sum(len(each) for each in data)
+    held = [name for name in result.held if name not in MODEL_ERRORS]
+    facts = {
+        "not fitted, [uncertainty] in all intervals": ", ".join(held),
+        "errors of models, in all intervals": ", ".join(_causes(result.held)),
+        "not fitted, taken as exact": ", ".join(exact_inputs(result)),
+    }
+    heads = ("quantity", "fitted", "from", "to", "unit", "before", "identified")
+    rows = [(each.name, *_numbers(each), _WORDS[each.verdict]) for each in result.parameters]
+    return Rows(
+        title=f"{scene.name} ({scene.source}), fitted to {count} measurements",
+        quantities=tuple(_quantity(each) for each in result.parameters),
+        findings=(
+            *_review(told),
+            *_findings(result),
+            Finding(code="next_measurement", values=_text(following)),
+        ),
+        facts=[(name, text) for name, text in facts.items() if text],
+        tables=(Table(heads=heads, rows=rows, note="from, to: ends of the 95 % interval"),),
+        listed=0,
+    )
 
 
-def _review(told: Review) -> Iterator[Text]:
-    yield Text(_sentence(told.text), "" if told.describes else "bold red")
+def _text(following: NextMeasurement) -> dict[str, Value]:
+    return {"text": following.text}
+
+
+def _quantity(found: FittedParameter) -> Quantity:
+    low, high = (finite(end) for end in found.interval)
+    status = "ok" if found.verdict is Verdict.IDENTIFIED else found.verdict.value.replace(" ", "_")
+    return Quantity(
+        key=found.path,
+        name=found.name,
+        unit=si_unit(found.path),
+        value=found.value,
+        lower=low,
+        upper=high,
+        origin="fitted",
+        status=status,
+    )
+
+
+def _review(told: Review) -> Iterator[Finding]:
+    yield Finding(code="fit_describes" if told.describes else "fit_contradicted", values={"text": told.text})
     for outcome, text in summaries(told.laws):
-        yield Text(_sentence(text), "yellow" if outcome == "other" else "")
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
-
-
-def _heading(result: FitResult, data: Sequence[Observations]) -> RenderableType:
-    rows = sum(len(each) for each in data)
-    files = "one file" if len(data) == 1 else f"{len(data)} files"
-    name = result.optimum.residuals.problem.scene.name
-    return Text(f"{name}, fitted to {rows} measurements of {files}", style="bold")
-
-
-def _parameters(result: FitResult) -> Table:
-    table = Table(box=SIMPLE_HEAD, padding=0, pad_edge=False, header_style="bold")
-    for name in ("quantity", "fitted", "from", "to (95 %)", "unit", "before", "identified"):
-        left, narrow = name in ("quantity", "unit", "identified"), name == "before"
-        # In a narrow terminal this column alone is broken into lines: a name cut short is no use.
-        table.add_column(
-            name,
-            justify="left" if left else "right",
-            no_wrap=not narrow,
-            min_width=_NARROW if narrow else None,
-        )
-    for each in result.parameters:
-        word, style = _WORDS[each.verdict]
-        table.add_row(each.name, *_numbers(each), Text(word, style=style))
-    return table
+        code = "other_law_fits_better" if outcome == "other" else "laws_compared"
+        yield Finding(code=code, values={"text": text})
 
 
 def _numbers(found: FittedParameter) -> tuple[str, str, str, str, str]:
@@ -220,77 +230,74 @@ def _numbers(found: FittedParameter) -> tuple[str, str, str, str, str]:
     return rounded(value, width), ends[0], ends[1], usual_unit(path), known
 
 
-def _remarks(result: FitResult) -> Iterator[Text]:
+def _findings(result: FitResult) -> Iterator[Finding]:
     for each in result.parameters:
-        if each.verdict is not Verdict.IDENTIFIED:
-            yield Text(f"{each.name}: {each.text}.", style="yellow")
-        yield from _bounds(each)
-        yield from (Text(f"{each.name}: {doubt}.", style="yellow") for doubt in each.doubts)
+        yield from _of_parameter(each)
     for found in result.combinations:
-        yield Text(
-            f"The data identify {found.text} within {100 * found.relative_uncertainty:.2g} % (95 %): "
-            f"{found.value:.4g}, in SI units."
+        numbers: dict[str, Value] = {"combination": found.text, "value": found.value}
+        yield Finding(
+            code="combination_identified", values=numbers | {"uncertainty": found.relative_uncertainty}
         )
-    yield from (Text(_noise_text(each)) for each in result.noise)
-    yield from map(Text, _pairs(result))
-    yield from _rows(result)
-    yield from (Text(_sentence(each), style="yellow") for each in result.pulled)
-    if held := [name for name in result.held if name not in MODEL_ERRORS]:
-        yield Text(f"Not fitted, their [uncertainty] is in all intervals: {', '.join(held)}.", "dim")
-    if models := _causes(result.held):
-        yield Text(f"So is what the models themselves may be off by: {', '.join(models)}.", "dim")
-    if exact := exact_inputs(result):
-        yield Text(f"Not fitted and without [uncertainty], so taken as exact: {', '.join(exact)}.", "dim")
+    yield from (_noise_finding(each) for each in result.noise)
+    yield from _pairs(result)
+    yield from _far_rows(result)
+    yield from (Finding(code="pulled", values={"text": each}) for each in result.pulled)
 
 
-def _bounds(found: FittedParameter) -> Iterator[Text]:
-    """Ends of an interval that the data did not set."""
-    for end, bound, word in zip(found.interval, found.at_bound, ("lower", "upper"), strict=True):
+def _of_parameter(found: FittedParameter) -> Iterator[Finding]:
+    name: dict[str, Value] = {"name": found.name}
+    if found.verdict is not Verdict.IDENTIFIED:
+        yield Finding(code="not_identified", values=name | {"text": found.text})
+    for end, bound, side in zip(found.interval, found.at_bound, ("lower", "upper"), strict=True):
+        # The data did not set this end.
         if bound and math.isfinite(end):
-            text = f"{found.name}: its interval has no {word} end; it stops where the scene's rules do."
-            yield Text(text, style="yellow")
+            yield Finding(code="interval_open", values=name | {"side": side})
+    yield from (Finding(code="parameter_doubted", values=name | {"text": each}) for each in found.doubts)
 
 
-def _noise_text(noise: Noise) -> str:
+def _noise_finding(noise: Noise) -> Finding:
     kind, name = noise.group.split(" ")
+    numbers: dict[str, Value] = {"kind": kind, "name": name}
     if not noise.estimated or noise.standard_deviation is None:
-        return f"Noise of {name} ({kind}): as the file states it."
+        return Finding(code="noise_stated", values=numbers)
     column = KINDS[kind].column(name)
     size = f"{noise.standard_deviation:.3g}"
     if column is not None and column.dimension is not None:
         size = format_quantity(noise.standard_deviation, column.dimension, column.unit, digits=3)
-    freedom = f"{noise.freedom:.0f} degrees of freedom"
-    return f"Noise of {name} ({kind}), estimated: {size} standard deviation, {freedom}."
+    more: dict[str, Value] = {"size": size, "standard_deviation": noise.standard_deviation}
+    return Finding(code="noise_estimated", values=numbers | more | {"freedom": round(noise.freedom or 0)})
 
 
-def _pairs(result: FitResult) -> Iterator[str]:
+def _pairs(result: FitResult) -> Iterator[Finding]:
     """Parameters whose errors go together."""
     names = [each.name for each in result.parameters]
     for i, first in enumerate(names):
         for j in range(i + 1, len(names)):
             correlation = float(result.correlations[i, j])
             if abs(correlation) >= _STRONG:
-                yield f"The errors of {first} and {names[j]} go together: correlation {correlation:+.3f}."
+                numbers: dict[str, Value] = {"first": first, "second": names[j], "correlation": correlation}
+                yield Finding(code="errors_correlated", values=numbers)
 
 
-def _rows(result: FitResult) -> Iterator[Text]:
+def _far_rows(result: FitResult) -> Iterator[Finding]:
     """Rows that lie far off, and those that a robust loss counts less."""
     for each in result.residuals:
-        size = np.max(np.abs(each.normalised), axis=1)
-        far = each.lines[size > _FAR]
+        far = each.lines[np.max(np.abs(each.normalised), axis=1) > _FAR]
         if far.size:
-            lines = _listed(far.tolist())
-            text = f"{each.file}: {lines} more than {_FAR:g} standard deviations from the fit"
-            yield Text(f"{text}; look at what was written down there.", style="yellow")
+            numbers: dict[str, Value] = {
+                "file": each.file,
+                "lines": _listed(far.tolist()),
+                "deviations": _FAR,
+            }
+            yield Finding(code="rows_far_off", values=numbers)
         if np.any(each.down_weighted):
             lines = _listed(each.lines[each.down_weighted].tolist())
-            yield Text(f"{each.file}: {lines} counted less than half by the robust loss.", style="yellow")
+            yield Finding(code="rows_down_weighted", values={"file": each.file, "lines": lines})
 
 
 def _listed(lines: Sequence[int]) -> str:
     shown = ", ".join(map(str, lines[:_MOST_LINES]))
-    more = f" and {len(lines) - _MOST_LINES} more" if len(lines) > _MOST_LINES else ""
-    return f"line {shown} is" if len(lines) == 1 else f"lines {shown}{more} are"
+    return shown + (f" and {len(lines) - _MOST_LINES} more" if len(lines) > _MOST_LINES else "")
 
 
 def _causes(names: Iterable[str]) -> list[str]:

@@ -6,7 +6,7 @@ import csv
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from io import StringIO
-from typing import Final
+from typing import Final, Literal
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Group
@@ -19,6 +19,8 @@ from ringbalance.results.rows import Quantity
 from ringbalance.results.table import Table
 
 _STYLES: Final = {"info": "green", "warning": "yellow", "error": "red"}
+_NAME: Final = 28
+"""Characters of names that stand in one line."""
 Facts = Sequence[tuple[str, str]]
 """Names and texts."""
 
@@ -63,8 +65,11 @@ def terminal_table(table: Table) -> RichTable:
         padding=0,
         pad_edge=False,
     )
-    for head, numeric in zip(table.heads, table.numeric, strict=True):
-        shown.add_column(Text(plain(head)), justify="right" if numeric else "left")
+    for place, (head, numeric) in enumerate(zip(table.heads, table.numeric, strict=True)):
+        # A name that is cut short is no use; anything else is broken into lines.
+        name = place == 0 and max((len(row[0]) for row in table.rows), default=0) <= _NAME
+        side: Literal["right", "left"] = "right" if numeric else "left"
+        shown.add_column(Text(plain(head)), justify=side, no_wrap=name, overflow="fold")
     for row in table.rows:
         shown.add_row(*(Text(plain(cell)) for cell in row))
     return shown

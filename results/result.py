@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from html import escape
+from itertools import islice
 from typing import Any, ClassVar, Final
 
 from rich.console import Group, RenderableType
@@ -61,11 +62,13 @@ class Rows:
         Args: `headline`: whether the first finding is one; otherwise the title is, and findings come later.
         """
         numbers = two_columns([*self.facts, *quantity_rows(self.quantities[: self.listed])])
-        tables = (terminal_table(table) for table in self.tables if table.rows)
+        tables = iter([terminal_table(table) for table in self.tables if table.rows])
         if headline:
             return Group(findings_text(self.findings), numbers, *more, *tables)
+        # Where nothing is listed, the first table has the quantities.
+        first = [*islice(tables, 1), two_columns(self.facts)] if self.listed == 0 else [numbers]
         sentences = findings_text(self.findings, headline=False)
-        return Group(Text(self.title, style="bold"), numbers, *more, sentences, *tables)
+        return Group(Text(self.title, style="bold"), *first, *more, sentences, *tables)
 
     def lines(self) -> Iterator[str]:
         """About five lines: what it is, its main numbers with units, and the verdict."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ringbalance.scene.registry import register
+from ringbalance.scene.registry import register, register_function
 
 if TYPE_CHECKING:
     from ringbalance.calibration import calibrate as calibrate
@@ -62,6 +62,8 @@ register(
     scene="ringbalance.controller.eccentric_mass.scene_rules:KIND",
     balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
 )
+register_function("with_values", place="ringbalance.scene.changes:with_values")
+register_function("scene_lines", place="ringbalance.scene.describe:scene_lines")
 
 _HOME = {
     "Calibration": "ringbalance.reduced_model.calibration",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any, Literal
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.data.reading import read_observations
-from ringbalance.identification.documents import fit_document
+from ringbalance.identification.documents import fit_document, fit_rows
 from ringbalance.identification.fitting import Loss
 from ringbalance.identification.fitting import fit as fit_scene
 from ringbalance.identification.next_measurement import NextMeasurement, next_measurement
@@ -22,10 +22,9 @@ from ringbalance.reports.cli import draw_pictures
 from ringbalance.reports.extremes_cli import base_of
 from ringbalance.reports.report import Report
 from ringbalance.reports.report import write_report as write_scene_report
-from ringbalance.results.result import CommandResult
+from ringbalance.results.result import Result, Rows
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.changes import checked_scene, document_of
-from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
@@ -37,7 +36,7 @@ Level = Literal["light", "heavy"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Fit(CommandResult):
+class Fit(Result):
     """A fit with the tests of its residuals and the measurement that would help most."""
 
     result: FitResult
@@ -56,23 +55,12 @@ class Fit(CommandResult):
         return self.review.holds
 
     def to_dict(self) -> dict[str, Any]:
-        """See `document`."""
-        return self.document()
-
-    def document(self) -> dict[str, Any]:
         """What `ringbalance fit --json` prints."""
         return fit_document(self.result, data=self.data, told=self.review, following=self.next_measurement)
 
-    def lines(self) -> Iterator[str]:
-        """For a terminal: each parameter, and whether the fit describes the data."""
-        scene = self.result.optimum.residuals.problem.scene
-        rows = sum(len(each) for each in self.data)
-        yield f"Fit of {scene.name} ({scene.source}) to {rows} measurements in {len(self.data)} files"
-        for each in self.parameters:
-            value, low, high = (in_usual_unit(each.path, x) for x in (each.value, *each.interval))
-            ends = f"{low:.4g} to {high:.4g} {usual_unit(each.path)}".rstrip()
-            yield f"{each.name} {value:.4g} (95 %: {ends}; {each.verdict.value})"
-        yield self.review.criticism.text
+    def rows(self) -> Rows:
+        """Each parameter, whether the fit describes the data, and what else they say."""
+        return fit_rows(self.result, data=self.data, told=self.review, following=self.next_measurement)
 
 
 def fit(

@@ -107,6 +107,13 @@ def usual_unit(path: str) -> str:
     return units.get(dimension, next(iter(DIMENSIONS[dimension].units))) if dimension else ""
 
 
+def si_unit(path: str) -> str:
+    """SI unit of a value of a scene, such as "kg m"; "1" for a number without one."""
+    line = _LINES.get(path)
+    dimension = _declared_elsewhere(path)[0] if line is None else line.dimension
+    return next(iter(DIMENSIONS[dimension].units)).replace("*", " ") if dimension else "1"
+
+
 def _declared_elsewhere(path: str) -> tuple[str, Mapping[str, str]]:
     """Dimension of a value of another kind of scene, and that kind's usual units; empty without."""
     table, _, key = path.split("[")[0].partition(".")

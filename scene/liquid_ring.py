@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.scene import deferred
 from ringbalance.scene.chamber_file.keys import MeshKeys
+from ringbalance.scene.chamber_file.loading import with_chamber
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.reading import Reading, read_document
@@ -25,7 +25,7 @@ def _read(
     if derived:
         reading = reading.following(derived)
     elif any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
-        reading, mesh_faults = deferred.with_chamber(reading, folder=folder)
+        reading, mesh_faults = with_chamber(reading, folder=folder)
         faults = (*faults, *mesh_faults)
     reading, liquid_faults = with_liquid(reading.completed())
     failed = failed_checks(reading, (*shape.CHECKS, *working.CHECKS, *validity.CHECKS))

@@ -18,6 +18,7 @@ class _Places:
     balancer: str
 
 
+_FUNCTIONS: dict[str, str] = {}
 _REGISTERED: dict[str, _Places] = {}
 """By the word of the key `balancer`; the first is the default of a scene file."""
 
@@ -45,6 +46,16 @@ def registered_scene(name: str) -> Any:
 def balancer_class(name: str) -> Any:
     """What makes the balancer of a scene of that kind. Raises: KeyError: there is no such balancer."""
     return _at(_REGISTERED[name].balancer)
+
+
+def register_function(name: str, *, place: str) -> None:
+    """Make a function known that methods of a scene use, by its place "module:name"; it imports scenes."""
+    _FUNCTIONS[name] = place
+
+
+def registered_function(name: str) -> Any:
+    """The function that was registered under a name. Raises: KeyError: none was."""
+    return _at(_FUNCTIONS[name])
 
 
 def _at(place: str) -> Any:

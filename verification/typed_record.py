@@ -131,7 +131,7 @@ def _mapping(inner: Any, value: Any, place: str, errors: list[str]) -> Any:
     if not isinstance(value, Mapping):
         errors.append(f"{place}: a table is needed")
         return None
-    # A plain one: results of cases go from process to process, and a proxy cannot.
+    # A plain dictionary: results with their definitions come back from worker processes.
     return {key: _value(inner, each, f"{place}.{key}", errors) for key, each in value.items()}
 
 

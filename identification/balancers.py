@@ -24,10 +24,10 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.uncertainty import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.scene.joint import with_model_error
+from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.uncertain import (
     NORMAL_95,
     UNCERTAIN_QUANTITIES,

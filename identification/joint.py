@@ -21,8 +21,8 @@ from ringbalance.identification.likelihood import Problem
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.result import Joint
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.model_errors import LARGEST_ERROR
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
-from ringbalance.scene.tube_models import LARGEST_ERROR
 from ringbalance.scene.uncertain import NORMAL_95
 
 _ROUNDS: Final = 4

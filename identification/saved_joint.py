@@ -14,9 +14,9 @@ from ringbalance.identification.result import FitResult, path_of
 from ringbalance.identification.saved_places import Place, place_of
 from ringbalance.scene.fitted import MODEL, NO_UNIT
 from ringbalance.scene.keys.schema import ORIGIN
+from ringbalance.scene.model_errors import ERROR_NAME, ModelError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
-from ringbalance.scene.tube_models import ERROR_NAME, ModelError
 from ringbalance.scene.uncertain import NORMAL_95
 
 _DIGITS: Final = 9

@@ -1,12 +1,10 @@
-"""Estimated contribution of one physical term, or of anything else that a model may leave out."""
+"""Estimated contribution of one physical term."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
 
-NEGLIGIBLE: Final = 1e-3
-"""Of the tolerance: a smaller contribution is left out unchecked."""
 _NO_BASIS: Final = "the scene gives no basis for an estimate"
 
 
@@ -14,14 +12,10 @@ _NO_BASIS: Final = "the scene gives no basis for an estimate"
 class Contribution:
     """What leaving one thing out is worth, judged before anything is solved."""
 
-    term: str = ""
     value: float | None
     """Relative to the quantity that it changes; None where the scene gives no basis for an estimate."""
     formula: str
     """How it is estimated, with its numbers."""
-    source: str = ""
-    rough: bool = False
-    """Whether it may be far too large, so that no model is ruled out by it alone."""
     time: float | None = None
     """Valve-open time that it costs of a long injection, s; None for a term that is no time."""
     default_range: tuple[float, float] | None = None

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
-from ringbalance.reports.pages.extremes import axis_rows, map_drawings
+from ringbalance.reports.pages.extremes import axis_rows
 from ringbalance.reports.section import Cells
 from ringbalance.results.numbers import number
 from ringbalance.scene.changes import document_of
@@ -24,7 +24,6 @@ from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.processes import checked_workers
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 from ringbalance.verification.evidence import Level
-from ringbalance.verification.extremes.axes import places_of
 from ringbalance.verification.extremes.design import Base
 from ringbalance.verification.extremes.study import SIZES, Record, find_extremes
 
@@ -48,8 +47,8 @@ def extremes(
     Args:
         scene: the scene file.
         json: print one JSON document instead of tables.
-        out: also write extremes.json and the stability maps to this folder; after an interrupted run with
-            the same folder the designed set resumes where it stopped.
+        out: also write extremes.json to this folder; after an interrupted run with the same folder the
+            designed set resumes where it stopped.
         level: "heavy" judges thousands of points, for an hour or more.
         workers: processes; default one for each core, at most two.
 
@@ -76,8 +75,6 @@ def extremes(
         told, tables = found.document(), found.tables()
         if stage is not None:
             write_whole(stage / FILE, json_format.dumps(told, allow_nan=False) + "\n")
-            for drawing in map_drawings(tables, places_of(base.scene)):
-                write_whole(stage / f"{drawing.name}.svg", drawing.standalone())
     if out is not None:
         console.print(f"written to {out}", highlight=False)
     if json:

@@ -22,8 +22,8 @@ from ringbalance.reports.pages import (
     measured,
     operation,
     sloshing,
+    trade,
 )
-from ringbalance.reports.pages import model_selection as trade
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside

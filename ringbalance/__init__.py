@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from ringbalance.studies import trade as trade
     from ringbalance.studies import write_report as write_report
     from ringbalance.verification.extremes.study import Extremes as Extremes
-    from ringbalance.verification.selection_studies.study import TradeStudy as TradeStudy
+    from ringbalance.verification.trade import TradeStudy as TradeStudy
 
 __version__ = "0.1.0"
 
@@ -85,7 +85,7 @@ _HOME = {
     "SceneError": "ringbalance.scene",
     "Sensor": "ringbalance.controller.rotor",
     "Simulation": "ringbalance.controller.simulation",
-    "TradeStudy": "ringbalance.verification.selection_studies.study",
+    "TradeStudy": "ringbalance.verification.trade",
     "Tuning": "ringbalance.controller.tuning.tune",
     "ValveCommand": "ringbalance.controller.algorithms.algorithm",
     "bundled_scene": "ringbalance.scene",

@@ -52,8 +52,8 @@ COMMANDS = {
     ),
     "compare": ("ringbalance.controller.compare_cli:compare", "Two balancers on one rotor, side by side."),
     "trade": (
-        "ringbalance.verification.selection_studies.cli:trade",
-        "Speed against accuracy: model hierarchies measured, and the models that a tolerance needs.",
+        "ringbalance.verification.trade:trade",
+        "Speed against accuracy: designs a second and error of every model.",
     ),
     "extremes": (
         "ringbalance.reports.extremes_cli:extremes",

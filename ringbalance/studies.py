@@ -30,7 +30,7 @@ from ringbalance.scene.toml_writing import toml_bytes
 from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases as run_scene_cases
-from ringbalance.verification.selection_studies.study import TradeStudy, trade_study
+from ringbalance.verification.trade import TradeStudy, trade_study
 
 Level = Literal["light", "heavy"]
 
@@ -99,10 +99,9 @@ def fit(
 def trade(
     scene: AnyScene, *, level: Level = "heavy", progress: Callable[[str], None] | None = None
 ) -> TradeStudy:
-    """Measure speed against accuracy on a scene, and choose its models for each tolerance.
+    """Measure speed against accuracy on a scene: designs a second and error of every model.
 
-    Args: `level`: "light" leaves out the settling time, which takes whole runs of the loop. `progress`:
-        called with each quantity's name.
+    Args: `level`: "light" leaves out the meshes in three dimensions. `progress`: called with each title.
     Raises: SceneError: a scene that cannot be used.
     """
     return trade_study(liquid_ring_scene(checked_scene(scene)), level=level, progress=progress)

@@ -28,8 +28,6 @@ _OF_MESH: Final = ("disc", "accuracy.tolerance")
 """Paths on which a mesh, or the meshing of a solid, depends."""
 _OF_CHECKS: Final = (*_OF_MESH, "tube.port_radius", "gas.inlet_radius")
 """Paths with which a mesh is compared as it is read."""
-_NO_KEYS: Final = frozenset({"tube.models"})
-"""Fields of records that no key of a scene file sets; calculations choose them."""
 
 
 def with_values(scene: SceneFile, values: Mapping[str, object], *, origin: Origin = "given") -> AnyScene:
@@ -136,7 +134,7 @@ def _changed_values(scene: SceneFile) -> Iterator[tuple[str, object]]:
         if is_dataclass(now) and type(now) is type(before):
             for field in fields(now):
                 path, value = f"{name}.{field.name}", getattr(now, field.name)
-                if path not in _NO_KEYS and not _same(value, getattr(before, field.name)):
+                if not _same(value, getattr(before, field.name)):
                     yield KEY_OF_FIELD.get(path, path), value
         elif now != before:
             yield KEY_OF_FIELD.get(name, name), now

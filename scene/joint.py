@@ -14,8 +14,8 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.fitted import MODEL, Fitted
+from ringbalance.scene.model_errors import LARGEST_ERROR, ErrorCause, ModelError
 from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import LARGEST_ERROR, ErrorCause, ModelError
 from ringbalance.scene.uncertain import NORMAL_95, UNCERTAIN_QUANTITIES, half_widths, shifted
 
 FITTED: Final = "fitted"

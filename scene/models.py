@@ -31,8 +31,8 @@ from ringbalance.scene.keys.fields import (
     quantity,
 )
 from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
+from ringbalance.scene.model_errors import DrawDownFactor, ExtraLoss, ModelErrors
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.tube_models import FINEST_MODELS, DrawDownFactor, ExtraLoss, ModelErrors, TubeModels
 
 HumpGas = Literal["vented", "trapped"]
 HumpShape = Literal["arc", "point"]
@@ -270,8 +270,6 @@ class Tube:
     ]
     draw_down_factor: DrawDownFactor = 1.0
     model_errors: ModelErrors = ()
-    models: TubeModels = FINEST_MODELS
-    """Of its loss; no key."""
 
     @property
     def area(self) -> float:

@@ -30,7 +30,7 @@ MEASUREMENTS: Final = Path(PAPER).parent / "measurements"
 MODELS: Final = "rungs"
 BY_NAME: Final = {
     *("tube.terms", "tube.uncertainty_parts", "fill_ratio", "tuned", "gain", "outcomes"),
-    *("held", "pulls", "cost_model.seconds", "quantities.choices.models", "times.refit_seconds"),
+    *("held", "pulls", "times"),
     *(f"quantities.{MODELS}.{each}" for each in ("models", "work", "fixed_work")),
     f"times.{MODELS}",
     *("findings.values", "findings.change"),
@@ -162,7 +162,7 @@ def test_keys_of_verify(printed: Any) -> None:
 @pytest.mark.heavy
 def test_keys_of_extremes() -> None:
     base = base_of(liquid_ring_scene(rb.load_scene(PAPER)))
-    found = find_extremes(base, size=Size(points=1, sweep=2, fineness=1.0, grid=2))
+    found = find_extremes(base, size=Size(points=1, sweep=2, fineness=1.0))
     violated = found.document() | {"violations": [{"point": {"speed": 1.0}, "violations": []}]}
     compare("`extremes --json`", [violated])
 

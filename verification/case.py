@@ -155,7 +155,7 @@ class Mutation:
 class _Study:
     """A computation that several cases share, in place of a `case.py`."""
 
-    of: Literal["pressure under gravity", "manufactured pressure", "choice of models", "measurements"]
+    of: Literal["pressure under gravity", "manufactured pressure", "measurements"]
     settings: Mapping[str, Any]
     """Arguments of its function, by name."""
 

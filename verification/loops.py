@@ -13,10 +13,10 @@ import numpy as np
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.calibration import Calibration, calibrate, chamber_and_law
+from ringbalance.reduced_model.estimates import steady
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reduced_model.selection.range_flow import steady
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Found, Series, figure
@@ -77,7 +77,7 @@ def calibration_of(scene: Scene) -> Calibration:
 
 @lru_cache(maxsize=64)
 def flow_law_of(scene: Scene) -> CalibratedLaw:
-    """The law of `calibrate` without the rest, which takes half of the time; the tube's models the finest."""
+    """The law of `calibrate` without the rest, which takes half of the time."""
     return chamber_and_law(scene)[1]
 
 

@@ -28,8 +28,8 @@ from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import Holding
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.model_errors import START_ERROR
 from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import START_ERROR
 from ringbalance.scene.uncertain import NORMAL_95
 
 RELATIVE_ERROR: Final = 1e-5

@@ -24,7 +24,6 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.uncertainty import corrected_state
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import FINEST_MODELS
 
 _ROUNDS: Final = 12
 _STEP: Final = 1e-4
@@ -136,9 +135,8 @@ def _flow_rate(device: Device, observations: Observations) -> FloatArray:
 
 
 def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:
-    """k of the tube at rest, by the finest models: the scene's are chosen for its own velocities."""
-    tube, rotor = replace(scene.tube, models=FINEST_MODELS), replace(scene.rotor, speed=0.0)
-    return corrected_state(replace(scene, tube=tube, rotor=rotor), velocity).k
+    """k of the tube at rest."""
+    return corrected_state(replace(scene, rotor=replace(scene.rotor, speed=0.0)), velocity).k
 
 
 def _pressures(scene: Scene, observations: Observations) -> FloatArray:

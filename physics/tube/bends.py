@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.rotation_table import laminar_ratio
-from ringbalance.scene.arrays import FloatArray, plain
+from ringbalance.scene.arrays import BoolArray, FloatArray, plain
 from ringbalance.scene.models import Bend, Tube
 
 BEND_UNCERTAINTY: Final = 0.25
@@ -109,9 +109,9 @@ def turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayLi
     return np.asarray(f * bend.angle * bend.radius / bore + turning, dtype=np.float64)
 
 
-def bend_in_range(*, bend: Bend, bore: float) -> bool:
+def bend_in_range(*, bend: Bend, bore: npt.ArrayLike) -> BoolArray:
     """Whether a bend lies within the formula's range: an angle up to 180 degrees and r/d of at least 0.5."""
-    return bend.angle <= math.pi * (1 + 1e-9) and bend.radius >= bore / 2
+    return np.asarray((bend.angle <= math.pi * (1 + 1e-9)) & (bend.radius >= np.asarray(bore) / 2))
 
 
 def straight_length(*, tube: Tube) -> float:

@@ -129,18 +129,20 @@ def range_notes(*, tube: Tube, state: TubeState, velocity: FloatArray) -> dict[s
     low, high = VELOCITIES
     notes = {"velocity outside 0.1 to 20 m/s": (velocity < low * (1 - 1e-9)) | (velocity > high * (1 + 1e-9))}
     if tube.drag_coefficient is None:
-        shapes = all(bend_in_range(bend=b, bore=tube.bore) for b in tube.bends)
+        shapes = [bend_in_range(bend=b, bore=tube.bore) for b in tube.bends]
         untested = ~rotation_table_covers(reynolds=re, rotation_reynolds=rotation)
         developing = LAMINAR_ENTRY_LENGTH * re * tube.bore > tube.length
         notes |= {
             "friction: Re above 1e6": re > LARGEST_REYNOLDS,
-            "friction: relative roughness above 0.05": np.full(
-                re.shape, tube.roughness > LARGEST_ROUGHNESS * tube.bore
+            "friction: relative roughness above 0.05": np.broadcast_to(
+                tube.roughness > LARGEST_ROUGHNESS * tube.bore, re.shape
             ),
             "rotation: laminar factor beyond Kl = 1e7 or R_Om = 1e5": (laminar | unsteady) & untested,
             "rotation: critical Re extrapolated beyond R_Om = 2000": unsteady & (rotation > 2000),
             "bends: scaled from one computed shape in laminar flow": (laminar | unsteady) & bool(tube.bends),
-            "bends: angle above 180 deg or radius below d/2": np.full(re.shape, not shapes),
+            "bends: angle above 180 deg or radius below d/2": np.broadcast_to(
+                ~np.all(np.broadcast_arrays(True, *shapes), axis=0), re.shape
+            ),
             "ends: tube too short for a developed laminar profile": laminar & developing,
         }
     return {text: where for text, where in notes.items() if np.any(where)}

@@ -1,34 +1,26 @@
-"""The terms of k at given velocities, each by the model that the tube asks for, without their uncertainty."""
+"""The terms of k at given velocities, without their uncertainty."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.bends import bend_loss, straight_length, turbulent_bend_loss
-from ringbalance.physics.tube.ends import (
-    TURBULENT_KINETIC_FACTOR,
-    entrance_loss,
-    exit_loss,
-    kinetic_factor,
-    turbulent_entrance_loss,
-)
+from ringbalance.physics.tube.bends import bend_loss, straight_length
+from ringbalance.physics.tube.ends import entrance_loss, exit_loss, kinetic_factor
 from ringbalance.physics.tube.friction import friction_factor, reynolds_number, rotation_reynolds_number
 from ringbalance.physics.tube.rotation import (
     STRAIGHT_CRITICAL_REYNOLDS,
     critical_reynolds,
     turbulent_friction_ratio,
 )
-from ringbalance.physics.tube.rotation_table import ito_nanbu_laminar, laminar_ratio
+from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Bend, Scene, Tube
-from ringbalance.scene.tube_models import CORRELATION, FINEST_MODELS, LEFT_OUT, Fidelity
 
-_LEAST_KL: Final = 220.0
 _SPREAD: Final = ("friction", "rotation", "extra", "decree")
 """Terms that are spread evenly along the path."""
 
@@ -103,22 +95,20 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
     Source: the sources of the terms stand with them.
     """
     re, rotation = (np.asarray(v, dtype=np.float64) for v in (reynolds, rotation_reynolds))
-    rough = 0.0 if tube.models.roughness == LEFT_OUT else tube.roughness / tube.bore
+    rough = tube.roughness / tube.bore
     straight = friction_factor(reynolds=re, relative_roughness=rough)
-    turning, laminar, critical = _rotation(tube.models.rotation, re, rotation, rough, straight)
+    turning, laminar, critical = _rotation(re, rotation, rough)
     bends = _bends(tube, re, rotation, critical, straight)
-    entrance, leaving, alpha = _ends(tube, re, critical, laminar)
-    prescribed = tube.models.constant if tube.drag_coefficient is None else tube.drag_coefficient
-    if prescribed is not None:
-        terms = {"decree": np.full(re.shape, prescribed)}
+    if tube.drag_coefficient is not None:
+        terms = {"decree": np.full(re.shape, tube.drag_coefficient)}
     else:
         # The arcs turn too: rotation acts on the whole length, friction without it on the straights alone.
         terms = {
-            "entrance": entrance,
+            "entrance": entrance_loss(tube=tube, reynolds=re, critical_ratio=critical)[0],
             "friction": straight_length(tube=tube) / tube.bore * straight,
             "rotation": tube.length / tube.bore * (turning - straight),
             "bends": np.asarray(sum(bends, start=np.zeros(re.shape)), dtype=np.float64),
-            "exit": leaving,
+            "exit": exit_loss(tube=tube, reynolds=re, critical_ratio=critical, friction_ratio=laminar)[0],
             "extra": np.full(re.shape, tube.extra_loss),
         }
     return TubeState(
@@ -127,34 +117,17 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
         critical_ratio=critical,
         rotating_friction=turning,
         bends=bends,
-        kinetic_factor=alpha,
+        kinetic_factor=kinetic_factor(reynolds=re, critical_ratio=critical, friction_ratio=laminar),
         terms=terms,
     )
 
 
-def finest_state(*, tube: Tube, state: TubeState) -> TubeState:
-    """The state by the finest model of every part; the same where nothing is left out."""
-    if tube.models == FINEST_MODELS:
-        return state
-    return tube_state_at(
-        tube=replace(tube, models=FINEST_MODELS),
-        reynolds=state.reynolds,
-        rotation_reynolds=state.rotation_reynolds,
-    )
-
-
 def _rotation(
-    model: Fidelity, re: FloatArray, rotation: FloatArray, rough: float, straight: FloatArray
+    re: FloatArray, rotation: FloatArray, rough: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """f with rotation, F, and the critical Re over the straight tube's."""
-    if model == LEFT_OUT:
-        return straight, np.ones(re.shape), np.ones(rotation.shape)
     critical = critical_reynolds(rotation_reynolds=rotation) / STRAIGHT_CRITICAL_REYNOLDS
-    if model == CORRELATION:
-        # At the lower end of its range the recalled formula is one; below, it would rise again.
-        laminar = np.maximum(ito_nanbu_laminar(kl=np.maximum(rotation * re, _LEAST_KL)), 1.0)
-    else:
-        laminar = laminar_ratio(reynolds=re, rotation_reynolds=rotation)
+    laminar = laminar_ratio(reynolds=re, rotation_reynolds=rotation)
     turning = friction_factor(
         reynolds=re,
         relative_roughness=rough,
@@ -165,33 +138,12 @@ def _rotation(
     return turning, laminar, critical
 
 
-def _ends(
-    tube: Tube, re: FloatArray, critical: FloatArray, laminar: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Entrance and exit loss, and alpha."""
-    nothing = np.zeros(re.shape)
-    if tube.models.ends == LEFT_OUT:
-        return nothing, nothing, np.ones(re.shape)
-    if tube.models.ends == CORRELATION:
-        entrance = nothing + turbulent_entrance_loss(tube=tube)[0]
-        return entrance, nothing, nothing + TURBULENT_KINETIC_FACTOR
-    return (
-        entrance_loss(tube=tube, reynolds=re, critical_ratio=critical)[0],
-        exit_loss(tube=tube, reynolds=re, critical_ratio=critical, friction_ratio=laminar)[0],
-        kinetic_factor(reynolds=re, critical_ratio=critical, friction_ratio=laminar),
-    )
-
-
 def _bends(
     tube: Tube, re: FloatArray, rotation: FloatArray, critical: FloatArray, straight: FloatArray
 ) -> tuple[FloatArray, ...]:
     """K of each bend; bends of one shape are evaluated once."""
 
     def loss(bend: Bend) -> FloatArray:
-        if tube.models.bends == LEFT_OUT:
-            return straight * bend.angle * bend.radius / tube.bore
-        if tube.models.bends == CORRELATION:
-            return turbulent_bend_loss(bend=bend, bore=tube.bore, friction_factor=straight)
         return bend_loss(
             bend=bend,
             bore=tube.bore,

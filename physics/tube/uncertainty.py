@@ -14,15 +14,13 @@ from ringbalance.physics.tube.ends import entrance_loss, exit_loss
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty, turbulent_share
 from ringbalance.physics.tube.rotation import turbulent_friction_ratio
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
-from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
+from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.joint import FITTED, fitted_causes
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.scene.uncertain import NORMAL_95
 
-SIMPLER: Final = "left out"
-"""Part by what models simpler than the finest neglect."""
 INPUT_PART: Final = "input: "
 """What the names of parts by inputs begin with."""
 MODEL_CAUSES: Final[Mapping[str, str]] = {
@@ -31,7 +29,6 @@ MODEL_CAUSES: Final[Mapping[str, str]] = {
     "rotation entry": "rotation",
     "ends": "entrance",
     "bends": "bends",
-    SIMPLER: "extra",
 }
 """Causes of `model_parts`, each with the term of k that its error changes."""
 BUILT_CAUSES: Final[Mapping[str, tuple[str, float]]] = {
@@ -63,7 +60,7 @@ _CREEPING: Final = 0.2
 _INERTIAL: Final = 57.0
 _EKMAN: Final = 47.21
 _LARGEST_ERROR: Final = 0.5
-"""Of k, by what simpler models leave out."""
+"""Of a constant k."""
 DEVELOPMENT_SHARE: Final = 1.0
 """Half-width of what development adds, over rotation's extra friction on one developing length.
 
@@ -78,7 +75,7 @@ def uncertainty_parts(
 ) -> Mapping[str, FloatArray]:
     """Expanded uncertainties (95 %) of k, one per cause; independent, so they combine by the root of the sum
     of squares.
-    Args: `state`: the terms of k of the scene's tube at these velocities, as its models have them. `fitted`:
+    Args: `state`: the terms of k of the scene's tube at these velocities. `fitted`:
         whether those of inputs and errors that were fitted together count.
     Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
     Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
@@ -97,14 +94,13 @@ def unfitted_parts(scene: Scene, parts: Mapping[str, FloatArray]) -> dict[str, F
 
 
 def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
-    """Expanded uncertainties (95 %) of k by the correlations and tables themselves, and by simpler models.
+    """Expanded uncertainties (95 %) of k by the correlations and tables themselves.
 
     Returns: Half-width of k by cause, each the shape of the state's arrays; none of a prescribed k.
-    Source: the spreads stand with the correlations; a simpler model is off by what it differs by.
+    Source: the spreads stand with the correlations.
     """
     if tube.drag_coefficient is not None:
         return {}
-    chosen, state = state, finest_state(tube=tube, state=state)
     re, rough, ratio = state.reynolds, tube.roughness / tube.bore, state.critical_ratio
     straight = straight_length(tube=tube) / tube.bore
     lam = rotating_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
@@ -127,14 +123,13 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         entrance_loss(tube=tube, reynolds=re, critical_ratio=ratio)[1],
         exit_loss(tube=tube, reynolds=re, critical_ratio=ratio, friction_ratio=lam.value)[1],
     )
-    parts = {
+    return {
         "friction correlation": straight * friction,
         "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
         "rotation entry": _development_part(tube, state, lam.value),
         "ends": np.sqrt(sum(e**2 for e in ends)),
         "bends": _bends_part(tube, state),
     }
-    return parts if chosen is state else parts | {SIMPLER: np.abs(state.k - chosen.k)}
 
 
 def _bends_part(tube: Tube, state: TubeState) -> FloatArray:
@@ -161,8 +156,7 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
     standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
     a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
     measured smooth tubes have.
-    What simpler models leave out, and errors of a constant k, count for half of k at most: they may be off by
-    far more at velocities that the scene never has, and no error makes a loss a gain.
+    Errors of a constant k count for half of it at most: no error makes a loss a gain.
     """
     if not tube.model_errors:
         return state
@@ -172,8 +166,6 @@ def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
         if each.cause not in parts:
             continue
         width = parts[each.cause]
-        if each.cause == SIMPLER:
-            width = _limited(width, _LARGEST_ERROR * state.k)
         error = width / NORMAL_95 * (each.even * np.cos(angle) + each.odd * np.sin(angle))
         if "decree" in terms:
             lumped = lumped + error

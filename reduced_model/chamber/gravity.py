@@ -1,9 +1,8 @@
-"""Gravity and the ring: its effect on the means over a turn, and when a ring exists at all."""
+"""Gravity and the ring: when a ring exists at all, and when it is closed."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,29 +12,6 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-
-
-@dataclass(frozen=True, kw_only=True)
-class GravityEffect:
-    """Change of the means over a turn by gravity; arrays along the fill ratio."""
-
-    wall_pressure: FloatArray
-    """Pa."""
-    hydrostatic_pressure: FloatArray
-    """Pa."""
-    moment: FloatArray
-    """kg m."""
-
-    @classmethod
-    def of(cls, scene: Scene, *, fill_ratio: FloatArray) -> GravityEffect:
-        """Change of the means over a turn, a dry part of the outer wall included; zero where empty."""
-        pressure, hydrostatic, moment = (np.zeros_like(fill_ratio) for _ in range(3))
-        wet = fill_ratio > 0
-        still = replace(scene, environment=replace(scene.environment, gravity=0.0))
-        ring, level = (TiltedRing.of(each, fill_ratio[wet]) for each in (scene, still))
-        pressure[wet], moment[wet] = ring.wall_pressure - level.wall_pressure, ring.moment - level.moment
-        hydrostatic[wet] = ring.hydrostatic_pressure - level.hydrostatic_pressure
-        return cls(wall_pressure=pressure, hydrostatic_pressure=hydrostatic, moment=moment)
 
 
 def check_ring(scene: Scene) -> None:

@@ -218,24 +218,14 @@ def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
     first = "rho omega^2 G |R2 s_2 - a s|/P" if pressures else "rho B a^2 G |shape|/U"
     swing = "2 max(1, |1/(1 - 1/s^2)|)" if pressures else "||1/(1 - 1/s^2)| - 1|"
     known = percent(FREQUENCY_UNCERTAINTY)
-    force = "and the Coriolis force on its flux" if pressures else "without Coriolis force"
     found = (
-        (PLATES, strips, "1 - V/(B theta (R2^2 - R1^2)/2)", "Eqs. 3, 7 and 12 against the exact geometry"),
-        (RIPPLE, largest[RIPPLE], f"{first}, G = g/omega^2", "first order of |r + g/omega^2| = b"),
+        (PLATES, strips, "1 - V/(B theta (R2^2 - R1^2)/2)"),
+        (RIPPLE, largest[RIPPLE], f"{first}, G = g/omega^2"),
         (
             SLOSHING,
             largest[SLOSHING],
             f"ripple times {swing}, s^2 = k tanh(k ln(R2/a)), k = pi/theta, s known to {known}",
-            f"lowest mode of a chamber {force}, driven at 1x",
         ),
-        (
-            MEAN,
-            largest[MEAN],
-            "order (G/a)^2, by quadrature",
-            "the same surface, mean over a turn",
-        ),
+        (MEAN, largest[MEAN], "order (G/a)^2, by quadrature"),
     )
-    return {
-        term: Contribution(term=term, value=float(value), formula=formula, source=source)
-        for term, value, formula, source in found
-    }
+    return {term: Contribution(value=float(value), formula=formula) for term, value, formula in found}

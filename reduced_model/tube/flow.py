@@ -25,8 +25,8 @@ from ringbalance.reduced_model.tube.regime import (
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, plain
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.joint import fitted_causes
+from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.uncertain import NORMAL_95
 
 _LEAST, _MOST = np.log(1e-9), np.log(1e6)

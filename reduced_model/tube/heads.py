@@ -11,9 +11,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.state import TubeState, finest_state, tube_state
+from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.physics.tube.uncertainty import (
-    SIMPLER,
     corrected_state,
     model_parts,
     uncertainty_parts,
@@ -192,10 +191,8 @@ def _widths(
     k, upstream = right.k, right.upstream_loss(end)
     width = np.sqrt(sum((part**2 for part in parts.values()), start=np.zeros_like(k)))
     share = np.where(k > 0, upstream / np.where(k > 0, k, 1.0), 1.0)
-    finest, to_crest = finest_state(tube=tube, state=state), right.kinetic_factor + upstream
-    simpler = finest.kinetic_factor + finest.upstream_loss(end)
-    simpler = simpler - state.kinetic_factor - state.upstream_loss(end)
-    moved = np.sqrt((width * share) ** 2 + (state.along * place) ** 2 + simpler**2)
+    to_crest = right.kinetic_factor + upstream
+    moved = np.hypot(width * share, state.along * place)
     found = {
         "uncertainty": width / (k + 1),
         "hump_uncertainty": moved / to_crest,
@@ -210,14 +207,9 @@ def _fraction_uncertainty(
 ) -> FloatArray:
     """(s_j - R)/(k + 1) of each part of k with a fraction s_j before the crest's end, and of its place."""
     total, end = state.k + 1, crest_span(tube)[1]
-    fraction, finest = (
-        (at.kinetic_factor + at.upstream_loss(end)) / (at.k + 1)
-        for at in (state, finest_state(tube=tube, state=state))
-    )
-    squares = (state.along * place / total) ** 2 + (finest - fraction) ** 2
+    fraction = (state.kinetic_factor + state.upstream_loss(end)) / total
+    squares = (state.along * place / total) ** 2
     for name, part in parts.items():
-        if name == SIMPLER:
-            continue
         # Which end or bend is wrong is not known: then the worse of before and behind the crest.
         lumped = name in {"ends", "bends"}
         lever = np.maximum(fraction, 1 - fraction) if lumped else np.abs(end - fraction)

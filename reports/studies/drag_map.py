@@ -9,23 +9,23 @@ Where the column is separated, someone who reads k off Eq. 18 finds a drag that 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any, Final
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from ringbalance.physics.gas import vented_pressure
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.operating.point import priming_pressure
-from ringbalance.reports.studies.drag_point import DragPoint, LiquidBatch
+from ringbalance.reports.studies.drag_point import DragPoint
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.designs import Designs
 from ringbalance.scene.liquids import known_liquids, liquid_at
-from ringbalance.scene.models import HumpGas, Liquid, Scene, Tube
+from ringbalance.scene.models import HumpGas, Liquid, Scene
 
 BORES: Final = (0.2e-3, 5e-3)
 """m: the map's range, widened when the scene's own bore lies near its edge."""
@@ -35,6 +35,7 @@ BORE_POINTS: Final = 41
 VISCOSITY_POINTS: Final = 49
 _ROOM: Final = 1.5
 _ROOM_TEMPERATURE: Final = 293.15
+_NU: Final = "liquid.kinematic_viscosity"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,22 +83,19 @@ class DragMap:
             VISCOSITY_POINTS,
             scene.liquid.kinematic_viscosity,
         )
-        rho = scene.liquid.density
-        batch = LiquidBatch(
-            kinematic_viscosity=nu,
-            density=np.full(nu.shape, rho),
-            gas_pressure=np.full(nu.shape, scene.gas.pressure),
-            vapour_pressure=np.full(nu.shape, calibration.flow_law.path.vapour_pressure),
-            relative_density=np.full(nu.shape, calibration.flow_law.inputs.relative_density),
-            relative_viscosity=np.zeros(nu.shape),
+        rho, law = scene.liquid.density, calibration.flow_law
+        point = DragPoint.of(
+            _designs(scene, {"tube.bore": np.repeat(d, nu.size), _NU: np.tile(nu, d.size)}),
+            scene=scene,
+            law=law,
+            relative_density=law.inputs.relative_density,
         )
-        rows = _rows(calibration, d, batch)
         return cls(
             bore=d,
             kinematic_viscosity=nu,
             density=rho,
             gas_pressure=scene.gas.pressure,
-            point=_stacked(rows),
+            point=point.reshaped(d.size, nu.size),
             velocity_paper=float(_velocity_paper(rho, scene.gas.pressure)),
         )
 
@@ -157,35 +155,40 @@ class LiquidVerdicts:
         asked = _default_liquids() if liquids is None else tuple(liquids)
         chosen = (scene.liquid, *(q for q in asked if q.name != scene.liquid.name))
         rho = np.array([q.density for q in chosen])
-        tube = replace(scene.tube, drag_coefficient=None)
         equal = scene.gas.pressure * rho / scene.liquid.density
+        spread = np.array([q.density_uncertainty for q in chosen])
+        spread[0] = law.inputs.relative_density
+        viscosity_spread = _viscosity_uncertainty(scene, chosen)
 
-        def batch(pressure: FloatArray) -> LiquidBatch:
-            own = np.array([q.density_uncertainty for q in chosen])
-            own[0] = law.inputs.relative_density
-            return LiquidBatch(
-                kinematic_viscosity=np.array([q.kinematic_viscosity for q in chosen]),
-                density=rho,
-                gas_pressure=pressure,
-                vapour_pressure=np.array([q.vapour_pressure for q in chosen]) - vented_pressure(scene),
-                relative_density=own,
-                relative_viscosity=_viscosity_uncertainty(scene, chosen),
+        def points(pressure: FloatArray, bore: FloatArray) -> DragPoint:
+            """Of all liquids in a tube of each bore, shape (bores, liquids)."""
+            of_liquids = {
+                _NU: np.array([q.kinematic_viscosity for q in chosen]),
+                "liquid.density": rho,
+                "liquid.vapour_pressure": np.array([q.vapour_pressure for q in chosen]),
+                "gas.pressure": pressure,
+            }
+            values = {path: np.tile(value, bore.size) for path, value in of_liquids.items()}
+            return DragPoint.of(
+                _designs(scene, {"tube.bore": np.repeat(bore, rho.size), **values}),
+                scene=scene,
+                law=law,
+                relative_density=np.tile(spread, bore.size),
+                relative_viscosity=np.tile(viscosity_spread, bore.size),
             )
 
-        def points(pressure: FloatArray) -> DragPoint:
-            return DragPoint.of(scene=scene, law=law, tube=tube, batch=batch(pressure))
-
+        own = np.array([scene.tube.bore])
         share = rho / law.density
         bores = np.geomspace(*BORES, BORE_POINTS)
         return cls(
             liquids=chosen,
-            at_scene=points(np.full(rho.shape, scene.gas.pressure)),
-            at_equal_head=points(equal),
+            at_scene=points(np.full(rho.shape, scene.gas.pressure), own),
+            at_equal_head=points(equal, own),
             equal_head_pressure=equal,
             starting_pressure=share * _starting_pressure(calibration),
             velocity_paper_at_scene=_velocity_paper(rho, scene.gas.pressure),
             velocity_paper_at_equal_head=_velocity_paper(rho, equal),
-            bore_for_paper=_bore_for_paper(bores, _stacked(_rows(calibration, bores, batch(equal)))),
+            bore_for_paper=_bore_for_paper(bores, points(equal, bores).reshaped(bores.size, rho.size)),
         )
 
     def velocity_errors(self) -> tuple[FloatArray, FloatArray]:
@@ -250,21 +253,9 @@ def _bore_for_paper(bores: FloatArray, points: DragPoint) -> FloatArray:
     return np.array([largest(k, runs) for k, runs in zip(points.k.T, points.runs.T, strict=True)])
 
 
-def _rows(calibration: Calibration, bore: FloatArray, batch: LiquidBatch) -> list[DragPoint]:
-    """Operating points of all liquids in a tube of each bore."""
-
-    def row(d: float) -> DragPoint:
-        tube: Tube = replace(calibration.scene.tube, bore=d, drag_coefficient=None)
-        return DragPoint.of(scene=calibration.scene, law=calibration.flow_law, tube=tube, batch=batch)
-
-    return [row(float(d)) for d in bore]
-
-
-def _stacked(rows: list[DragPoint]) -> DragPoint:
-    columns: dict[str, Any] = {
-        field.name: np.stack([getattr(row, field.name) for row in rows]) for field in fields(DragPoint)
-    }
-    return DragPoint(**columns)
+def _designs(scene: Scene, values: Mapping[str, FloatArray]) -> Designs:
+    """Of a scene whose k is not prescribed."""
+    return Designs.of(replace(scene, tube=replace(scene.tube, drag_coefficient=None)), values)
 
 
 def _velocity_paper(density: npt.ArrayLike, gas_pressure: npt.ArrayLike) -> FloatArray:

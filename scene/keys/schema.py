@@ -163,7 +163,10 @@ def _origins(table: Table) -> Key:
 
 _TOLERANCE = Key(
     takes=share(Bounds(above=0, below=1), example=0.01),
-    presence=standard("1 %", "relative bound on discretisation and left-out terms, against the top model"),
+    presence=standard(
+        "1 %",
+        "relative bound on discretisation, for meshes and gravity in finite elements",
+    ),
 )
 _RUN = {
     "run": Table.of(loop_models.RunSettings, "a simulation's seed and end"),

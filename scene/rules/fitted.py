@@ -14,7 +14,7 @@ from ringbalance.scene.fitted import MODEL, NO_UNIT, FittedQuantity
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.keys.schema import LIQUID_RING
-from ringbalance.scene.tube_models import ERROR_NAME, ErrorCause
+from ringbalance.scene.model_errors import ERROR_NAME, ErrorCause
 from ringbalance.scene.units import DIMENSIONS
 
 _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[[01]\])?")

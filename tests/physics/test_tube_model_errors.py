@@ -9,8 +9,8 @@ import pytest
 
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.physics.tube.uncertainty import MODEL_CAUSES, model_parts, with_errors
+from ringbalance.scene.model_errors import ModelError
 from ringbalance.scene.models import Scene, Tube
-from ringbalance.scene.tube_models import ModelError
 from ringbalance.scene.uncertain import NORMAL_95
 
 VELOCITIES = np.array([1.0, 3.0, 8.0, 20.0])

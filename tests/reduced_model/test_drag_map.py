@@ -150,8 +150,8 @@ def test_prescribed_k_is_lifted(calibration: Calibration) -> None:
 
 
 def test_without_a_hump_every_point_is_a_siphon(calibration: Calibration) -> None:
-    law = calibration.flow_law
-    straight = replace(calibration, flow_law=replace(law, path=replace(law.path, hump_pressure=None)))
+    scene = calibration.scene
+    straight = calibrate(replace(scene, tube=replace(scene.tube, hump_radius=None)))
     point = DragMap.of(calibration=straight).point
     assert np.all(point.regime == Regime.SIPHON)
     np.testing.assert_allclose(point.apparent_k, point.k, rtol=1e-9)

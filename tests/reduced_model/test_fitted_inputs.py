@@ -16,8 +16,8 @@ from ringbalance.reduced_model.law.loading import load_law
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.fitted import Fitted, FittedQuantity
+from ringbalance.scene.model_errors import ModelError
 from ringbalance.scene.models import Scene
-from ringbalance.scene.tube_models import ModelError
 from ringbalance.scene.uncertain import NORMAL_95, with_value
 
 SIZES = {

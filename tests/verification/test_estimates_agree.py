@@ -18,10 +18,8 @@ from ringbalance.reduced_model.terms import IN_INJECTIONS, models_used
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.selection_studies.choices import random_scene
 
 BUNDLED = ("liquid_ring_paper", "perfluorinated_oil", "silicone_oil_100cst", "six_chamber")
-RANDOM = (1, 2, 3, 5, 8, 13, 14, 17, 30, 35)
 LINE = {"conductance": 1e-7, "critical_ratio": 0.3, "dead_volume": 5e-6, "valve_lag": 2e-5}
 
 
@@ -62,14 +60,6 @@ def test_bundled_scenes_agree_at_every_tolerance(name: str) -> None:
     assert calibration.models_used == models_used(scene)
     check_comparison(scene, calibration)
     check(replace(scene, tolerance=0.003), calibration)
-
-
-@pytest.mark.parametrize("number", RANDOM)
-def test_random_scenes_agree(paper_scene: Scene, number: int) -> None:
-    scene = short(random_scene(paper_scene, number))
-    calibration = calibrate(scene)
-    assert calibration.models_used == models_used(scene)
-    check(scene, calibration)
 
 
 def test_sloshing_is_judged_at_the_worst_fill(paper_scene: Scene) -> None:

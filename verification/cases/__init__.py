@@ -15,7 +15,6 @@ _STUDIES: Final = MappingProxyType(
     {
         "pressure under gravity": "reference.gravity",
         "manufactured pressure": "reference.manufactured",
-        "choice of models": "selection_studies.choices",
         "measurements": "validation.comparison",
     }
 )

@@ -19,8 +19,6 @@ from ringbalance.scene.models import Scene
 Document = dict[str, Any]
 Values = Mapping[str, float]
 """By axis, in the axis' unit."""
-MAP_PREFIX: Final = "map of "
-"""Of the name of a map's table."""
 _ON_SHAFT: Final = 0.5
 """Of the axis "place", from which the gas pressure is one on the shaft."""
 _TABLES: Final = ("environment", "gas", "sensor", "controller", "run", "accuracy")
@@ -39,11 +37,6 @@ class Axis:
     usual: tuple[float, float]
     """Ends of the range where most discs are; the rest of the axis lies beyond it on one or both sides."""
     spacing: Literal["log", "linear"] = "log"
-
-    @classmethod
-    def of(cls, name: str) -> Axis:
-        """An axis by its name. Raises: KeyError: no axis of that name."""
-        return {axis.name: axis for axis in AXES}[name]
 
     def share(self, value: float) -> float:
         """How far along the axis a value in `unit` stands, within [0, 1]."""
@@ -80,23 +73,6 @@ AXES: Final = (
     Axis("gravity", "gravity over standard gravity", "1", 0.0, 2.0, usual=(0.0, 0.0), spacing="linear"),
 )
 """What a designed set varies together, each after those that it hangs on."""
-
-
-def places_of(scene: Scene) -> dict[str, float]:
-    """Where a scene stands on the axes of the maps, in their units."""
-    disc, tube, control = scene.disc, scene.tube, scene.controller
-    return {
-        "speed": scene.rotor.speed * 30 / math.pi,
-        "fill": disc.max_fill_ratio,
-        "angle": math.degrees(disc.central_angle),
-        "plate": disc.plate_thickness / _closing(scene, disc.central_angle),
-        "viscosity": scene.liquid.kinematic_viscosity,
-        "bore": 1e3 * tube.bore,
-        "pressure": scene.gas.pressure / _column(scene, scene.rotor.speed),
-        "gain": 1.0,
-        "noise": scene.sensor.amplitude_noise / control.limit,
-        "period": control.period,
-    }
 
 
 def _closing(scene: Scene, angle: float) -> float:

@@ -1,4 +1,4 @@
-"""A scene at its extremes: every axis, pairs of axes, and a designed set over all of them together."""
+"""A scene at its extremes: every axis from end to end, and a designed set over all of them together."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.results.result import CommandResult
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.evidence import Level
-from ringbalance.verification.extremes.axes import MAP_PREFIX
+from ringbalance.verification.extremes.axes import AXES, Axis
 from ringbalance.verification.extremes.design import Base, Point, design
-from ringbalance.verification.extremes.maps import StabilityMap, Sweep, stability_maps, sweeps
+from ringbalance.verification.extremes.design import Progress as Counting
 from ringbalance.verification.extremes.point import Ending, Judgement
 
 Progress = Callable[[str, int, int], None]
@@ -36,14 +37,126 @@ class Size:
     """Values on each axis to begin with."""
     fineness: float
     """Share of an axis within which the place is found where points begin to end in another way."""
-    grid: int
-    """Values along each axis of a map."""
 
 
 SIZES: Final[Mapping[Level, Size]] = {
-    "light": Size(points=40, sweep=7, fineness=0.03, grid=5),
-    "heavy": Size(points=5000, sweep=15, fineness=1e-3, grid=9),
+    "light": Size(points=40, sweep=7, fineness=0.03),
+    "heavy": Size(points=5000, sweep=15, fineness=1e-3),
 }
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Span:
+    """A stretch of one axis along which points end alike."""
+
+    low: float
+    """First value judged, in the axis' unit."""
+    high: float
+    """Last value judged."""
+    ending: Ending
+    loop: str
+    """Outcome of the closed loop; empty where there is none."""
+    text: str
+    """What the program says there: its message or reservation, at the end towards the nearest answer."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep:
+    """One axis from end to end."""
+
+    axis: Axis
+    values: FloatArray
+    """In the axis' unit, ascending, shape (n,): even steps, and closer ones where the ending changes."""
+    judgements: tuple[Judgement, ...]
+
+    def solved(self) -> tuple[float, float] | None:
+        """First and last value that got an answer, with or without a reservation; None for none."""
+        good = [v for v, j in zip(self.values, self.judgements, strict=True) if _answered(j)]
+        return (float(good[0]), float(good[-1])) if good else None
+
+    def beyond(self) -> tuple[str, ...]:
+        """What the program says past either end of that, each message once."""
+        told = (j.text for j in self.judgements if not _answered(j))
+        return tuple(dict.fromkeys(told))
+
+    def changes(self) -> tuple[int, ...]:
+        """Places after which a point ends in another way than the one before."""
+        pairs = zip(self.judgements[:-1], self.judgements[1:], strict=True)
+        return tuple(i for i, (one, other) in enumerate(pairs) if _alike(one) != _alike(other))
+
+    def spans(self) -> tuple[_Span, ...]:
+        """The stretches along which points end alike, from one end of the axis to the other."""
+        ends = [*(i + 1 for i in self.changes()), len(self.judgements)]
+        starts = [0, *ends[:-1]]
+        return tuple(self._span(start, end) for start, end in zip(starts, ends, strict=True))
+
+    def _span(self, start: int, end: int) -> _Span:
+        judgement = self.judgements[start]
+        # Towards the answers: what is said last below them, and first above.
+        said = self.judgements[end - 1 if start == 0 else start]
+        return _Span(
+            low=float(self.values[start]),
+            high=float(self.values[end - 1]),
+            ending=judgement.ending,
+            loop=judgement.loop,
+            text=said.text,
+        )
+
+
+def _alike(judgement: Judgement) -> tuple[Ending, str]:
+    return judgement.ending, judgement.loop
+
+
+def _answered(judgement: Judgement) -> bool:
+    """Whether a point got an answer, with or without a reservation."""
+    return judgement.ending not in (Ending.REFUSED, Ending.BROKEN)
+
+
+def sweeps(
+    base: Base, *, count: int, fineness: float, workers: int = 1, progress: Counting | None = None
+) -> tuple[Sweep, ...]:
+    """Every axis alone, in even steps, then halved wherever neighbours end differently.
+
+    Of changes back and forth within a step some may be missed.
+    Args: `count`: values on each to begin with. `fineness`: fraction of an axis to which changes are found.
+    """
+
+    def judge_all(places: Sequence[tuple[Axis, float]]) -> Sequence[Judgement]:
+        points = [{axis.name: value} for axis, value in places]
+        return base.judged(points, workers=workers, progress=progress)
+
+    grid = np.linspace(0, 1, count)
+    found = judge_all([(axis, float(value)) for axis in AXES for value in axis.at(grid)])
+    made = [
+        Sweep(axis=axis, values=axis.at(grid), judgements=tuple(found[k * count : (k + 1) * count]))
+        for k, axis in enumerate(AXES)
+    ]
+    while gaps := [(k, i) for k, sweep in enumerate(made) for i in _wide(sweep, fineness)]:
+        middles = [_middle(made[k], i) for k, i in gaps]
+        more = judge_all([(made[k].axis, value) for (k, _), value in zip(gaps, middles, strict=True)])
+        # From the right, so that places to the left stay where they are.
+        for (k, i), value, judgement in reversed(list(zip(gaps, middles, more, strict=True))):
+            made[k] = _with(made[k], i + 1, value, judgement)
+    return tuple(made)
+
+
+def _wide(sweep: Sweep, fineness: float) -> list[int]:
+    """Changes that lie between values further apart than that."""
+    places = [sweep.axis.share(float(value)) for value in sweep.values]
+    return [i for i in sweep.changes() if places[i + 1] - places[i] > fineness]
+
+
+def _middle(sweep: Sweep, place: int) -> float:
+    low, high = (sweep.axis.share(float(value)) for value in sweep.values[place : place + 2])
+    return float(sweep.axis.at((low + high) / 2))
+
+
+def _with(sweep: Sweep, place: int, value: float, judgement: Judgement) -> Sweep:
+    return Sweep(
+        axis=sweep.axis,
+        values=np.insert(sweep.values, place, value),
+        judgements=(*sweep.judgements[:place], judgement, *sweep.judgements[place:]),
+    )
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -54,13 +167,11 @@ class Extremes(CommandResult):
     judgements: tuple[Judgement, ...]
     """Of the designed set, in the order of its points."""
     sweeps: tuple[Sweep, ...]
-    maps: tuple[StabilityMap, ...]
 
     @property
     def everything(self) -> tuple[Judgement, ...]:
-        """Judgements of the designed set, the sweeps and the maps."""
-        parts: list[Sweep | StabilityMap] = [*self.sweeps, *self.maps]
-        return self.judgements + tuple(j for part in parts for j in part.judgements)
+        """Judgements of the designed set and the sweeps."""
+        return self.judgements + tuple(j for sweep in self.sweeps for j in sweep.judgements)
 
     def lines(self) -> Iterator[str]:
         """For a terminal: how the points ended."""
@@ -86,11 +197,10 @@ class Extremes(CommandResult):
             "worst_error_over_half_width": max((j.worst_ratio for j in everything), default=-1.0),
             "violations": _violations(self),
             "axes": [_sweep(sweep) for sweep in self.sweeps],
-            "maps": [_map(found) for found in self.maps],
         }
 
     def tables(self) -> dict[str, dict[str, list[Any]]]:
-        """Columns by table: "axes", the spans of each that end alike, and "map of x and y" for each map."""
+        """Columns by table: "axes", the spans of each that end alike."""
         spans = [(sweep.axis, span) for sweep in self.sweeps for span in sweep.spans()]
         axes: dict[str, list[Any]] = {
             "axis": [axis.title for axis, _ in spans],
@@ -101,8 +211,7 @@ class Extremes(CommandResult):
             "loop": [span.loop for _, span in spans],
             "said": [span.text for _, span in spans],
         }
-        maps = {f"{MAP_PREFIX}{item.x.name} and {item.y.name}": _map_columns(item) for item in self.maps}
-        return {"axes": axes, **maps}
+        return {"axes": axes}
 
     def broken(self) -> int:
         """Number of points, of all looked at, at which anything was not as it should be."""
@@ -133,18 +242,7 @@ def find_extremes(
         points=points,
         judgements=judgements,
         sweeps=sweeps(base, count=size.sweep, fineness=size.fineness, workers=workers, progress=told("axes")),
-        maps=stability_maps(base, count=size.grid, workers=workers, progress=told("maps")),
     )
-
-
-def _map_columns(item: StabilityMap) -> dict[str, list[Any]]:
-    places = [(x, y) for y in item.y_values for x in item.x_values]
-    return {
-        item.x.name: [float(x) for x, _ in places],
-        item.y.name: [float(y) for _, y in places],
-        "ending": [str(j.ending) for j in item.judgements],
-        "loop": [j.loop for j in item.judgements],
-    }
 
 
 def counted(judgements: Sequence[Judgement]) -> dict[str, int]:
@@ -178,26 +276,4 @@ def _sweep(sweep: Sweep) -> Record:
         "ending": [str(j.ending) for j in sweep.judgements],
         "loop": [j.loop for j in sweep.judgements],
         "residual": [j.residual for j in sweep.judgements],
-    }
-
-
-def _map(found: StabilityMap) -> Record:
-    shape = (found.y_values.size, found.x_values.size)
-    endings = np.array([str(j.ending) for j in found.judgements], dtype=object).reshape(shape)
-    loops = np.array([j.loop for j in found.judgements], dtype=object).reshape(shape)
-
-    def axis(of: Any, values: Any) -> Record:
-        return {
-            "axis": of.name,
-            "title": of.title,
-            "unit": of.unit,
-            "spacing": of.spacing,
-            "values": values.tolist(),
-        }
-
-    return {
-        "x": axis(found.x, found.x_values),
-        "y": axis(found.y, found.y_values),
-        "ending": endings.tolist(),
-        "loop": loops.tolist(),
     }

@@ -14,7 +14,7 @@ import numpy as np
 
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.selection.range_flow import TABLES, velocity_under_head
+from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, figure, from_half_width
 from ringbalance.verification.loops import flow_law_of
@@ -116,7 +116,8 @@ def running_tube(scene: Scene, *, head: float) -> Running:
 @lru_cache(maxsize=64)
 def running_tubes(scene: Scene, heads: tuple[float, ...]) -> tuple[Running, ...]:
     """The same under several heads at once."""
-    found = tube_loss(scene, velocity_under_head(scene, loss=TABLES, head=heads))
+    head = np.array(heads)
+    found = tube_loss(scene, velocity_of(table=TubeHeads.exact(scene).head, head=head, where=head > 0))
     leaving = found.terms.get("exit", np.zeros(len(heads)))
     return tuple(
         Running(

@@ -1,4 +1,4 @@
-"""The designed set, the axes and the maps of the extremes; a heavy run."""
+"""The designed set and the axes of the extremes; a heavy run."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DEFECTS: Final = {
     "half_widths_hundredth": Defect(width_factor=0.01),
     "liquid_lost": Defect(leak=1e-6),
 }
-_FEW: Final = Size(points=40, sweep=2, fineness=1.0, grid=2)
+_FEW: Final = Size(points=40, sweep=2, fineness=1.0)
 """Enough for a mutation to show."""
 _WORKERS: Final = 2
 _KEPT: Final = "extremes-points.json"

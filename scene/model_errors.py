@@ -1,4 +1,4 @@
-"""Models of the loss of a tube, chosen for a tolerance, and the keys that correct them."""
+"""Errors of the models themselves, supposed, drawn or fitted, and the keys of a tube that correct them."""
 
 from __future__ import annotations
 
@@ -9,30 +9,6 @@ from typing import Annotated, Final, Literal, cast, get_args
 from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, Shown, needed, standard
 from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, Bounds, number
 
-LEFT_OUT: Final = "left out"
-CORRELATION: Final = "correlation"
-FINEST: Final = "finest"
-Fidelity = Literal["left out", "correlation", "finest"]
-"""In order of cost."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class TubeModels:
-    """Model of each part of the loss; by default the finest of each."""
-
-    constant: float | None = None
-    """k in place of the sum of its parts."""
-    roughness: Fidelity = FINEST
-    """Left out: a smooth wall."""
-    rotation: Fidelity = FINEST
-    """The finest takes laminar flow from finite elements."""
-    bends: Fidelity = FINEST
-    """Left out: their arcs as straight tube; by correlation: as if all flow were turbulent."""
-    ends: Fidelity = FINEST
-    """Left out: no entrance loss, alpha = 1; by correlation: as if all flow were turbulent."""
-
-
-FINEST_MODELS: Final = TubeModels()
 CLEARING_ERROR: Final = "clearing of the crest"
 CAVITY_ERROR: Final = "pressure of the cavity"
 START_ERROR: Final = "start of the flow"
@@ -43,7 +19,6 @@ ErrorCause = Literal[
     "rotation entry",
     "ends",
     "bends",
-    "left out",
     "friction as built",
     "rotation as built",
     "entrance as built",

@@ -1,0 +1,104 @@
+"""Speed against accuracy: designs a second and error of every model, beside what the finest is known to."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ringbalance.reports.figures import style
+from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.section import Record, Section, Table, Work
+from ringbalance.results.numbers import MISSING, number, percent
+from ringbalance.scene.models import Scene
+from ringbalance.verification.trade import TradeStudy, trade_study
+
+_LEAST: Final = 1e-12
+"""Error at which a model that equals the finest is drawn."""
+
+
+def _collect(work: Work) -> Record | None:
+    """The trade of the scene, light: without meshes in three dimensions."""
+    return _study(work.scene).document()
+
+
+@lru_cache(maxsize=4)
+def _study(scene: Scene) -> TradeStudy:
+    """One measurement serves every report of a scene within a process."""
+    return trade_study(scene, level="light")
+
+
+def _view(trade: Record, evidence: Record) -> Record:
+    times = evidence["times"].get("trade") or {}
+    terms = [(row["term"], row["group"], _error(row["estimated_contribution"])) for row in trade["terms"]]
+    quantities = [quantity for quantity in trade["quantities"] if quantity["models"]]
+    return {
+        "terms": Table(
+            caption="What leaving a term out would change, by the dimensionless group that it grows with.",
+            heads=("Term", "Group", "Estimated contribution"),
+            rows=terms,
+        ),
+        "quantities": [_quantity(each, times.get(each["quantity"], [])) for each in quantities],
+    }
+
+
+def _quantity(quantity: Record, times: list[Record]) -> Record:
+    speed = {entry["model"]: entry["designs_per_second"] for entry in times}
+    models, known = quantity["models"], quantity["uncertainty"]
+    title = quantity["title"][0].upper() + quantity["title"][1:]
+    rows = [
+        (
+            model["model"],
+            MISSING if model is models[-1] else _error(model["error"]),
+            number(speed[model["model"]], digits=2) if model["model"] in speed else MISSING,
+        )
+        for model in models
+    ]
+    return {
+        "title": title,
+        "status": "" if quantity["status"]["code"] == "ok" else quantity["status"]["text"],
+        "models": Table(
+            caption=f"{title}. The last model is the finest, known to {_error(known)}.",
+            heads=("Model", "Error", "Designs a second"),
+            rows=rows,
+            style="",
+        ),
+        "figure": _figure(quantity, speed, title),
+    }
+
+
+def _error(value: float | None) -> str:
+    if value is None:
+        return MISSING
+    return percent(value, digits=2) if value >= 1e-3 else number(value, digits=2)
+
+
+def _figure(quantity: Record, speed: Record, title: str) -> Drawing:
+    """Error against designs a second of every model that was timed."""
+    models = [model for model in quantity["models"] if model["model"] in speed]
+    rates = np.array([speed[model["model"]] for model in models])
+    errors = np.array([max(model["error"], _LEAST) for model in models])
+    known = quantity["uncertainty"]
+
+    def paint(axes: Axes) -> None:
+        axes.plot(rates, errors, "o", color=style.FOUND, markersize=5, label="models")
+        axes.axhline(max(known, _LEAST), color=style.PAPER, linewidth=1, linestyle=":", label="known to")
+        style.logarithmic(axes, "x")
+        style.logarithmic(axes, "y")
+
+    return draw(
+        columns=4,
+        x="designs a second",
+        y="error against the finest",
+        name=f"trade-{quantity['quantity'].replace('_', '-')}",
+        paint=paint,
+        height=2.9,
+        alt=f"Error of {len(models)} models for {quantity['title']} against the designs that each answers in "
+        "a second.",
+        caption=f"{title}. The finest model is drawn at 10⁻¹²; dotted: what it is itself known to.",
+    )
+
+
+SECTION: Final = Section(name="trade", title="Speed against accuracy", collect=_collect, show=_view)

@@ -1,0 +1,363 @@
+"""Speed against accuracy, measured on a scene: a chamber's totals and the tube's flow, each by every model.
+
+Each model answers the same questions as the finest one; its error is the largest relative difference from
+that, beside what the finest one is itself known to.  The command `ringbalance trade` prints the study.
+"""
+
+from __future__ import annotations
+
+import json as json_format
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.physics.results import Status
+from ringbalance.reduced_model.calibration import chamber_and_law
+from ringbalance.reduced_model.chamber.element_check import ImportedElements, scene_ring
+from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
+from ringbalance.reduced_model.chamber.values import RingValues, paper_closed_forms
+from ringbalance.reduced_model.law.building import nominal_law
+from ringbalance.reduced_model.law.flow_law import FlowLaw
+from ringbalance.reduced_model.law.paper_law import paper_law
+from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
+from ringbalance.reduced_model.terms import TERMS, models_used
+from ringbalance.results.result import CommandResult
+from ringbalance.scene import load_scene
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.joint import without_fitted
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import Models, liquid_ring_scene, with_tolerance
+from ringbalance.scene.platform.files import check_file, write_whole
+from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.verification.evidence import Level
+
+Record = dict[str, Any]
+Solve = Callable[[], tuple[FloatArray, ...]]
+"""Values at the points of a study, one array a quantity."""
+
+_FILE: Final = "trade.json"
+_ENOUGH: Final = 0.2
+"""s of processor time, after which a solve is not repeated."""
+_REPEATS: Final = 5
+_FLOW_SHARES: Final = (0.2, 0.4, 0.5, 0.6, 0.8)
+"""Fills of the driven chamber, of max_fill_ratio."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredModel:
+    """One model on one quantity."""
+
+    name: str
+    values: tuple[float, ...]
+    """SI, at the points of the quantity."""
+    error: float
+    """Largest difference from the finest model, relative to that one's largest value."""
+    seconds: float
+    """Processor time of all the points, the least of some tries."""
+
+    @property
+    def designs_per_second(self) -> float:
+        """Designs that one processor answers in a second."""
+        return 1 / self.seconds
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredQuantity:
+    """One quantity by every model, the finest last."""
+
+    name: str
+    title: str
+    points: tuple[str, ...]
+    uncertainty: float
+    """Of the finest model, 95 %, relative, without that of the inputs."""
+    status: Status
+    models: tuple[MeasuredModel, ...]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class TradeStudy(CommandResult):
+    """Speed against accuracy of one scene."""
+
+    scene: Scene
+    quantities: tuple[MeasuredQuantity, ...]
+
+    def lines(self) -> Iterator[str]:
+        """For a terminal: the fastest model of each quantity that is no worse than the finest is known."""
+        yield f"Speed against accuracy of {self.scene.name} ({self.scene.source})"
+        for quantity in self.quantities:
+            best = max(_enough(quantity), key=lambda model: model.designs_per_second)
+            yield (
+                f"{quantity.title}: {best.name}, {best.designs_per_second:.2g} designs a second, is off by "
+                f"{best.error:.0e}, known to {quantity.uncertainty:.0e}"
+            )
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `document`."""
+        return self.document()
+
+    def document(self) -> Record:
+        """Plain numbers and texts; all but `times` is the same on every machine."""
+        scene = self.scene
+        estimates = [(term, term.estimate(scene)) for term in TERMS]
+        return {
+            "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
+            "tolerance": scene.tolerance,
+            "terms": [
+                {
+                    "term": term.name,
+                    "group": term.group,
+                    "estimated_contribution": estimate.value,
+                    "why": estimate.reason(None),
+                }
+                for term, estimate in estimates
+            ],
+            "models_used": [asdict(used) for used in models_used(scene)],
+            "quantities": [_quantity_document(quantity) for quantity in self.quantities],
+            "times": {
+                quantity.name: [
+                    {
+                        "model": model.name,
+                        "seconds": model.seconds,
+                        "designs_per_second": model.designs_per_second,
+                    }
+                    for model in quantity.models
+                ]
+                for quantity in self.quantities
+            },
+        }
+
+
+def _quantity_document(quantity: MeasuredQuantity) -> Record:
+    return {
+        "quantity": quantity.name,
+        "title": quantity.title,
+        "points": list(quantity.points),
+        "uncertainty": quantity.uncertainty,
+        "status": {"code": str(quantity.status.code), "text": quantity.status.text},
+        "models": [
+            {"model": model.name, "values": list(model.values), "error": model.error}
+            for model in quantity.models
+        ],
+    }
+
+
+def _enough(quantity: MeasuredQuantity) -> list[MeasuredModel]:
+    """Models whose error is below what the finest is known to; the finest always is."""
+    return [model for model in quantity.models if model.error <= quantity.uncertainty]
+
+
+def trade_study(
+    scene: Scene, *, level: Level = "heavy", progress: Callable[[str], None] | None = None
+) -> TradeStudy:
+    """Measure every model of a scene; all but times repeats on every machine.
+
+    Args: `level`: "light" leaves the meshes in three dimensions out. `progress`: called with each title.
+    Raises: SceneError: a rotor too slow for the liquid to form a ring.
+    """
+    check_ring(scene)
+    scene, show = without_fitted(scene), progress or (lambda _: None)
+    show("chamber")
+    chamber, law = chamber_and_law(scene)
+    fills = chamber_fills(scene)
+    models = _chamber_models(scene, fills, meshes=level == "heavy") if fills.size else {}
+    judged = chamber.fill_ratio >= fills.min(initial=1.0)
+    known = [
+        float(np.max(_shares(curve.uncertainty, curve.value), where=judged, initial=0.0))
+        for curve in (chamber.wall_pressure, chamber.moment)
+    ]
+    pressure, moment = _measured(
+        models,
+        (("wall_pressure", "wall pressure, mean over a turn, Pa"), ("moment", "moment of a chamber, kg m")),
+        points=[f"fill ratio {x:.3g}" for x in fills],
+        known=known,
+        status=chamber_status(scene),
+    )
+    show("velocity")
+    driven = scene.disc.max_fill_ratio * np.array(_FLOW_SHARES)
+    flow = law.evaluate(fill_ratio=driven, gas_pressure=scene.gas.pressure)
+    (velocity,) = _measured(
+        _flow_models(scene, driven),
+        (("velocity", "velocity in the tube, m/s"),),
+        points=[f"fill ratio {x:.3g}" for x in driven],
+        known=[float(np.max(_shares(flow.uncertainty, flow.velocity)))],
+        status=Status(),
+    )
+    return TradeStudy(scene=scene, quantities=(pressure, moment, velocity))
+
+
+def _shares(width: FloatArray, value: FloatArray) -> FloatArray:
+    return np.asarray(width / np.where(value == 0, math.inf, np.abs(value)))
+
+
+def _measured(
+    models: dict[str, Solve],
+    quantities: Sequence[tuple[str, str]],
+    *,
+    points: Sequence[str],
+    known: Sequence[float],
+    status: Status,
+) -> list[MeasuredQuantity]:
+    """Every model solved and timed, the last one being the finest."""
+    solved = {name: _timed(solve) for name, solve in models.items()}
+    measured = []
+    for place, (name, title) in enumerate(quantities):
+        values = {model: found[place] for model, (found, _) in solved.items()}
+        finest = values[next(reversed(values))] if values else np.zeros(0)
+        scale = float(np.max(np.abs(finest), initial=0.0)) or 1.0
+        measured.append(
+            MeasuredQuantity(
+                name=name,
+                title=title,
+                points=tuple(points),
+                uncertainty=known[place],
+                status=status,
+                models=tuple(
+                    MeasuredModel(
+                        name=model,
+                        values=tuple(map(float, value)),
+                        error=float(np.max(np.abs(value - finest))) / scale,
+                        seconds=solved[model][1],
+                    )
+                    for model, value in values.items()
+                ),
+            )
+        )
+    return measured
+
+
+def _timed(solve: Solve) -> tuple[tuple[FloatArray, ...], float]:
+    """Values and the least processor time, s."""
+    spent: list[float] = []
+    while not spent or (sum(spent) < _ENOUGH and len(spent) < _REPEATS):
+        start = time.process_time()
+        values = solve()
+        spent.append(time.process_time() - start)
+    return values, max(min(spent), 1e-9)
+
+
+def _chamber_models(scene: Scene, fills: FloatArray, *, meshes: bool) -> dict[str, Solve]:
+    """Wall pressure and moment; the finest finds the free surface under gravity to all orders."""
+
+    def closed(gravity: bool) -> tuple[FloatArray, ...]:
+        ring = RingValues.of(scene, fill_ratio=fills, gravity=gravity)
+        return ring.wall_pressure.value, ring.moment.value
+
+    def elements(cells: tuple[int, ...]) -> tuple[FloatArray, ...]:
+        meshes_of_three = tuple(tuple(max(1, n // k) for n in cells) for k in (1, 2, 4))
+        ring = scene_ring(scene, fill_ratio=fills, gravity=False, cells=meshes_of_three)
+        return ring.wall_pressure.value, ring.moment.value
+
+    walls = "closed form" if scene.disc.geometry is None else "integrals over the walls"
+    models: dict[str, Solve] = {
+        "the paper's formulas": partial(paper_closed_forms, scene, fills),
+        walls: partial(closed, False),
+    }
+    if geometry := scene.disc.geometry:
+
+        def on_its_mesh() -> tuple[FloatArray, ...]:
+            found = ImportedElements.of(scene, geometry, fill_ratio=fills)
+            return found.wall_pressure.value, found.moment.value
+
+        models |= {"3-D finite elements on its mesh": on_its_mesh} if meshes else {}
+    else:
+        fine = [default_cells(disc=scene.disc, dimension=dimension) for dimension in (2, 3)]
+        coarse = tuple(max(4, n // 2) for n in fine[0])
+        for cells in (coarse, *(fine if meshes else fine[:1])):
+            named = " x ".join(map(str, cells))
+            models[f"{len(cells)}-D finite elements, {named} cells"] = partial(elements, cells)
+    return models | {f"{walls}, gravity to all orders": partial(closed, True)}
+
+
+def _flow_models(scene: Scene, fills: FloatArray) -> dict[str, Solve]:
+    """Velocity at some fills under the scene's gas; the finest tabulates the loss to rounding."""
+
+    def velocity(law: Callable[[], FlowLaw]) -> tuple[FloatArray, ...]:
+        return (law().evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure).velocity,)
+
+    constant = replace(scene, tube=replace(scene.tube, drag_coefficient=PAPER_DRAG_COEFFICIENT))
+    laws: dict[str, Callable[[], FlowLaw]] = {
+        "the paper's law": lambda: paper_law(scene),
+        f"k = {PAPER_DRAG_COEFFICIENT:g}, regimes over the crest": lambda: nominal_law(
+            constant, gravity=False
+        ),
+        "correlations and finite-element tables, few nodes": lambda: nominal_law(scene, gravity=False),
+        "the same with gravity to all orders": lambda: nominal_law(scene, gravity=True),
+        "the same with uncertainties, checked by finite elements": lambda: chamber_and_law(scene)[1],
+    }
+    return {name: partial(velocity, law) for name, law in laws.items()}
+
+
+def trade(
+    scene: Path,
+    *,
+    json: bool = False,
+    out: Path | None = None,
+    level: Level = "heavy",
+    tolerance: str | None = None,
+    models: Models | None = None,
+) -> int:
+    """Measure speed against accuracy on a scene: designs a second and error of every model.
+
+    Args:
+        scene: the scene file.
+        json: print one JSON document instead of tables.
+        out: also write the document to trade.json in this folder.
+        level: "light" leaves out the meshes in three dimensions.
+        tolerance: in place of the scene's, such as "0.5 %" or 0.005.
+        models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
+
+    Returns:
+        Exit code 0.
+
+    Raises:
+        SceneError: a scene that cannot be used.
+        OSError: a file cannot be written.
+    """
+    asked = with_tolerance(liquid_ring_scene(load_scene(scene)), tolerance=tolerance, models=models)
+    if out is not None:
+        check_file(out / _FILE)
+    with activity("trade", "models ...") as shown:
+        study = trade_study(asked, level=level, progress=lambda title: shown.show(f"{title} ..."))
+    text = json_format.dumps(study.document(), allow_nan=False)
+    if json:
+        print(text)
+    else:
+        results_console().print(_view(study))
+    if out is not None:
+        write_whole(out / _FILE, text + "\n")
+        messages_console().print(f"written to {out / _FILE}", highlight=False)
+    return 0
+
+
+def _view(study: TradeStudy) -> RenderableType:
+    """A study for people. Returns: What rich prints."""
+    parts: list[RenderableType] = [Text(study.scene.name, style="bold")]
+    for quantity in study.quantities:
+        parts.append(Text(f"\n{quantity.title}", style="bold"))
+        if not quantity.status.ok:
+            parts.append(Padding(Text(quantity.status.text, style="yellow"), (0, 0, 0, 2)))
+        table = Table(box=None, header_style="dim", padding=(0, 1, 0, 2))
+        table.add_column("model")
+        for head in ("error", "designs a second", "time of one"):
+            table.add_column(head, justify="right")
+        for model in quantity.models:
+            table.add_row(
+                Text(model.name),
+                f"{model.error:.1e}" if model is not quantity.models[-1] else "finest",
+                f"{model.designs_per_second:,.0f}".replace(",", " "),
+                f"{1e3 * model.seconds:.3g} ms",
+            )
+        parts += [table, Padding(Text(f"the finest is known to {quantity.uncertainty:.1e}"), (0, 0, 0, 2))]
+    return Group(*parts)

@@ -67,6 +67,8 @@ class Draws:
         return cls(numbers=tuple(range(count)), devices=devices)
 
 
+CALIBRATED: Final = "calibrated"
+"""The law of a liquid ring where no other is asked for."""
 AS_GIVEN: Final = Draws.first(1, devices=False)
 """The scene as it says, with its own seed."""
 
@@ -223,6 +225,21 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
 def takes(scene: SceneFile, option: str) -> bool:
     """Whether the balancer of a scene has an option, such as "flow_law"."""
     return option in balancer_class(scene.balancer).options
+
+
+def balancer_under(law: str, scene: SceneFile) -> Balancer:
+    """The balancer of a scene under the law of the option `--law`.
+
+    Raises: SceneError: a law for a balancer that has none.
+    """
+    if law == CALIBRATED:
+        return balancer_of(scene)
+    if not takes(scene, "flow_law"):
+        problem = f"the balancer of {scene.source} has no flow law"
+        raise SceneError.of_option(
+            option="--law", value=law, problem=problem, allowed="this option with a liquid ring alone"
+        )
+    return balancer_of(scene, flow_law=law)
 
 
 def inputs_of(scene: SceneFile, half_widths: Mapping[str, float]) -> tuple[Input, ...]:

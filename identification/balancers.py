@@ -15,8 +15,11 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.eccentric_mass.inputs import eccentric_value, eccentric_with
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.scene_records import (
+    EccentricScene,
+    eccentric_value,
+    eccentric_with,
+)
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.device import Models

@@ -130,7 +130,7 @@ def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: Float
     wide = math.sqrt(float(spread[which, which]))
     along = spread[:, which] / max(float(spread[which, which]), 1e-300)
     inside, outside = (0.0, 0.0), (math.inf, math.inf)
-    start, slopes = optimum.t, optimum.slopes
+    start = optimum.t
     points: list[tuple[float, float]] = []
     distance = min(factor * wide, _LONGEST)
     for _ in range(_TRIALS):
@@ -139,8 +139,8 @@ def _end(optimum: Optimum, which: int, sign: float, factor: float, spread: Float
             place, distance = bound, abs(bound - here)
         begin = np.clip(start + along * (place - start[which]), *bounds)
         begin[which] = place
-        found = searched(optimum.residuals, begin, slopes, gain=_GAIN, fixed=which)
-        end, slopes, rise = found.t, found.slopes, float(found.at @ found.at) - least
+        end, at = searched(optimum.residuals, begin, gain=_GAIN, fixed=which)
+        rise = float(at @ at) - least
         root = math.sqrt(max(rise, 0.0))
         points.append((place, rise))
         at_bound = root < factor and place == bound

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from ringbalance.identification.likelihood import Problem, Residuals
 from ringbalance.identification.parameters import FitError
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.arrays import FloatArray
 
 _FIRST_NOISE: Final = 0.02
 """Of the root mean square of what a group measured: where the search for its noise begins."""
@@ -29,17 +29,9 @@ another's."""
 _APART: Final = 1.0
 """Of t for a further start, in prior standard deviations or, without a prior, in half of ln 2."""
 _WIDE: Final = 0.35
-_STEPS: Final = 6
 _LEAST_GAIN: Final = 1e-8
 """Of the sum of squares, below which a step to the optimum is not taken: a ten-thousandth of a standard
 deviation of a parameter."""
-_ROUGH: Final = 1e-4
-"""The same of a gain that does not come: predictions by integration in time are no smoother."""
-_JUMPED: Final = 0.08
-"""Of the sum of squares, below which a gain that does not come on a profile is taken for lost to a jump of a
-prediction; it moves no end of an interval by more than 1 %."""
-_LONGEST: Final = 1.0
-"""Of a step, in t."""
 _ROBUST: Final = 1.345
 """Residual over its standard deviation from which soft_l1 bends, for 95 % efficiency."""
 
@@ -103,7 +95,7 @@ def optimum(
     t = _from_starts(residuals, starts) if before is None else before.t
     of_prediction = problem.slopes(t)
     for _ in range(_ROUNDS):
-        t = searched(residuals, t, residuals.slopes(t, of_prediction), gain=_LEAST_GAIN).t
+        t, _ = searched(residuals, t, gain=_LEAST_GAIN)
         changed, freedom = _settled_noise(residuals, t, of_prediction, loss)
         done = _same(changed, residuals)
         residuals = changed
@@ -124,14 +116,10 @@ def _first_noise(problem: Problem) -> FloatArray:
 
 
 def _from_starts(residuals: Residuals, starts: int) -> FloatArray:
-    """The best of where searches from the scene and from around it come to, trust regions from the scene."""
-    problem = residuals.problem
-    first, *others = _start_points(problem, starts)
-    ends = [_minimised(residuals, first)]
-    for t in others:
-        slopes = residuals.slopes(t, problem.quick_slopes(t))
-        ends.append(searched(residuals, t, slopes, gain=_NEARBY).t)
-    return min(ends, key=lambda t: float(np.sum(residuals.at(t) ** 2)))
+    """The best of where searches from the scene and from around it come to."""
+    points = _start_points(residuals.problem, starts)
+    ends = [searched(residuals, point, gain=_NEARBY) for point in points]
+    return min(ends, key=lambda end: float(end[1] @ end[1]))[0]
 
 
 def _start_points(problem: Problem, count: int) -> list[FloatArray]:
@@ -155,30 +143,6 @@ def _start_points(problem: Problem, count: int) -> list[FloatArray]:
         part = np.mod(n * ratio ** -np.arange(1, size + 1), 1.0)
         points.append(np.clip(problem.start + _APART * wide * (2 * part - 1), low, high))
     return points
-
-
-def _minimised(residuals: Residuals, start: FloatArray) -> FloatArray:
-    """t near the least sum of squares that a search from a start comes to."""
-    problem = residuals.problem
-    found = least_squares(
-        residuals.at,
-        _inside(problem, start),
-        jac=lambda t: residuals.slopes(t, problem.quick_slopes(t)),
-        bounds=problem.bounds,
-        method="trf",
-        x_scale="jac",
-        ftol=_NEARBY,
-        xtol=1e-8,
-        gtol=1e-10,
-        max_nfev=_EVALUATIONS,
-    )
-    return np.asarray(found.x, dtype=np.float64)
-
-
-def _inside(problem: Problem, t: FloatArray) -> FloatArray:
-    low, high = problem.bounds
-    margin = 1e-9 * (high - low)
-    return np.clip(t, low + margin, high - margin)
 
 
 def _settled_noise(
@@ -218,67 +182,42 @@ def _size(whole: FloatArray, freedom: float, loss: str) -> float:
 
 
 def searched(
-    residuals: Residuals, t: FloatArray, slopes: FloatArray, *, gain: float, fixed: int | None = None
-) -> _Search:
-    """Least sum of squares nearby, by Gauss-Newton steps with Broyden's updates of the slopes.
+    residuals: Residuals, t: FloatArray, *, gain: float, fixed: int | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Least sum of squares nearby, by trust regions.
 
-    Where these come to no end, slopes are found again by differences.
-    Args: `t`: where to begin, with the value of a parameter that is held `fixed`. `slopes`: d(residuals)/dt
-        nearby. `gain`: of the sum of squares, below which a step is not taken.
-    Source: Broyden, Math. Comput. 19 (1965) 577.
+    Args: `t`: where to begin, with the value of a parameter that is held `fixed`. `gain`: of the sum of
+        squares, below which a step is not taken.
+    Returns: t, and the residuals and priors there.
     """
-    search = _Search(residuals=residuals, fixed=fixed, t=t, at=residuals.at(t), slopes=slopes)
-    if not search.descends(gain):
-        search.slopes = residuals.slopes(search.t, residuals.problem.slopes(search.t))
-        search.descends(gain)
-    return search
+    problem, free = residuals.problem, np.arange(t.size) != fixed
+    # What is reported needs the slopes that central differences give; a profile's other parameters do not.
+    differences = problem.slopes if fixed is None else problem.quick_slopes
 
+    def whole(part: FloatArray) -> FloatArray:
+        there = t.copy()
+        there[free] = part
+        return there
 
-@dataclass(kw_only=True, eq=False)
-class _Search:
-    """Where a search stands, and what it knows of the slopes there."""
+    def jacobian(part: FloatArray) -> FloatArray:
+        there = whole(part)
+        return np.asarray(residuals.slopes(there, differences(there))[:, free])
 
-    residuals: Residuals
-    fixed: int | None
-    t: FloatArray
-    at: FloatArray
-    slopes: FloatArray
-
-    def descends(self, gain: float) -> bool:
-        """Take steps while they gain; whether there is nothing left to gain."""
-        for _ in range(_STEPS):
-            step = self._step()
-            promised = float(np.sum((self.slopes @ step) ** 2))
-            if promised < gain:
-                return True
-            if not self._takes(step * min(1.0, _LONGEST / float(np.max(np.abs(step))))):
-                return promised < (_ROUGH if self.fixed is None else _JUMPED)
-        return False
-
-    def _takes(self, step: FloatArray) -> bool:
-        """Whether a step or a part of it gains; the slopes learn from those that do not, too."""
-        low, high = self.residuals.problem.bounds
-        for part in (1.0, 0.25, 0.0625):
-            there = np.clip(self.t + part * step, low, high)
-            found, moved = self.residuals.at(there), there - self.t
-            missed = found - self.at - self.slopes @ moved
-            self.slopes = self.slopes + np.outer(missed, moved) / max(float(moved @ moved), 1e-300)
-            if float(found @ found) < float(self.at @ self.at):
-                self.t, self.at = there, found
-                return True
-        return False
-
-    def _step(self) -> FloatArray:
-        low, high = self.residuals.problem.bounds
-        free = ~_blocked(self.t, self.slopes.T @ self.at, low, high)
-        if self.fixed is not None:
-            free[self.fixed] = False
-        step = np.zeros(self.t.size)
-        if np.any(free):
-            step[free] = -np.linalg.lstsq(self.slopes[:, free], self.at, rcond=1e-10)[0]
-        return step
-
-
-def _blocked(t: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
-    """Parameters at a bound that the descent points through."""
-    return np.asarray(((t <= low) & (gradient > 0)) | ((t >= high) & (gradient < 0)))
+    here = residuals.at(t)
+    if not np.any(free):
+        return t, here
+    low, high = problem.bounds
+    margin = 1e-9 * (high - low)
+    found = least_squares(
+        lambda part: residuals.at(whole(part)),
+        np.clip(t, low + margin, high - margin)[free],
+        jac=jacobian,
+        bounds=(low[free], high[free]),
+        method="trf",
+        x_scale="jac",
+        ftol=max(gain / max(float(here @ here), 1.0), 1e-12),
+        xtol=1e-8,
+        gtol=1e-10,
+        max_nfev=_EVALUATIONS,
+    )
+    return whole(found.x), np.asarray(found.fun)

@@ -18,8 +18,7 @@ from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, FittedParameter
-from ringbalance.identification.saved_joint import JointEntry, joint_entries, put_joint
-from ringbalance.identification.saved_places import Place, place_of
+from ringbalance.identification.saved_joint import JointEntry, Place, joint_entries, place_of, put_joint
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.loader import scene_from

@@ -187,7 +187,7 @@ def _answer(scene: Scene, end: _LineEnd, model: BalancerModel) -> LineAnswer:
         # Under extreme laws the shortest injection may move nothing: then no vibration belongs to a way.
         if correction > 0:
             amount = limit * moved / correction
-            dead = injections.dead_time(amount, least=end.valve_lag)
+            dead = injections.dead_time(amount)
             standing = _at_equal_fills(scene, dead, rate=limit / amount * injections.steady)
     return LineAnswer(
         end=end.name,

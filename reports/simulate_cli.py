@@ -8,8 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.controller.balancer import AS_GIVEN, Run
-from ringbalance.controller.commands import balancer_under
+from ringbalance.controller.balancer import AS_GIVEN, Run, balancer_under
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import AnyScene, Models, with_tolerance

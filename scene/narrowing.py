@@ -11,8 +11,6 @@ from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.units import FieldError, parse_quantity
 
 AnyScene: TypeAlias = SceneFile
-CALIBRATED: Final = "calibrated"
-"""The law of a liquid ring where no other is asked for."""
 Kind = TypeVar("Kind", bound=SceneFile)
 
 

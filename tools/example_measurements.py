@@ -15,8 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.eccentric_mass.inputs import eccentric_with
-from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene, eccentric_with
 from ringbalance.identification.balancers import models_for
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.measurements import Observations

@@ -14,12 +14,15 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.document import eccentric_document
-from ringbalance.controller.eccentric_mass.inputs import eccentric_drawn, eccentric_moved
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.scene_records import (
+    EccentricScene,
+    eccentric_drawn,
+    eccentric_moved,
+)
 from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.targets import target_angles

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json as json_format
 from pathlib import Path
 
-from ringbalance.controller.commands import balancer_under
+from ringbalance.controller.balancer import balancer_under
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.terminal import activity, results_console

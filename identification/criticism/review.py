@@ -11,8 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.inputs import eccentric_with
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_with
 from ringbalance.identification.criticism.explained import Explained, shares_explained
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.ranges import ComparedColumn, compared_columns

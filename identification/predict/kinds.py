@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+from scipy.optimize import newton
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
@@ -25,11 +26,8 @@ from ringbalance.physics.tube.uncertainty import corrected_state
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 
-_ROUNDS: Final = 12
-_STEP: Final = 1e-4
-"""In ln u, of the slope of ln (k + 1)."""
-_DONE: Final = 1e-6
-"""Change of ln u after which the next one, its square, is round-off."""
+_DONE: Final = 1e-10
+"""In ln u."""
 
 
 def _by_scene_alone(predict: Callable[[Any, Observations], FloatArray]) -> Callable[..., FloatArray]:
@@ -114,7 +112,7 @@ def _moved(device: Device, observations: Observations) -> FloatArray:
 def _flow_rates(scene: Scene, observations: Observations, models: Models) -> FloatArray:
     """Flow through the tube alone, at rest: (k + 1) rho u^2/2 = p, Q = S u, k without rotation.
 
-    Returns: Q, m^3/s, shape (n,), by Newton's method in ln u.
+    Returns: Q, m^3/s, shape (n,), by the secant in ln u.
     Source: definition of k, Eq. 14 of the liquid-ring paper, between two reservoirs at rest.
     """
     return Device.of(scene, models).once(observations, _flow_rate)
@@ -124,14 +122,11 @@ def _flow_rate(device: Device, observations: Observations) -> FloatArray:
     scene = device.scene
     head = observations.columns["pressure_difference"] / scene.liquid.density
     log_u = np.log(np.sqrt(2 * head / (_loss(scene, np.sqrt(head)) + 1)))
-    for _ in range(_ROUNDS):
-        both = np.log(_loss(scene, np.exp(np.concatenate([log_u, log_u + _STEP]))) + 1)
-        loss, nearby = both[: head.size], both[head.size :]
-        change = (np.log(2 * head) - loss - 2 * log_u) / (2 + (nearby - loss) / _STEP)
-        log_u = log_u + np.clip(change, -1.0, 1.0)
-        if np.max(np.abs(change)) < _DONE:
-            break
-    return np.asarray(scene.tube.area * np.exp(log_u))
+
+    def lacking(log_u: FloatArray) -> FloatArray:
+        return np.asarray(np.log(_loss(scene, np.exp(log_u)) + 1) + 2 * log_u - np.log(2 * head))
+
+    return np.asarray(scene.tube.area * np.exp(newton(lacking, log_u, tol=_DONE)))
 
 
 def _loss(scene: Scene, velocity: FloatArray) -> FloatArray:

@@ -104,12 +104,12 @@ class Injections:
             return np.inf
         return float(brentq(lambda time: self.moved(time) - amount, least, longest + more, xtol=_TIME_ERROR))
 
-    def dead_time(self, amount: float, *, least: float = 0.0) -> float:
+    def dead_time(self, amount: float) -> float:
         """Of the injection that moves a fill ratio, or of the shortest sure one that moves more, s.
 
         Zero where the gas cannot move so much.
         """
         if self.shortest is None:
             return 0.0
-        opening = self.opening(amount, least=max(self.shortest, least))
+        opening = self.opening(amount, least=self.shortest)
         return opening - self.moved(opening) / self.steady if np.isfinite(opening) else 0.0

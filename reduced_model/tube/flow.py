@@ -185,9 +185,10 @@ class TubeFlow:
         self, pressure: FloatArray, where: BoolArray, *, to_crest: bool, exactly: bool = True
     ) -> FloatArray:
         """Velocity that belongs to a fall of pressure, zero where the second argument is false, m/s."""
-        flows, inverse = where & (pressure > 0), self.to_crest if to_crest else self.between
+        head, inverse = pressure / self.path.density, self.to_crest if to_crest else self.between
         assert inverse is not None
-        wanted = np.log(np.where(flows, pressure, 1.0) / self.path.density)
+        flows = where & (head > 0)
+        wanted = np.log(np.where(flows, head, 1.0))
         found, slope = inverse(wanted)
         if exactly:
             found = growing_root(partial(self.log_head, to_crest=to_crest), wanted, found, slope, flows)

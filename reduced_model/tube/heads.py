@@ -150,8 +150,9 @@ def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -
 
     Returns: u, m/s, the shape of `head`.
     """
-    safe = np.where(where, head, 1.0)
-    return np.where(where, np.exp(table.inverse(np.log(safe))), 0.0)
+    # A pressure above zero may make a head that is rounded to zero.
+    flows = where & (np.asarray(head) > 0)
+    return np.where(flows, np.exp(table.inverse(np.log(np.where(flows, head, 1.0)))), 0.0)
 
 
 def _growing(scene: Scene, head: LogHead) -> LogHead:

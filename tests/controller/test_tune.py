@@ -15,9 +15,12 @@ import pytest
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass import balancer
-from ringbalance.controller.eccentric_mass.inputs import eccentric_drawn
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
+from ringbalance.controller.eccentric_mass.scene_records import (
+    EccentricScene,
+    eccentric_drawn,
+    eccentric_scene,
+)
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.tuning import FIRST_RUNS, _eccentric_settling, tune_eccentric
 from ringbalance.controller.loop import simulate

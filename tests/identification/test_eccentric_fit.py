@@ -13,9 +13,13 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.eccentric_mass.inputs import eccentric_value, eccentric_with
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
+from ringbalance.controller.eccentric_mass.scene_records import (
+    EccentricScene,
+    eccentric_scene,
+    eccentric_value,
+    eccentric_with,
+)
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit

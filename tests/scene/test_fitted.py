@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.eccentric_mass.inputs import eccentric_drawn
-from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_drawn, eccentric_scene
 from ringbalance.scene import SceneError, bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.narrowing import liquid_ring_scene

@@ -24,8 +24,11 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
     filter_matrices,
     whirl_transition,
 )
-from ringbalance.controller.eccentric_mass.inputs import eccentric_value, eccentric_with
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.scene_records import (
+    EccentricScene,
+    eccentric_value,
+    eccentric_with,
+)
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.uncertain import NORMAL_95
 

@@ -120,7 +120,7 @@ class Outcome(StrEnum):
     TOO_MANY_SAMPLES = "too_many_samples"
 
 
-class Verdict(StrEnum):
+class RunVerdict(StrEnum):
     """What a run says of the loop."""
 
     SETTLED = "settled"
@@ -132,11 +132,11 @@ class Verdict(StrEnum):
     """A small residual grows, or the amplitude did."""
 
 
-_VERDICTS: Final[Mapping[Outcome, Verdict]] = {
-    Outcome.SETTLED: Verdict.SETTLED,
-    Outcome.HOVERING: Verdict.HOVERING,
-    Outcome.UNSTABLE: Verdict.UNSTABLE,
-    Outcome.DIVERGING: Verdict.UNSTABLE,
+_VERDICTS: Final[Mapping[Outcome, RunVerdict]] = {
+    Outcome.SETTLED: RunVerdict.SETTLED,
+    Outcome.HOVERING: RunVerdict.HOVERING,
+    Outcome.UNSTABLE: RunVerdict.UNSTABLE,
+    Outcome.DIVERGING: RunVerdict.UNSTABLE,
 }
 """What an outcome says of the loop; any other: not settled."""
 
@@ -221,9 +221,9 @@ class Simulation(DeferredResult):
         return "; ".join(finding.text for finding in self.findings)
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> RunVerdict:
         """What the outcome says of the loop."""
-        return _VERDICTS.get(self.outcome, Verdict.NOT_SETTLED)
+        return _VERDICTS.get(self.outcome, RunVerdict.NOT_SETTLED)
 
     # Most runs are one of many, of which nobody asks what follows.
     @property

@@ -15,7 +15,7 @@ from ringbalance.identification.criticism.law_comparison import summaries
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 from ringbalance.results.findings import Finding, Value
@@ -155,9 +155,9 @@ _STRONG: Final = 0.9
 """Correlation from which two parameters are named together."""
 _MOST_LINES: Final = 10
 _WORDS: Final = {
-    Verdict.IDENTIFIED: "yes",
-    Verdict.PRACTICALLY: "hardly",
-    Verdict.STRUCTURALLY: "no",
+    Identified.IDENTIFIED: "yes",
+    Identified.PRACTICALLY: "hardly",
+    Identified.STRUCTURALLY: "no",
 }
 _FAR: Final = 3.0
 """Normalised residual of a row that is named."""
@@ -196,7 +196,7 @@ def _text(following: NextMeasurement) -> dict[str, Value]:
 
 def _quantity(found: FittedParameter) -> Quantity:
     low, high = (finite(end) for end in found.interval)
-    status = "ok" if found.verdict is Verdict.IDENTIFIED else found.verdict.value.replace(" ", "_")
+    status = "ok" if found.verdict is Identified.IDENTIFIED else found.verdict.value.replace(" ", "_")
     return Quantity(
         key=found.path,
         name=found.name,
@@ -246,7 +246,7 @@ def _findings(result: FitResult) -> Iterator[Finding]:
 
 def _of_parameter(found: FittedParameter) -> Iterator[Finding]:
     name: dict[str, Value] = {"name": found.name}
-    if found.verdict is not Verdict.IDENTIFIED:
+    if found.verdict is not Identified.IDENTIFIED:
         yield Finding(code="not_identified", values=name | {"text": found.text})
     for end, bound, side in zip(found.interval, found.at_bound, ("lower", "upper"), strict=True):
         # The data did not set this end.

@@ -10,7 +10,7 @@ import numpy as np
 from ringbalance.identification.balancers import both_sides, held_for, informed, models_for, parameters_for
 from ringbalance.identification.data.kinds import kinds_of
 from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.identifiability import Combination, Verdict, combinations, verdicts
+from ringbalance.identification.identifiability import Combination, Identified, combinations, verdicts
 from ringbalance.identification.intervals import Profile, covariance, profiles
 from ringbalance.identification.joint import about_pulls, joint_of, scene_as_fitted
 from ringbalance.identification.likelihood import Block, Problem
@@ -102,7 +102,7 @@ def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
 
 
 def _fitted(
-    parameter: Parameter, t: float, found: Profile, verdict: Verdict, products: Sequence[Combination]
+    parameter: Parameter, t: float, found: Profile, verdict: Identified, products: Sequence[Combination]
 ) -> FittedParameter:
     before = None
     if parameter.prior:
@@ -122,8 +122,8 @@ def _fitted(
     )
 
 
-def _verdict_text(parameter: Parameter, verdict: Verdict, found: Sequence[Combination]) -> str:
-    if verdict is Verdict.IDENTIFIED:
+def _verdict_text(parameter: Parameter, verdict: Identified, found: Sequence[Combination]) -> str:
+    if verdict is Identified.IDENTIFIED:
         return "identified by the data"
     within = [c.text for c in found if parameter.name in c.names]
     only = f"; the data identify {' and '.join(within)}" if within else ""
@@ -133,8 +133,8 @@ def _verdict_text(parameter: Parameter, verdict: Verdict, found: Sequence[Combin
         else "nothing else is known of it"
     )
     reason = {
-        Verdict.STRUCTURALLY: "no data of these kinds can tell it apart",
-        Verdict.PRACTICALLY: "these data hardly narrow it down",
+        Identified.STRUCTURALLY: "no data of these kinds can tell it apart",
+        Identified.PRACTICALLY: "these data hardly narrow it down",
     }[verdict]
     return f"{verdict}: {reason}{only}; {rest}"
 

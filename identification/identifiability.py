@@ -47,7 +47,7 @@ _WHOLE: Final = 3
 """Largest whole exponent looked for."""
 
 
-class Verdict(StrEnum):
+class Identified(StrEnum):
     """Whether data identify a parameter."""
 
     IDENTIFIED = "identified"
@@ -92,8 +92,8 @@ def _allowed_widths(parameters: Sequence[Parameter], t: FloatArray) -> FloatArra
 
 def verdicts(
     parameters: Sequence[Parameter], t: FloatArray, slopes: FloatArray, profiles: Sequence[Profile]
-) -> tuple[Verdict, ...]:
-    """Verdict of each parameter. Args: `slopes`: d(residuals of the data)/dt, without priors."""
+) -> tuple[Identified, ...]:
+    """Identified of each parameter. Args: `slopes`: d(residuals of the data)/dt, without priors."""
     _, s, vt = _normalised(slopes)
     null = vt[s <= DEPENDENT]
     lost = np.any(np.abs(null) > 1e-2, axis=0) if null.size else np.zeros(t.size, dtype=np.bool_)
@@ -105,7 +105,9 @@ def verdicts(
         # Prior and data of equal weight leave the prior's width over the root of two.
         wide = reach > allowed[i] / (math.sqrt(2) if parameter.prior else 1.0)
         weak = wide or profile.factor * alone[i] > allowed[i]
-        found.append(Verdict.STRUCTURALLY if lost[i] else Verdict.PRACTICALLY if weak else Verdict.IDENTIFIED)
+        found.append(
+            Identified.STRUCTURALLY if lost[i] else Identified.PRACTICALLY if weak else Identified.IDENTIFIED
+        )
     return tuple(found)
 
 
@@ -124,17 +126,17 @@ def combinations(
     parameters: Sequence[Parameter],
     t: FloatArray,
     slopes: FloatArray,
-    found: Sequence[Verdict],
+    found: Sequence[Identified],
     profiles: Sequence[Profile],
 ) -> tuple[Combination, ...]:
     """Products of powers that the data identify, where they do not identify each parameter.
 
     Args: `slopes`: as of `verdicts`.
     """
-    if all(verdict is Verdict.IDENTIFIED for verdict in found):
+    if all(verdict is Identified.IDENTIFIED for verdict in found):
         return ()
     factor, allowed = max(p.factor for p in profiles), _allowed_widths(parameters, t)
-    weak = np.array([verdict is not Verdict.IDENTIFIED for verdict in found])
+    weak = np.array([verdict is not Identified.IDENTIFIED for verdict in found])
     flat = _flattened(slopes, t, allowed, [p for p, one in zip(profiles, weak, strict=True) if one])
     _, s, vt = np.linalg.svd(flat * allowed, full_matrices=False)
     # A row is the gradient of a product's logarithm; one that has a single parameter is a verdict.

@@ -17,7 +17,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.balancers import both_sides
 from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
@@ -89,7 +89,7 @@ def _least_identified(result: FitResult) -> str:
 
     def key(which: int) -> tuple[int, float]:
         each = result.parameters[which]
-        return list(Verdict).index(each.verdict), each.profile.high - each.profile.low
+        return list(Identified).index(each.verdict), each.profile.high - each.profile.low
 
     return result.parameters[max(range(len(result.parameters)), key=key)].name
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.identifiability import Combination, Verdict
+from ringbalance.identification.identifiability import Combination, Identified
 from ringbalance.identification.intervals import Profile
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
@@ -34,7 +34,7 @@ class FittedParameter:
     """Of the scene."""
     before_interval: tuple[float, float] | None
     """By the scene's [uncertainty]; None where nothing is known beforehand."""
-    verdict: Verdict
+    verdict: Identified
     text: str
     """The verdict with its reason, in one sentence."""
     profile: Profile
@@ -50,7 +50,7 @@ class FittedParameter:
     @property
     def origin(self) -> Origin:
         """Of the value in a saved scene."""
-        return "measured" if self.verdict is Verdict.IDENTIFIED else "inferred"
+        return "measured" if self.verdict is Identified.IDENTIFIED else "inferred"
 
     @property
     def contradicts(self) -> bool:

@@ -21,7 +21,7 @@ _HIGHEST_ORDER = 50.0
 _EPSILON = float(np.finfo(np.float64).eps)
 
 
-class Verdict(StrEnum):
+class GridVerdict(StrEnum):
     """What the sequence of values looks like."""
 
     MONOTONE = "monotone"
@@ -32,11 +32,11 @@ class Verdict(StrEnum):
 
 
 _TEXT = {
-    Verdict.MONOTONE: "converges steadily at about its formal order",
-    Verdict.OSCILLATORY: "oscillates from mesh to mesh: add a finer mesh before trusting the order",
-    Verdict.ROUND_OFF: "has converged to round-off: no order can be seen, and none is needed",
-    Verdict.NOT_ASYMPTOTIC: "is not yet in its asymptotic range: add a finer mesh",
-    Verdict.DIVERGING: "does not converge on these meshes: look for an error before refining",
+    GridVerdict.MONOTONE: "converges steadily at about its formal order",
+    GridVerdict.OSCILLATORY: "oscillates from mesh to mesh: add a finer mesh before trusting the order",
+    GridVerdict.ROUND_OFF: "has converged to round-off: no order can be seen, and none is needed",
+    GridVerdict.NOT_ASYMPTOTIC: "is not yet in its asymptotic range: add a finer mesh",
+    GridVerdict.DIVERGING: "does not converge on these meshes: look for an error before refining",
 }
 
 
@@ -44,7 +44,7 @@ _TEXT = {
 class GridConvergence:
     """Order, limit and uncertainty of one number computed on several meshes."""
 
-    verdict: Verdict
+    verdict: GridVerdict
     observed_order: float
     """As found, with its sign and before any cap; zero where none can be seen."""
     order: float
@@ -93,7 +93,7 @@ def gci(
     noise = max(round_off, 8 * _EPSILON * float(np.abs(phi).max()))
     if _is_noise(phi, h, formal_order, noise):
         change = abs(float(phi[1] - phi[0]))
-        return _record(Verdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + change)
+        return _record(GridVerdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + change)
     if phi.size > 3:
         return _from_fit(phi, _best_fit(phi, h, formal_order=formal_order), formal_order, noise, safety)
     return _from_three(phi, h, formal_order, noise, safety)
@@ -144,7 +144,7 @@ def _from_three(
     e21, e32 = float(phi[1] - phi[0]), float(phi[2] - phi[1])
     r21, r32 = float(h[1] / h[0]), float(h[2] / h[1])
     if abs(e32) <= noise:
-        return _record(Verdict.DIVERGING, phi, 0.0, 0.0, phi[0], 0.0, 3 * abs(e21) + noise)
+        return _record(GridVerdict.DIVERGING, phi, 0.0, 0.0, phi[0], 0.0, 3 * abs(e21) + noise)
     observed = _celik_order(e21, e32, r21, r32)
     verdict = _verdict(observed, e21 * e32 < 0, formal_order)
     if observed <= 0:
@@ -154,19 +154,19 @@ def _from_three(
     # An order above the formal one means that leading errors cancel here; the coarser pair still sees them.
     foretold = abs(e32) / (r32**order - 1) / r21**order
     error = max(abs(e21) / (r21**order - 1), foretold if observed > formal_order else 0.0)
-    if verdict is Verdict.OSCILLATORY:
+    if verdict is GridVerdict.OSCILLATORY:
         error = max(error, float(np.ptp(phi)) / 2)
     half_width = safety * error + noise
     return _record(verdict, phi, observed, order, phi[0] - e21 / gain, safety * abs(e21) / gain, half_width)
 
 
-def _verdict(observed: float, oscillates: bool, formal_order: float) -> Verdict:
+def _verdict(observed: float, oscillates: bool, formal_order: float) -> GridVerdict:
     if observed <= 0:
-        return Verdict.DIVERGING
+        return GridVerdict.DIVERGING
     if oscillates:
-        return Verdict.OSCILLATORY
+        return GridVerdict.OSCILLATORY
     near = 0.5 * formal_order <= observed <= 1.5 * formal_order
-    return Verdict.MONOTONE if near else Verdict.NOT_ASYMPTOTIC
+    return GridVerdict.MONOTONE if near else GridVerdict.NOT_ASYMPTOTIC
 
 
 def _from_fit(
@@ -183,9 +183,9 @@ def _from_fit(
     if good:
         verdict = _verdict(fit.observed_order, False, formal_order)
     elif np.any(changes[1:] * changes[:-1] < 0):
-        verdict = Verdict.OSCILLATORY
+        verdict = GridVerdict.OSCILLATORY
     else:
-        verdict = Verdict.DIVERGING if fit.observed_order <= 0 else Verdict.NOT_ASYMPTOTIC
+        verdict = GridVerdict.DIVERGING if fit.observed_order <= 0 else GridVerdict.NOT_ASYMPTOTIC
     index = half_width
     return _record(verdict, phi, fit.observed_order, fit.order, fit.limit, index, half_width + noise)
 
@@ -268,7 +268,7 @@ def _linear(
 
 
 def _record(
-    verdict: Verdict,
+    verdict: GridVerdict,
     phi: FloatArray,
     observed: float,
     order: float,

@@ -1,6 +1,6 @@
 """What every command answers with, and how it is written.
 
-`rows`: a quantity, and a requirement with its verdict.  `findings`: something to say, with a code, a
+`rows`: a quantity with its interval.  `findings`: something to say, with a code, a
 severity, its numbers and the change of the scene that would mend it; the sentences are in `sentences.toml`.
 `numbers`: values with their uncertainties as text.  `table`: texts in rows and columns.
 `render`: rows and tables for a terminal, HTML, CSV and JSON.  `result`: the base of all results.

@@ -1,10 +1,9 @@
-"""A quantity as one record, and a requirement with its verdict: what every output is made of."""
+"""A quantity as one record: what every output is made of."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from enum import StrEnum
 from typing import Any
 
 from ringbalance.results.numbers import Width, given, shown
@@ -74,56 +73,3 @@ class Quantity:
 def around(value: float, total: float) -> tuple[float | None, float | None]:
     """Ends of an interval as wide on both sides; none without an uncertainty."""
     return (value - total, value + total) if total else (None, None)
-
-
-class Verdict(StrEnum):
-    """Whether a requirement is met, by the fraction of drawn devices that meet it or by an interval."""
-
-    MET = "met"
-    NOT_MET = "not met"
-    UNDECIDED = "undecided"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Requirement:
-    """What is asked for, what is reached, and the verdict."""
-
-    key: str
-    name: str
-    required: Quantity | None
-    """None: nothing is asked for."""
-    reached: Quantity
-    at_least: bool = True
-    """Whether more than required is better."""
-    verdict: Verdict | None = None
-    """None where nothing is asked for."""
-
-    def document(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "key": self.key,
-            "name": self.name,
-            "required": None if self.required is None else self.required.document(),
-            "reached": self.reached.document(),
-            "at_least": self.at_least,
-            "verdict": None if self.verdict is None else self.verdict.value,
-        }
-
-
-def judged(*, reached: Quantity, required: float, at_least: bool) -> Verdict:
-    """Verdict of an interval: undecided where it holds what is required, or has no end on that side."""
-    if reached.value is None:
-        return Verdict.NOT_MET
-    low, high = _ends(reached)
-    worst, best = (low, high) if at_least else (-high, -low)
-    wanted = required if at_least else -required
-    return Verdict.MET if worst >= wanted else Verdict.NOT_MET if best < wanted else Verdict.UNDECIDED
-
-
-def _ends(quantity: Quantity) -> tuple[float, float]:
-    value = quantity.value or 0.0
-    if quantity.width is None:
-        return value, value
-    low = -math.inf if quantity.lower is None else quantity.lower
-    high = math.inf if quantity.upper is None else quantity.upper
-    return low, high

@@ -269,7 +269,7 @@ class RunSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Requirement:
+class RequirementSettings:
     """What the balancer is wanted for; None where nothing is required. No result depends on it."""
 
     settling_time: Annotated[

@@ -30,7 +30,7 @@ from ringbalance.scene.keys.fields import (
     number,
     quantity,
 )
-from ringbalance.scene.loop_models import ControllerSettings, Environment, Requirement, Rotor, Sensor
+from ringbalance.scene.loop_models import ControllerSettings, Environment, RequirementSettings, Rotor, Sensor
 from ringbalance.scene.model_errors import DrawDownFactor, ExtraLoss, ModelErrors
 from ringbalance.scene.origins import SceneFile
 
@@ -369,7 +369,7 @@ class Scene(SceneFile):
     rotor: Rotor
     sensor: Sensor
     controller: ControllerSettings
-    requirement: Requirement = field(default_factory=Requirement)
+    requirement: RequirementSettings = field(default_factory=RequirementSettings)
 
     balancer: ClassVar[str] = "liquid_ring"
 

@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
-from ringbalance.physics.convergence import Verdict
+from ringbalance.physics.convergence import GridVerdict
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.pressure.solve import RotatingLiquid
 from ringbalance.physics.results import Estimate
@@ -41,7 +41,7 @@ def found_of(quantities: RingQuantities, name: str, index: int) -> Found:
     It is not conclusive where the meshes do not converge steadily.
     """
     estimate: Estimate = getattr(quantities, name)
-    converges = quantities.convergence[name][index].verdict in (Verdict.MONOTONE, Verdict.ROUND_OFF)
+    converges = quantities.convergence[name][index].verdict in (GridVerdict.MONOTONE, GridVerdict.ROUND_OFF)
     return Found(
         value=float(estimate.value[index]),
         numerical=from_half_width(float(estimate.uncertainty[index])),

@@ -48,7 +48,7 @@ DRAWS: Final = 39
 
 
 @dataclass(frozen=True)
-class Requirement:
+class EccentricRequirement:
     """What is asked of the balancer and what it comes to; intervals are 95 %, from stated uncertainties."""
 
     quantity: str
@@ -113,7 +113,7 @@ class _EccentricStudy:
     """With the masses clamped where they start: the same rotor without balancing."""
     tuning: EccentricTuning
     """The loops alone, without runs."""
-    requirements: tuple[Requirement, ...]
+    requirements: tuple[EccentricRequirement, ...]
 
     def document(self) -> dict[str, Any]:
         """Plain numbers in SI: both runs as `simulate --json` gives them, the loops as `tune --json` does."""
@@ -141,7 +141,7 @@ def eccentric_study(scene: EccentricScene) -> _EccentricStudy:
     return _EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
 
 
-def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
+def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[EccentricRequirement]:
     plant = PlantParameters.of(scene)
     gap = scene.masses.arc_length / scene.masses.guide_radius
     # Of an imbalance beyond all reach, what the masses side by side leave is what they lack.
@@ -152,15 +152,15 @@ def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
     limit, gate = scene.supervisor.limit, scene.imbalance_filter.gate
     until, why = _deadline(scene)
     return [
-        Requirement(
+        EccentricRequirement(
             "balancing moment", "kg m", _AT_LEAST, plant.unbalance, "the imbalance to cancel", capacity
         ),
-        Requirement("amplitude at the end", "m", _AT_MOST, limit, _LIMIT, run.final_amplitude),
-        Requirement(
+        EccentricRequirement("amplitude at the end", "m", _AT_MOST, limit, _LIMIT, run.final_amplitude),
+        EccentricRequirement(
             "largest amplitude after balancing", "m", _AT_MOST, limit, _LIMIT, _largest_balanced(run)
         ),
-        Requirement("settling time", "s", _AT_MOST, until, why, run.settling_time),
-        Requirement(
+        EccentricRequirement("settling time", "s", _AT_MOST, until, why, run.settling_time),
+        EccentricRequirement(
             "standard deviation of the imbalance, from noise",
             "kg m",
             _AT_MOST,
@@ -179,10 +179,12 @@ def _deadline(scene: EccentricScene) -> tuple[float, str]:
     return scene.run.time_limit, "run.time_limit, the end of the run"
 
 
-def _of_loops(gains: RecommendedGains) -> Sequence[Requirement]:
+def _of_loops(gains: RecommendedGains) -> Sequence[EccentricRequirement]:
     why = "half the gain at which the loop is unstable"
     return [
-        Requirement(f"gain margin of the {loop.name}", "", _AT_LEAST, GAIN_MARGIN, why, loop.gain_margin)
+        EccentricRequirement(
+            f"gain margin of the {loop.name}", "", _AT_LEAST, GAIN_MARGIN, why, loop.gain_margin
+        )
         for loop in gains.loops
     ]
 
@@ -201,8 +203,8 @@ def _judged(scene: EccentricScene, run: EccentricRun) -> Judged:
 
 
 def _with_intervals(
-    row: Requirement, moved: Mapping[str, list[Judged]], drawn: Sequence[Judged]
-) -> Requirement:
+    row: EccentricRequirement, moved: Mapping[str, list[Judged]], drawn: Sequence[Judged]
+) -> EccentricRequirement:
     if not drawn or row.achieved is None:
         return row
     excess = [run[f"{row.quantity}.excess"] for run in drawn]

@@ -192,7 +192,8 @@ _LIQUID_RING = {
     "sensor": Table.of(loop_models.Sensor, "the vibration sensor; exact when left out"),
     "controller": Table.of(loop_models.ControllerSettings, "the control algorithm"),
     "requirement": Table.of(
-        loop_models.Requirement, "what is required of the balancer; reports compare it with what is reached"
+        loop_models.RequirementSettings,
+        "what is required of the balancer; reports compare it with what is reached",
     ),
 }
 LIQUID_RING = Schema.of(

@@ -17,7 +17,7 @@ from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import MAX_SAMPLES, simulate
-from ringbalance.controller.simulation import Outcome, Simulation, Verdict
+from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError
@@ -272,7 +272,7 @@ def test_dipping_below_the_limit_at_the_end_is_not_settling(scene: Scene, model:
     cut = simulate(replace(with_noise(scene), run=replace(scene.run, time_limit=end)), model)
     assert cut.amplitude[-1] <= cut.limit
     assert cut.outcome is Outcome.HOLD_INCOMPLETE
-    assert cut.verdict is Verdict.NOT_SETTLED
+    assert cut.verdict is RunVerdict.NOT_SETTLED
     assert "raise run.time_limit" in cut.status
     assert not cut.settled
 

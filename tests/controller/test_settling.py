@@ -16,7 +16,7 @@ from ringbalance.controller.ensemble.monte_carlo import simulate_members
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import disc_unbalance
-from ringbalance.controller.simulation import Outcome, Simulation, Verdict
+from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
 from ringbalance.controller.tuning.loop_factor import (
     LoopFactor,
     _largest_staying,
@@ -155,14 +155,14 @@ def test_the_verdict_follows_the_loop_factor(scene: Scene, model: BalancerModel)
         run = simulate(noisy(scene, noise=1.2e-8, proportional=h / rate), model)
         verdicts[h] = run.verdict
         assert run.status.startswith(run.verdict.value)
-        assert run.settled == (run.verdict is Verdict.SETTLED) == (run.settling_time is not None)
-    assert verdicts == {0.6: Verdict.SETTLED, 1.7: Verdict.HOVERING, 2.6: Verdict.UNSTABLE}
+        assert run.settled == (run.verdict is RunVerdict.SETTLED) == (run.settling_time is not None)
+    assert verdicts == {0.6: RunVerdict.SETTLED, 1.7: RunVerdict.HOVERING, 2.6: RunVerdict.UNSTABLE}
 
 
 def test_a_gain_that_is_too_high_is_answered_with_a_number(scene: Scene, calibrated: BalancerModel) -> None:
     # The paper's gain on a bore that was chosen for k = 50: the calibrated law is three times as fast.
     run = simulate(noisy(scene, time_limit=20.0), calibrated)
-    assert run.verdict is Verdict.HOVERING
+    assert run.verdict is RunVerdict.HOVERING
     gain = recommended_gain(scene, calibrated, loop=run.loop)
     assert f"to {gain * 1e-6:.3g} s/um" in run.status
     again = simulate(noisy(scene, time_limit=20.0, proportional=gain), calibrated)
@@ -251,4 +251,4 @@ def test_a_run_that_comes_to_rest_needs_no_hold(scene: Scene, model: BalancerMod
     run = simulate(noisy(scene, noise=0.0, hold_time=50.0), model)
     exact = replace(scene, controller=replace(scene.controller, hold_time=1e3))
     assert simulate(exact, model).outcome is Outcome.SETTLED
-    assert run.verdict in {Verdict.SETTLED, Verdict.HOVERING}
+    assert run.verdict in {RunVerdict.SETTLED, RunVerdict.HOVERING}

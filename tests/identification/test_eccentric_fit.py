@@ -23,7 +23,7 @@ from ringbalance.controller.eccentric_mass.scene_records import (
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.next_measurement import _offered_rows, _words_of, next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.predict.kinds import PREDICTED
@@ -84,7 +84,7 @@ def test_a_run_up_gives_back_bearing_and_imbalance(scene: EccentricScene) -> Non
     for each in result.parameters:
         low, high = each.interval
         assert low < truth[each.name] < high
-        assert each.verdict is Verdict.IDENTIFIED
+        assert each.verdict is Identified.IDENTIFIED
         assert each.path == each.name
     assert Review.of(result).criticism.describes
 
@@ -92,7 +92,7 @@ def test_a_run_up_gives_back_bearing_and_imbalance(scene: EccentricScene) -> Non
 def test_only_the_product_of_mass_and_radius_is_identified(scene: EccentricScene) -> None:
     """U = m_im r_im is all that the rotor feels of its imbalance."""
     result = fit(scene, data=[run_up(scene, 2)], parameters=["imbalance.mass", "imbalance.radius"])
-    assert {each.verdict for each in result.parameters} == {Verdict.STRUCTURALLY}
+    assert {each.verdict for each in result.parameters} == {Identified.STRUCTURALLY}
     (found,) = result.combinations
     assert found.exponents == (1.0, 1.0)
     moment = scene.imbalance.mass * scene.imbalance.radius
@@ -130,8 +130,8 @@ def test_the_second_mass_moves_as_the_first_one_would_in_its_place(scene: Eccent
     for each, name in ((data, "masses.friction_arm[0]"), (second, "masses.friction_arm[1]")):
         assert arms & set(PREDICTED["positioning"].informs(each)) == {name}
     found = fit(scene, data=[second], parameters=["masses.friction_arm[1]", "masses.friction_arm[0]"])
-    assert found.parameters[0].verdict is Verdict.IDENTIFIED
-    assert found.parameters[1].verdict is Verdict.STRUCTURALLY
+    assert found.parameters[0].verdict is Identified.IDENTIFIED
+    assert found.parameters[1].verdict is Identified.STRUCTURALLY
 
 
 def test_the_next_speed_narrows_as_expected(scene: EccentricScene) -> None:

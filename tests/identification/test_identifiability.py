@@ -12,7 +12,7 @@ from synthetic_rigs import READINGS, observations
 
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.identifiability import DEPENDENT, Verdict, _power_text
+from ringbalance.identification.identifiability import DEPENDENT, Identified, _power_text
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
@@ -63,7 +63,7 @@ def rank(slopes: FloatArray) -> int:
     return int(np.linalg.matrix_rank(slopes[:, norms > 0] / norms[norms > 0], tol=DEPENDENT))
 
 
-def verdicts(result: FitResult) -> dict[str, Verdict]:
+def verdicts(result: FitResult) -> dict[str, Identified]:
     return {p.name: p.verdict for p in result.parameters}
 
 
@@ -72,7 +72,7 @@ def test_density_and_speed_from_pressures(scene: Scene) -> None:
     exact = np.outer(RADII**2 - SURFACE**2, [1.0, 2.0])
     found = fit(scene, data=[pressures(scene)], parameters=["density", "speed"])
     assert rank(exact) == rank(found.optimum.slopes) == 1
-    assert set(verdicts(found).values()) == {Verdict.STRUCTURALLY}
+    assert set(verdicts(found).values()) == {Identified.STRUCTURALLY}
     assert [c.text for c in found.combinations] == ["density speed^2"]
     product = scene.liquid.density * scene.rotor.speed**2
     seen = found.combinations[0]
@@ -85,7 +85,7 @@ def test_the_surface_tells_nothing_apart_from_density(scene: Scene) -> None:
     data = pressures(scene, speeds=scene.rotor.speed * np.array([0.8, 0.9, 1.0, 1.1]))
     found = fit(scene, data=[data], parameters=["density", "speed"])
     assert rank(exact) == rank(found.optimum.slopes) == 1
-    assert verdicts(found) == {"density": Verdict.IDENTIFIED, "speed": Verdict.STRUCTURALLY}
+    assert verdicts(found) == {"density": Identified.IDENTIFIED, "speed": Identified.STRUCTURALLY}
     assert found.combinations == ()
 
 
@@ -94,9 +94,9 @@ def test_trial_weights_say_nothing_of_the_tube(scene: Scene) -> None:
     found = fit(scene, data=[weights(scene)], parameters=names)
     assert rank(found.optimum.slopes) == 2
     assert verdicts(found) == {
-        "influence_coefficient": Verdict.IDENTIFIED,
-        "lag_angle": Verdict.IDENTIFIED,
-        "bore": Verdict.STRUCTURALLY,
+        "influence_coefficient": Identified.IDENTIFIED,
+        "lag_angle": Identified.IDENTIFIED,
+        "bore": Identified.STRUCTURALLY,
     }
 
 
@@ -131,7 +131,7 @@ def test_injections_alone_see_kappa_lambda(scene: Scene) -> None:
     data = injections(scene, np.linspace(0.1, 0.4, 8), noise=1e-8, seed=1)
     found = fit(scene, data=[data], parameters=["influence_coefficient", "lambda_factor", "lag_angle"])
     assert rank(found.optimum.slopes) == 2
-    assert verdicts(found)["lag_angle"] is Verdict.IDENTIFIED
+    assert verdicts(found)["lag_angle"] is Identified.IDENTIFIED
     assert [c.text for c in found.combinations] == ["kappa lambda"]
 
 
@@ -179,10 +179,12 @@ def check_end_rates(scene: Scene, loss: str, seed: int, same: bool) -> None:
     assert [c.text for c in found.combinations] == ["lambda^2/(k + 1)"]
     if same:
         assert rank(found.optimum.slopes) == 1
-        assert set(verdicts(found).values()) == {Verdict.STRUCTURALLY}
+        assert set(verdicts(found).values()) == {Identified.STRUCTURALLY}
     else:
-        assert Verdict.STRUCTURALLY not in verdicts(found).values()
-    assert all("lambda^2/(k + 1)" in p.text for p in found.parameters if p.verdict is not Verdict.IDENTIFIED)
+        assert Identified.STRUCTURALLY not in verdicts(found).values()
+    assert all(
+        "lambda^2/(k + 1)" in p.text for p in found.parameters if p.verdict is not Identified.IDENTIFIED
+    )
     if loss == "drag_coefficient":
         true = truth.disc.moment_factor**2 / ((truth.tube.drag_coefficient or 0.0) + 1)
         product = found.combinations[0]
@@ -204,7 +206,7 @@ def test_end_rates_at_various_pressures_see_no_more(scene: Scene, loss: str) -> 
         pressures=0.8e6 * random.uniform(1.0, 1.33, 24),
     )
     found = fit(bare, data=[data], parameters=["lambda_factor", loss])
-    assert set(verdicts(found).values()) == {Verdict.PRACTICALLY}
+    assert set(verdicts(found).values()) == {Identified.PRACTICALLY}
     assert [c.text for c in found.combinations] == ["lambda^2/(k + 1)"]
 
 
@@ -219,7 +221,7 @@ def test_an_amount_and_a_time_tell_both_apart(scene: Scene) -> None:
     }
     names = ["lambda_factor", "drag_coefficient"]
     found = fit(scene, data=[data, noisy("transfer", scene, columns)], parameters=names)
-    assert set(verdicts(found).values()) == {Verdict.IDENTIFIED}
+    assert set(verdicts(found).values()) == {Identified.IDENTIFIED}
     assert found.combinations == ()
 
 
@@ -233,8 +235,8 @@ def test_a_prior_that_says_more_than_the_data(scene: Scene) -> None:
     }
     data = noisy("transfer", scene, columns)
     known = replace(scene, uncertainty=(replace_bore(scene, 1e-4),))
-    assert verdicts(fit(known, data=[data], parameters=["bore"]))["bore"] is Verdict.PRACTICALLY
-    assert verdicts(fit(scene, data=[data], parameters=["bore"]))["bore"] is Verdict.IDENTIFIED
+    assert verdicts(fit(known, data=[data], parameters=["bore"]))["bore"] is Identified.PRACTICALLY
+    assert verdicts(fit(scene, data=[data], parameters=["bore"]))["bore"] is Identified.IDENTIFIED
 
 
 def replace_bore(scene: Scene, relative: float) -> InputUncertainty:

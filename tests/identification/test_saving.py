@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
-from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import Profile
 from ringbalance.identification.result import FittedParameter
 from ringbalance.identification.saving import _fitted_scene, _found_from, _save_fitted
@@ -35,7 +35,7 @@ def fitted(path: str, value: float, width: float, **more: Any) -> FittedParamete
         "value": value,
         "interval": (value - width, value + width),
         "at_bound": (False, False),
-        "verdict": Verdict.IDENTIFIED,
+        "verdict": Identified.IDENTIFIED,
         "text": "",
         "profile": PROFILE,
     }
@@ -53,7 +53,7 @@ FACTOR = fitted("disc.lambda_factor", 0.97, 0.01, before=1.0, before_interval=No
 def test_values_uncertainties_and_origins(tmp_path: Path) -> None:
     target = tmp_path / "fitted.toml"
     lag = fitted("rotor.lag_angle", -0.01, 0.05)
-    loss = fitted("tube.extra_loss", 2.0, 0.5, verdict=Verdict.PRACTICALLY)
+    loss = fitted("tube.extra_loss", 2.0, 0.5, verdict=Identified.PRACTICALLY)
     _save_fitted(
         target, text=text_of("liquid_ring_paper"), fitted=[BORE, FACTOR, lag, loss], files=[FILE],
         findings=[MeasuredFinding(about="combination", text="lambda^2/(k + 1)")],

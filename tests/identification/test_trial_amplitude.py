@@ -14,7 +14,7 @@ import numpy as np
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
@@ -78,7 +78,7 @@ def test_phase_and_lag_are_not_identified_by_themselves(paper_scene: Scene) -> N
     exact = PREDICTED["trial_amplitude"].predict(scene, observed(unbalance, angle, unbalance, None), None)
     data = observed(unbalance, angle, exact, np.full(5, 0.1e-6))
     result = fit(scene, data=[data], parameters=["lag_angle", "initial_phase"])
-    assert {each.verdict for each in result.parameters} == {Verdict.STRUCTURALLY}
+    assert {each.verdict for each in result.parameters} == {Identified.STRUCTURALLY}
 
 
 def washers() -> Observations:
@@ -117,7 +117,7 @@ def test_the_rotor_of_rodrigues_has_one_coefficient(paper_scene: Scene) -> None:
         half = (found.interval[1] - found.interval[0]) / 2
         assert abs(found.value / PER_G_MM - 1.02) < np.hypot(half / PER_G_MM, 0.05)
         assert half / PER_G_MM < 0.12
-        assert found.verdict is Verdict.IDENTIFIED
+        assert found.verdict is Identified.IDENTIFIED
 
 
 def test_the_page_has_what_the_fits_find(paper_scene: Scene) -> None:

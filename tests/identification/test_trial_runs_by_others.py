@@ -18,7 +18,7 @@ from synthetic_rigs import observations
 
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.identifiability import Verdict
+from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -73,7 +73,7 @@ def test_two_planes_are_balanced_by_what_the_fits_find(paper_scene: Scene) -> No
             data = trial_runs(np.array([0.0, MASS]), readings, angle=np.zeros(2))
             width = {"amplitude": np.full(2, 1e-6)}
             result = fit(bare(paper_scene, 50e-6), data=[replace(data, uncertainty=width)])
-            assert {p.verdict for p in result.parameters} == {Verdict.IDENTIFIED}
+            assert {p.verdict for p in result.parameters} == {Identified.IDENTIFIED}
             found[sensor, plane] = coefficient(result)
     own = np.array([cmath.rect(size, math.radians(phase)) for size, phase in INITIAL])
     masses = np.linalg.solve(found, -own)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.physics.convergence import Verdict, gci
+from ringbalance.physics.convergence import GridVerdict, gci
 
 
 @dataclass(frozen=True)
@@ -48,12 +48,12 @@ def test_celik_2008_table_1(column: Column) -> None:
     assert 100 * found.approximate_error == pytest.approx(column.approximate_pct, abs=0.1)
     assert 100 * found.extrapolated_error == pytest.approx(column.extrapolated_pct, abs=0.1)
     assert 100 * found.index == pytest.approx(column.gci_pct, abs=0.1)
-    assert (found.verdict is Verdict.OSCILLATORY) == column.oscillates
+    assert (found.verdict is GridVerdict.OSCILLATORY) == column.oscillates
 
 
 def test_celik_2008_slow_column_is_not_called_asymptotic() -> None:
     sizes = (1.0, SLOW.r21, SLOW.r21 * SLOW.r32)
-    assert gci(values=SLOW.phi, sizes=sizes, formal_order=2.0).verdict is Verdict.NOT_ASYMPTOTIC
+    assert gci(values=SLOW.phi, sizes=sizes, formal_order=2.0).verdict is GridVerdict.NOT_ASYMPTOTIC
 
 
 def sequence(order: float, sizes: tuple[float, ...], scale: float = 0.1) -> list[float]:
@@ -66,7 +66,7 @@ def test_a_pure_power_gives_its_order_and_limit(order: float, sizes: tuple[float
     found = gci(values=sequence(order, sizes), sizes=sizes, formal_order=order)
     assert found.observed_order == pytest.approx(order, rel=1e-8)
     assert found.extrapolated == pytest.approx(1.0, abs=1e-12)
-    assert found.verdict is Verdict.MONOTONE
+    assert found.verdict is GridVerdict.MONOTONE
     assert found.uncertainty == pytest.approx(1.25 * 0.1 * sizes[0] ** order, rel=1e-8)
 
 
@@ -96,7 +96,7 @@ def test_a_crossing_of_two_error_terms_stays_covered(ratio: float) -> None:
 
 def test_round_off_is_said_and_gets_no_index() -> None:
     found = gci(values=(1.0, 1.0 + 1e-13, 1.0 + 1e-12), sizes=(1, 2, 4), formal_order=2.0, round_off=1e-12)
-    assert found.verdict is Verdict.ROUND_OFF
+    assert found.verdict is GridVerdict.ROUND_OFF
     assert found.index == 0.0
     assert found.uncertainty >= 1e-12
     assert "round-off" in found.text
@@ -105,13 +105,13 @@ def test_round_off_is_said_and_gets_no_index() -> None:
 def test_equal_values_are_round_off_and_not_an_error() -> None:
     for value in (0.0, 3.7):
         found = gci(values=(value,) * 3, sizes=(1, 2, 4), formal_order=2.0)
-        assert found.verdict is Verdict.ROUND_OFF
+        assert found.verdict is GridVerdict.ROUND_OFF
         assert found.uncertainty >= 0
 
 
 def test_oscillation_is_said_and_covers_half_the_range() -> None:
     found = gci(values=(1.0, 1.1, 0.7), sizes=(1, 2, 4), formal_order=2.0)
-    assert found.verdict is Verdict.OSCILLATORY
+    assert found.verdict is GridVerdict.OSCILLATORY
     assert found.uncertainty >= 0.2
     assert "oscillates" in found.text
 
@@ -119,7 +119,7 @@ def test_oscillation_is_said_and_covers_half_the_range() -> None:
 @pytest.mark.parametrize("values", [(1.0, 1.2, 1.3), (1.0, 0.9, 0.95), (1.0, 1.1, 1.1)])
 def test_growing_changes_are_called_diverging(values: tuple[float, ...]) -> None:
     found = gci(values=values, sizes=(1, 2, 4), formal_order=2.0)
-    assert found.verdict is Verdict.DIVERGING
+    assert found.verdict is GridVerdict.DIVERGING
     assert found.uncertainty >= 3 * abs(values[1] - values[0])
     assert found.observed_order <= 0
 
@@ -163,7 +163,7 @@ def test_least_squares_beyond_the_formal_order_falls_back_and_covers() -> None:
     found = gci(values=sequence(5.0, sizes, 1e-3), sizes=sizes, formal_order=2.0)
     assert found.order <= 2.0
     assert found.uncertainty >= 1e-3
-    assert found.verdict is Verdict.NOT_ASYMPTOTIC
+    assert found.verdict is GridVerdict.NOT_ASYMPTOTIC
 
 
 def test_least_squares_calls_growing_changes_diverging() -> None:
@@ -173,12 +173,12 @@ def test_least_squares_calls_growing_changes_diverging() -> None:
         sizes=(1, 2, 4, 5),
         formal_order=2.0,
     )
-    assert found.verdict is Verdict.DIVERGING
+    assert found.verdict is GridVerdict.DIVERGING
 
 
 def test_least_squares_says_oscillation() -> None:
     found = gci(values=(1.0, 1.2, 0.9, 1.3, 0.8), sizes=(1, 2, 3, 4, 5), formal_order=2.0)
-    assert found.verdict is Verdict.OSCILLATORY
+    assert found.verdict is GridVerdict.OSCILLATORY
     assert found.uncertainty >= 0.2
 
 

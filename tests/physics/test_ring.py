@@ -14,7 +14,7 @@ from scipy.integrate import quad
 
 from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
-from ringbalance.physics.convergence import Verdict
+from ringbalance.physics.convergence import GridVerdict
 from ringbalance.physics.pressure import elements
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.pressure.ring_samples import QUANTITIES, liquid_integrals
@@ -110,7 +110,7 @@ def test_order_is_the_formal_one(paper_ring: RingQuantities) -> None:
     for name in QUANTITIES:
         records = paper_ring.convergence[name][1:]
         assert all(abs(record.observed_order - 4.0) < 0.3 for record in records), name
-        assert all(record.verdict is Verdict.MONOTONE for record in records)
+        assert all(record.verdict is GridVerdict.MONOTONE for record in records)
         assert paper_ring.mesh_values[name].shape == (3, FILLS.size)
         np.testing.assert_array_equal(paper_ring.mesh_values[name][0], getattr(paper_ring, name).value)
 

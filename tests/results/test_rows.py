@@ -1,4 +1,4 @@
-"""A quantity says its interval in every output; a requirement is judged by it."""
+"""A quantity says its interval in every output."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import plain
 from ringbalance.results.render import csv_text, html_table
 from ringbalance.results.result import Result, Rows
-from ringbalance.results.rows import Parts, Quantity, Verdict, around, judged
+from ringbalance.results.rows import Parts, Quantity, around
 from ringbalance.results.table import Table
 
 STALL = Quantity(
@@ -110,28 +110,3 @@ def test_parts_add_as_squares() -> None:
     assert total == 3.0
     assert around(5.0, total) == (2.0, 8.0)
     assert around(5.0, 0.0) == (None, None)
-
-
-@pytest.mark.parametrize(
-    ("interval", "at_least", "verdict"),
-    [
-        ((1.0, 3.0), True, Verdict.MET),
-        ((0.5, 3.0), True, Verdict.UNDECIDED),
-        ((0.5, 0.9), True, Verdict.NOT_MET),
-        ((None, 3.0), True, Verdict.UNDECIDED),
-        ((0.2, 1.0), False, Verdict.MET),
-        ((0.2, 1.1), False, Verdict.UNDECIDED),
-        ((1.1, 1.2), False, Verdict.NOT_MET),
-        ((1.1, None), False, Verdict.NOT_MET),
-    ],
-)
-def test_an_interval_across_what_is_required_is_undecided(
-    interval: tuple[float | None, float | None], at_least: bool, verdict: Verdict
-) -> None:
-    reached = Quantity(key="x", name="x", value=0.8, lower=interval[0], upper=interval[1])
-    assert judged(reached=reached, required=1.0, at_least=at_least) is verdict
-
-
-def test_what_is_not_reached_is_not_met() -> None:
-    assert judged(reached=Quantity(key="x", name="x", value=None), required=1.0, at_least=False) == "not met"
-    assert judged(reached=Quantity(key="x", name="x", value=2.0), required=1.0, at_least=True) == "met"

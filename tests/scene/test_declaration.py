@@ -24,7 +24,7 @@ from ringbalance.scene.keys.declaration import (
 from ringbalance.scene.keys.fields import Length, PositiveLength
 from ringbalance.scene.keys.reading import Reading, read_document
 from ringbalance.scene.keys.schema import LIQUID_RING, Schema, Table
-from ringbalance.scene.loop_models import Requirement
+from ringbalance.scene.loop_models import RequirementSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,6 +132,6 @@ def test_every_description_of_a_scene_reaches_its_table() -> None:
     described = {row.quantity for row in scene_table(trial)}
     optional = {"critical pressure ratio b", "dead volume", "valve lag", "gas inlet radius", "mass"}
     optional |= {"measured factor on lambda", "geometry of a chamber"}
-    optional |= {entry.name for entry in descriptions_of(Requirement).values()}
+    optional |= {entry.name for entry in descriptions_of(RequirementSettings).values()}
     assert names - described <= optional
     assert described - names == {"tolerance"}

@@ -70,7 +70,7 @@ def test_example_in_the_document_loads(load: Callable[[Mapping[str, Any]], Scene
         ("rotor", loop_models.Rotor, {"initial_vibration", "initial_amplitude", "initial_phase"}),
         ("sensor", loop_models.Sensor, set()),
         ("controller", loop_models.ControllerSettings, set()),
-        ("requirement", loop_models.Requirement, set()),
+        ("requirement", loop_models.RequirementSettings, set()),
         ("run", loop_models.RunSettings, set()),
         ("measured", Measured, set()),
     ],

@@ -13,7 +13,7 @@ from ringbalance.controller.eccentric_mass import study as study_module
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.controller.eccentric_mass.study import (
     DRAWS,
-    Requirement,
+    EccentricRequirement,
     _EccentricStudy,
     eccentric_study,
     interval,
@@ -78,7 +78,7 @@ def uncertain(
     )
 
 
-def rows_of(scene: EccentricScene, *, draws: int = DRAWS) -> dict[str, Requirement]:
+def rows_of(scene: EccentricScene, *, draws: int = DRAWS) -> dict[str, EccentricRequirement]:
     """Requirements by quantity; few drawn runs do where the runs with one input moved are looked at."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "DRAWS", draws)

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.physics.convergence import GridConvergence, Verdict, gci
+from ringbalance.physics.convergence import GridConvergence, GridVerdict, gci
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found
@@ -24,7 +24,7 @@ class _Sequence:
 
     name: str
     values: FloatArray
-    expected: tuple[Verdict, ...]
+    expected: tuple[GridVerdict, ...]
     formal_order: float = _FORMAL
     converges: bool = True
 
@@ -36,33 +36,35 @@ def _h(levels: int = 3) -> FloatArray:
 def _sequences() -> tuple[_Sequence, ...]:
     h = _h()
     noise = np.array([0.0, 1e-9, -1e-9, 1e-9, 0.0])
-    astray = (Verdict.NOT_ASYMPTOTIC, Verdict.DIVERGING)
+    astray = (GridVerdict.NOT_ASYMPTOTIC, GridVerdict.DIVERGING)
     return (
-        _Sequence(name="second order", values=_LIMIT + 1e-3 * h**2, expected=(Verdict.MONOTONE,)),
+        _Sequence(name="second order", values=_LIMIT + 1e-3 * h**2, expected=(GridVerdict.MONOTONE,)),
         _Sequence(
             name="with a fourth-order part",
             values=_LIMIT + 1e-3 * h**2 + 1e-5 * h**4,
-            expected=(Verdict.MONOTONE,),
+            expected=(GridVerdict.MONOTONE,),
         ),
-        _Sequence(name="faster than formal", values=_LIMIT + 1e-4 * h**4, expected=(Verdict.NOT_ASYMPTOTIC,)),
+        _Sequence(
+            name="faster than formal", values=_LIMIT + 1e-4 * h**4, expected=(GridVerdict.NOT_ASYMPTOTIC,)
+        ),
         _Sequence(
             name="oscillatory",
             values=_LIMIT + 1e-3 * h**2 * np.array([1.0, -1.0, 1.0]),
-            expected=(Verdict.OSCILLATORY,),
+            expected=(GridVerdict.OSCILLATORY,),
         ),
         _Sequence(name="slow", values=_LIMIT + 1e-3 * h**0.6, expected=astray),
         _Sequence(
-            name="growing", values=_LIMIT + 1e-3 * h**-1.0, expected=(Verdict.DIVERGING,), converges=False
+            name="growing", values=_LIMIT + 1e-3 * h**-1.0, expected=(GridVerdict.DIVERGING,), converges=False
         ),
         _Sequence(
             name="round-off",
             values=_LIMIT + np.array([0.0, 4e-16, -4e-16]),
-            expected=(Verdict.ROUND_OFF,),
+            expected=(GridVerdict.ROUND_OFF,),
         ),
         _Sequence(
             name="five levels, third order, noise",
             values=_LIMIT + 1e-4 * _h(5) ** _FITTED + noise,
-            expected=(Verdict.MONOTONE,),
+            expected=(GridVerdict.MONOTONE,),
             formal_order=_FITTED,
         ),
     )

@@ -9,14 +9,14 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Final
 
-from ringbalance.physics.convergence import GridConvergence, Verdict, gci
+from ringbalance.physics.convergence import GridConvergence, GridVerdict, gci
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Table, as_found
 
 _FORMAL_ORDER: Final = 2.0
 _LAST_DIGIT: Final = {"order": 0.01, "limit": 0.0001, "error": 0.1, "index": 0.1}
 _CELLS_OF_FIRST: Final = (18000, 8000, 4500)
-_EXPECTED: Final = (Verdict.MONOTONE, Verdict.NOT_ASYMPTOTIC, Verdict.OSCILLATORY)
+_EXPECTED: Final = (GridVerdict.MONOTONE, GridVerdict.NOT_ASYMPTOTIC, GridVerdict.OSCILLATORY)
 
 
 @dataclass(frozen=True, kw_only=True)

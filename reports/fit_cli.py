@@ -56,7 +56,7 @@ def fit(
     if plot is not None:
         # Loading what draws takes as long as a short fit.
         from ringbalance.reports.figures.fit import fit_figures  # noqa: PLC0415
-        from ringbalance.reports.figures.sheet import sheet  # noqa: PLC0415
+        from ringbalance.reports.figures.style import sheet  # noqa: PLC0415
 
         write_whole(plot, sheet(fit_figures(against_fit(result))))
     return code

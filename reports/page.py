@@ -22,7 +22,7 @@ from ringbalance.reports.figures.calibration import chamber_figures, tube_figure
 from ringbalance.reports.figures.loop import loop_figures
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.eccentric_scene import BALANCER
+from ringbalance.reports.pages.eccentric import BALANCER
 from ringbalance.reports.prose import named_with_origin, states_uncertainty
 from ringbalance.reports.section import Record
 from ringbalance.reports.sections import drawings_in, section_views, viewed

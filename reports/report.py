@@ -16,8 +16,8 @@ from typing import Any, Final
 from ringbalance.reports.eccentric_evidence import collect_eccentric
 from ringbalance.reports.evidence import Progress, collect_evidence
 from ringbalance.reports.page import DOCUMENTS, case_views, page_content
-from ringbalance.reports.pages.document import evidence_text
 from ringbalance.reports.pages.first_page import loop_sentences
+from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
 from ringbalance.reports.prose import untraced

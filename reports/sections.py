@@ -14,25 +14,21 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.pages import drag_coefficient as fifty
 from ringbalance.reports.pages import (
-    conditions,
-    credibility,
-    document,
-    eccentric_scene,
+    eccentric,
     extremes,
     first_page,
-    loop,
     measured,
     operation,
     sloshing,
     trade,
 )
-from ringbalance.reports.pages import consequences as consequence_view
-from ringbalance.reports.pages import drag_coefficient as fifty
-from ringbalance.reports.pages import eccentric_mass as driven
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside
+from ringbalance.reports.pages.loop import CONSEQUENCES, LOOP
+from ringbalance.reports.pages.standing import CONDITIONS, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Place, Record, Section, Work
 from ringbalance.scene import Scene
 from ringbalance.scene.platform.processes import Workers
@@ -41,13 +37,13 @@ from ringbalance.verification.loops import calibration_of
 
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
-    conditions.SECTION,
+    CONDITIONS,
     operation.SECTION,
-    loop.SECTION,
+    LOOP,
     Section(name="claims", title="Claims of the liquid-ring paper", place="report"),
-    credibility.SECTION,
+    CREDIBILITY,
     Section(name="parameters", title="Parameters and their origin", place="report"),
-    document.SECTION,
+    DOCUMENT,
     Section(name="disc", title="The disc and its liquid"),
     Section(name="pressure", title="Pressure of the liquid"),
     Section(name="moment", title="Balancing moment and λ"),
@@ -59,9 +55,9 @@ SECTIONS: Final[tuple[Section, ...]] = (
     fifty.SECTION,
     Section(name="injections", title="The closed loop, injection by injection"),
     paper_again.SECTION,
-    consequence_view.SECTION,
+    CONSEQUENCES,
     Section(name="cases", title="Claims: evidence and doubts"),
-    driven.SECTION,
+    eccentric.SECOND_BALANCER,
     Section(name="numerics", title="Numerical verification"),
     extremes.SECTION,
     trade.SECTION,
@@ -105,7 +101,7 @@ def completed(found: Record, apart: Begun, work: Work, pool: Workers | None) -> 
 
 def sections_of(evidence: Record) -> tuple[Section, ...]:
     """The sections of a report on the evidence's kind of balancer."""
-    return eccentric_scene.SECTIONS if evidence.get("balancer") == eccentric_scene.BALANCER else SECTIONS
+    return eccentric.SECTIONS if evidence.get("balancer") == eccentric.BALANCER else SECTIONS
 
 
 def section_view(name: str, text: str) -> Record | None:

@@ -95,7 +95,7 @@ def _with_seed(scene: AnyScene, seed: int | None) -> AnyScene:
 def _sheet(scene: AnyScene, run: Run) -> str:
     # Loading what draws takes as long as a short run.
     from ringbalance.reports.figures.runs import figures_of  # noqa: PLC0415
-    from ringbalance.reports.figures.sheet import sheet  # noqa: PLC0415
+    from ringbalance.reports.figures.style import sheet  # noqa: PLC0415
 
     return sheet(figures_of(scene, run))
 

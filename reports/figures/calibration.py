@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.section import Record
-from ringbalance.results.numbers import given, measured, percent, short, shown
+from ringbalance.results.numbers import given
 from ringbalance.scene.arrays import FloatArray, stretches
 
 _VELOCITY_TICKS: Final = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]
@@ -61,16 +61,12 @@ def _pressure_profile(profile: Record) -> Drawing:
         axes.set_xlim(right=radius[-1])
         axes.set_ylim(bottom=0)
 
-    found, printed = shown(profile["pressure_Pa"][-1], "Pa"), shown(profile["paper_pressure_Pa"][-1], "Pa")
-    fill = short(profile["fill_ratio"])
     return draw(
         x="radius in mm",
         y="gauge pressure in MPa",
         name="pressure-profile",
         paint=paint,
-        alt=f"Pressure rises from the free surface to the outer wall: {found} found, {printed} by Eq. 12.",
-        caption=f"Liquid pressure along the middle of a chamber at a fill ratio of {fill}. At the wall: "
-        f"{found} by finite elements, {printed} by Eq. 12.",
+        alt="Pressure rises from the free surface to the outer wall, more than Eq. 12 has it.",
     )
 
 
@@ -87,14 +83,12 @@ def _moment(chamber: Record) -> Drawing:
         axes.plot(fill, paper, **style.AS_PAPER, label="Eq. 7, plates left out")
         axes.set_ylim(bottom=0)
 
-    most, printed = shown(chamber["moment_kg_m"][-1], "kg m"), shown(chamber["moment_paper_kg_m"][-1], "kg m")
     return draw(
         x="fill ratio",
         y="moment of one chamber in g mm",
         name="moment",
         paint=paint,
-        alt=f"The moment of a chamber grows with its fill to {most}; Eq. 7 gives {printed}.",
-        caption=f"Balancing moment of one chamber. At the largest fill: {most} found, {printed} by Eq. 7.",
+        alt="The moment of a chamber grows with its fill, less than by Eq. 7.",
     )
 
 
@@ -114,15 +108,12 @@ def _transfer_lambda(chamber: Record, summary: Record, paper: Record) -> Drawing
         style.band(axes, fill, found, half_width, style.FOUND)
         axes.plot(fill, found, color=style.FOUND, marker="o", markersize=3, label="finite elements")
 
-    centre = shown(summary["per_transferred_mass_m"], "m", total)
-    varies = percent(summary["variation_over_range"])
     return draw(
         x="fill ratio of the driven chamber",
         y="λ per transferred mass in mm",
         name="lambda",
         paint=paint,
-        alt=f"Lambda is {centre} at the centre and varies by {varies} over the fill range.",
-        caption=f"λ = {centre} at the centre; over the fill range it varies by {varies} of that.",
+        alt="Lambda at the centre and over the fill range, beside the paper’s number.",
     )
 
 
@@ -187,9 +178,6 @@ def _drag(tube: Record, point: Record, paper: Record) -> Drawing:
         axes.set_ylim(bottom, ceiling)
         _reynolds_axis(axes, tube["reynolds"][-1] / tube["velocity_m_s"][-1])
 
-    ends = [measured(tube["k"][i], tube["k_uncertainty"][i]) for i in (0, -1)]
-    speeds = [given(tube["velocity_m_s"][i], "m/s") for i in (0, -1)]
-    shaded = " Grey: transition." if "transitional" in tube["flow_state"] else ""
     return draw(
         columns=4,
         x="mean velocity in the tube in m/s",
@@ -198,10 +186,7 @@ def _drag(tube: Record, point: Record, paper: Record) -> Drawing:
         paint=paint,
         wide=True,
         height=3.9,
-        alt=f"The drag coefficient is {ends[0]} at {speeds[0]} and {ends[1]} at {speeds[1]}; the paper has "
-        f"{short(printed)} throughout.",
-        caption=f"Drag coefficient over velocity and Reynolds number: {ends[0]} at {speeds[0]}, {ends[1]} at "
-        f"{speeds[1]}. The paper has one number, {short(printed)}.{shaded}",
+        alt="The drag coefficient over velocity, with its band, beside the paper’s one number.",
     )
 
 
@@ -228,7 +213,6 @@ def _drag_terms(tube: Record) -> Drawing:
         name="drag-terms",
         paint=paint,
         alt=f"Contributions to the drag coefficient over velocity: {names}.",
-        caption=f"What k is made of: {names}.",
     )
 
 
@@ -259,5 +243,4 @@ def _flow_law(law: Record, row: int) -> Drawing:
         name=f"flow-law-{row}",
         paint=paint,
         alt=f"Velocity over fill ratio at {pressure}: calibrated ({names}), and by Eq. 19.",
-        caption=f"Flow law at {pressure} gas pressure, drawn as in Fig. 4 of the paper. Calibrated: {names}.",
     )

@@ -116,8 +116,6 @@ def _early_amplitude(runs: Record, limit: float) -> Drawing:
         paint=paint,
         columns=3,
         alt=f"Vibration amplitude in the first {shown(until, 's', digits=2)}, under both laws.",
-        caption=f"The first {shown(until, 's', digits=2)}, while liquid moves. A line that falls "
-        "and rises again within one operation has passed its target.",
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any, Final, cast
@@ -358,3 +358,21 @@ def legend_above(axes: Axes, *, columns: int) -> None:
     top = _TOP + _LEGEND_ROW * rows + (_TOP_AXIS if axes.child_axes else 0.0)
     box, height = axes.get_position(), figure.get_figheight()
     axes.set_position((box.x0, box.y0, box.width, 1 - (_BOTTOM + top) / height))
+
+
+_POINTS: Final = 72
+_MARGIN: Final = 18.0
+
+
+def sheet(drawings: Sequence[Drawing]) -> str:
+    """All drawings below each other, narrow ones in pairs, in the colours of a light page."""
+    placed, x, y, row, edge = [], _MARGIN, _MARGIN, 0.0, _MARGIN + _POINTS * WIDE
+    for drawing in drawings:
+        width = _POINTS * (WIDE if drawing.wide else NARROW)
+        if x > _MARGIN and x + width > edge:
+            x, y, row = _MARGIN, y + row + _MARGIN, 0.0
+        height = drawing.size[1]
+        place = f'<svg x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" overflow="visible" '
+        placed.append(drawing.svg.replace("<svg ", place, 1))
+        x, row = x + width + _MARGIN, max(row, height)
+    return as_file("\n".join(placed), edge + _MARGIN, y + row + _MARGIN)

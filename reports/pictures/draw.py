@@ -27,7 +27,6 @@ from PIL import Image
 from ringbalance.reports.pictures.disc_shapes import chamber_outline, ring, split_cells, web
 from ringbalance.reports.pictures.draw_tube import draw_tube
 from ringbalance.reports.pictures.style import PICTURE, THEMES, Bar, Label, Theme, label_at, letter, look
-from ringbalance.reports.pictures.tube_path import tube_path
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.processes import end_with
 
@@ -289,6 +288,43 @@ def _add_tube(plotter: Any, disc: Record, theme: Theme) -> list[tuple[FloatArray
         label_at(f"siphon crest at {hump:.4g} mm", top, shift=(-8, -88)),
         label_at("connecting tube", side, shift=(200, -80)),
     ]
+
+
+def tube_path(*, port: float, hump: float | None, height: float, bend: float) -> FloatArray:
+    """Schematic centre line from the first chamber's port over the crest to the opposite one's.
+
+    Out of the chamber, inward to the crest's radius, along that radius half-way round, outward and in again;
+    without a crest straight across.
+    Args: `port`: radius of both ports, mm. `hump`: smallest radius on the path, mm; None: a straight tube.
+    `bend`: radius of its corners, mm.
+    Returns: Points, mm, shape (n, 3).
+    """
+    low = -height
+    if hump is None:
+        return np.array(
+            [[port, 0, low], [port, 0, height], [-port, 0, height], [-port, 0, low]], dtype=np.float64
+        )
+    angle = np.linspace(0, np.pi, 121)
+    arc = np.c_[hump * np.cos(angle), hump * np.sin(angle), np.full(angle.size, height)]
+    return np.vstack(
+        [
+            [[port, 0, low]],
+            _corner(np.array([port, 0, low]), np.array([port, 0, height]), arc[0], bend),
+            _corner(np.array([port, 0, height]), arc[0], arc[5], bend),
+            arc[6:-6],
+            _corner(arc[-6], arc[-1], np.array([-port, 0, height]), bend),
+            _corner(arc[-1], np.array([-port, 0, height]), np.array([-port, 0, low]), bend),
+            [[-port, 0, low]],
+        ]
+    )
+
+
+def _corner(before: FloatArray, corner: FloatArray, after: FloatArray, bend: float) -> FloatArray:
+    """A corner rounded by a parabola, at most half-way into its legs."""
+    legs = [point - corner for point in (before, after)]
+    start, end = (corner + leg * min(bend / float(np.linalg.norm(leg)), 0.5) for leg in legs)
+    share = np.linspace(0, 1, 13)[:, None]
+    return np.asarray((1 - share) ** 2 * start + 2 * share * (1 - share) * corner + share**2 * end)
 
 
 if __name__ == "__main__":

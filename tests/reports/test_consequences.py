@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from ringbalance.reports import summary
-from ringbalance.reports.pages.consequences import SECTION
+from ringbalance.reports.pages.loop import CONSEQUENCES
 from ringbalance.reports.render import render
 
 Record = dict[str, Any]
@@ -93,7 +93,7 @@ def test_a_law_that_does_not_flow_leaves_its_tables_out(evidence: Record, said: 
     assert "Table A1. One run each" in text
     assert "Table A2" not in text
     assert "Figure" not in text
-    assert SECTION.view({}) is None
+    assert CONSEQUENCES.view({}) is None
 
 
 @pytest.mark.usefixtures("unwritten")

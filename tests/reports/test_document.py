@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reports.pages.document import evidence_text, symbols_and_sources
+from ringbalance.reports.pages.standing import evidence_text, symbols_and_sources
 from ringbalance.reports.provenance import provenance
 from ringbalance.reports.render import render
 from ringbalance.reports.tables import LONG, csv_tables, is_long, table_file

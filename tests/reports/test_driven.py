@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ringbalance.reports import summary
-from ringbalance.reports.pages import eccentric_mass as driven
+from ringbalance.reports.pages import eccentric as driven
 
 Record = dict[str, Any]
 
@@ -38,10 +38,10 @@ def test_each_paper_has_its_own_claims() -> None:
 
 
 def test_verdicts_are_counted() -> None:
-    view = driven.SECTION.view(evidence())
+    view = driven.SECOND_BALANCER.view(evidence())
     assert view is not None
     assert view["counts"] == ["1 is confirmed", "1 is refuted"]
 
 
 def test_no_claims_no_section() -> None:
-    assert driven.SECTION.view({"verification": []}) is None
+    assert driven.SECOND_BALANCER.view({"verification": []}) is None

@@ -16,7 +16,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, 
 from ringbalance.reports import eccentric_evidence
 from ringbalance.reports.eccentric_evidence import parameters
 from ringbalance.reports.figures.eccentric import sampled_poles
-from ringbalance.reports.pages.eccentric_scene import SECTIONS
+from ringbalance.reports.pages.eccentric import SECTIONS
 from ringbalance.reports.render import render
 from ringbalance.reports.report import write_report
 from ringbalance.scene import bundled_scene, load_scene

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ringbalance.reports.evidence import scene_record
-from ringbalance.reports.pages import eccentric_scene
+from ringbalance.reports.pages import eccentric
 from ringbalance.reports.pages.measured import SECTION
 from ringbalance.reports.render import render
 from ringbalance.scene.models import Scene
@@ -91,4 +91,4 @@ def test_the_evidence_has_what_the_scene_says(paper_scene: Scene) -> None:
 
 
 def test_both_balancers_show_it() -> None:
-    assert SECTION in eccentric_scene.SECTIONS
+    assert SECTION in eccentric.SECTIONS

@@ -19,7 +19,7 @@ from ringbalance.reports.figures.operation import (
     tornado,
 )
 from ringbalance.reports.figures.style import NARROW, Drawing
-from ringbalance.reports.pages.loop import SECTION as LOOP
+from ringbalance.reports.pages.loop import LOOP
 from ringbalance.reports.pages.operation import SECTION, _letter_radius, disc_section
 from ringbalance.reports.section import Work
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene

@@ -17,7 +17,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.pages import drag_coefficient as fifty
-from ringbalance.reports.pages import eccentric_scene
+from ringbalance.reports.pages import eccentric
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside
@@ -36,7 +36,7 @@ Record = dict[str, Any]
 def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
     folder = files("ringbalance.reports").joinpath("templates")
     present = {item.name for item in folder.iterdir() if item.name.endswith(".html")}
-    assert present == {section.file for section in (*SECTIONS, *eccentric_scene.SECTIONS)} | {
+    assert present == {section.file for section in (*SECTIONS, *eccentric.SECTIONS)} | {
         "report.html",
         "macros.html",
     }

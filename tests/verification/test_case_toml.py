@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import pytest
 
 from ringbalance.verification.case import CaseDefinition, CaseError
@@ -78,3 +80,8 @@ def test_the_program_s_cases_say_all_that_a_report_shows() -> None:
         assert case.explanation, case.id
         assert case.consequence, case.id
         assert case.kind == "claim" or (case.order is not None and case.about), case.id
+
+
+def test_a_case_goes_from_process_to_process() -> None:
+    for case in load_cases():
+        assert pickle.loads(pickle.dumps(case)) == case

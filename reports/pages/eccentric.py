@@ -1,14 +1,18 @@
-"""The report of a scene with two eccentric masses: what its templates need beside the evidence."""
+"""Two eccentric masses: the report of their scene, and their section in that of a liquid ring."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections import Counter
+from dataclasses import replace
+from pathlib import PurePath
 from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.compare import compare
 from ringbalance.controller.eccentric_mass.study import DRAWS
 from ringbalance.reports import summary
 from ringbalance.reports.figures.eccentric import (
@@ -21,12 +25,14 @@ from ringbalance.reports.figures.eccentric import (
     sampled_poles,
 )
 from ringbalance.reports.figures.operation import requirement_bars
-from ringbalance.reports.pages import credibility, document, measured
+from ringbalance.reports.pages import measured
+from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.pages.standing import CREDIBILITY, DOCUMENT
 from ringbalance.reports.prose import input_name
-from ringbalance.reports.section import Record, Section
+from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import OPEN
+from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
-BALANCER: Final = "eccentric_mass"
 _KEY: Final = re.compile(r"\b[a-z_]+\.[a-z_]+\b")
 """A key of the scene file, such as supervisor.limit."""
 _CAUSES: Final = 2
@@ -156,10 +162,50 @@ SECTIONS: Final = (
         show=_claims,
         template="masses_claims.html",
     ),
-    credibility.SECTION,
+    CREDIBILITY,
     Section(name="parameters", title="Parameters and their origin", place="report"),
-    document.SECTION,
+    DOCUMENT,
     Section(name="cases", title="Claims: evidence and doubts"),
     measured.SECTION,
     Section(name="scene", title="Scene file"),
+)
+
+
+BALANCER: Final = "eccentric_mass"
+RIVAL: Final = "driven_masses_small"
+"""Masses of a size for the liquid-ring paper's rotor."""
+_RUNS: Final = 3
+_SPAN: Final = 20.0
+"""s compared at most: either balances the rotor within a few seconds or not at all."""
+
+
+def _shortened(scene: AnyScene) -> AnyScene:
+    return replace(scene, run=replace(scene.run, time_limit=min(scene.run.time_limit, _SPAN)))
+
+
+def _compared(work: Work) -> Record | None:
+    """Both balancers on the scene's rotor, where all is asked for: no scene of a liquid ring requires it."""
+    if work.level == "light":
+        return None
+    rival = _shortened(load_scene(bundled_scene(RIVAL)))
+    try:
+        ring = balancer_of(_shortened(work.scene), flow_law=work.calibration.flow_law)
+        found = compare(ring, balancer_of(rival), runs=_RUNS)
+    except SceneError as error:
+        # Without folders: the evidence is the same wherever the files stand.
+        faults = (replace(fault, file=PurePath(fault.file).name) for fault in error.faults)
+        return {"compared": None, "text": "\n".join(map(str, faults))}
+    return {"compared": found.to_dict(), "text": ""}
+
+
+def _second(_own: Record, evidence: Record) -> Record | None:
+    cases = summary.claims(evidence, paper=BALANCER)
+    if not cases:
+        return None
+    views = [{**case_view(case), "elsewhere": False} for case in cases]
+    return {"claims": views, "counts": summary.counted(cases)}
+
+
+SECOND_BALANCER: Final = Section(
+    name="driven", title="The second balancer", collect=_compared, show=_second, always=True
 )

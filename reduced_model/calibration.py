@@ -11,16 +11,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.tube.loss import VELOCITIES, TubeLoss, tube_loss
-from ringbalance.reduced_model import deferred
 from ringbalance.reduced_model.budget import Budget, budgets
+from ringbalance.reduced_model.calibration_rows import calibration_rows
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
 from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
@@ -33,7 +34,7 @@ from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
 from ringbalance.reduced_model.terms import ModelUsed, models_used
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.results.findings import Finding
-from ringbalance.results.result import DeferredResult
+from ringbalance.results.result import Result, Rows
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
@@ -42,12 +43,8 @@ VELOCITY_POINTS: Final = 47
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Calibration(DeferredResult):
+class Calibration(Result):
     """Everything that `calibrate` finds out about a scene's balancer."""
-
-    _deferred: ClassVar[Any] = deferred
-    _document: ClassVar[str] = "calibration_document"
-    _rows: ClassVar[str] = "calibration_rows"
 
     scene: Scene
     chamber: ChamberCalibration
@@ -72,6 +69,12 @@ class Calibration(DeferredResult):
     """Every physical term, with its model and its estimated contribution."""
     statistics: Mapping[str, float]
     """Counted work and measured interpolation errors; no wall times, so they reproduce."""
+
+    def to_dict(self) -> dict[str, Any]:
+        return calibration_document(self)
+
+    def rows(self) -> Rows:
+        return calibration_rows(self)
 
     @cached_property
     def budgets(self) -> Mapping[str, Budget]:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from ringbalance.reduced_model.budget import Budget
-from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
 from ringbalance.reduced_model.documents import (
     PRESSURE_FACTORS,
@@ -25,6 +24,9 @@ from ringbalance.results.numbers import believed, given, rounded
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Parts, Quantity, around
 from ringbalance.results.table import Table, models_table
+
+if TYPE_CHECKING:
+    from ringbalance.reduced_model.calibration import Calibration
 
 _NAMES: Final = MappingProxyType(
     {

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from html import escape
 from itertools import islice
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from rich.console import Group, RenderableType
 from rich.text import Text
@@ -129,43 +129,16 @@ class PresentedResult(Result):
         return self.presentation.rows(self)
 
 
-class DeferredResult(Result):
-    """A result whose rows and document are made by functions of modules that import it."""
-
-    _deferred: ClassVar[Any]
-    """Module that loads the functions below when they are first used."""
-    _document: ClassVar[str]
-    """Name of the one that lays the result out as a document."""
-    _rows: ClassVar[str]
-    """Name of the one that makes its rows."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """The document that the command of the result prints with `--json`."""
-        document: dict[str, Any] = getattr(self._deferred, self._document)(self)
-        return document
-
-    def rows(self) -> Rows:
-        """Quantities, findings and tables."""
-        rows: Rows = getattr(self._deferred, self._rows)(self)
-        return rows
-
-
 class CommandResult:
     """Base of results that have no rows yet."""
 
-    _deferred: ClassVar[Any]
-    _document: ClassVar[str]
-    _summary: ClassVar[str]
-
+    @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """The document that the command of the result prints with `--json`."""
-        document: dict[str, Any] = getattr(self._deferred, self._document)(self)
-        return document
 
+    @abstractmethod
     def lines(self) -> Iterable[str]:
         """About five lines."""
-        lines: Iterable[str] = getattr(self._deferred, self._summary)(self)
-        return lines
 
     def __repr__(self) -> str:
         """The same as one text."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from ringbalance.reduced_model.budget import Budget
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
 from ringbalance.reduced_model.documents import (
     PRESSURE_FACTORS,
@@ -24,9 +25,6 @@ from ringbalance.results.numbers import believed, given, rounded
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Parts, Quantity, around
 from ringbalance.results.table import Table, models_table
-
-if TYPE_CHECKING:
-    from ringbalance.reduced_model.calibration import Calibration
 
 _NAMES: Final = MappingProxyType(
     {

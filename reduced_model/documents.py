@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.budget import Budget
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.calibration import Curve
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
 from ringbalance.reduced_model.chamber.gravity import closed_ring
@@ -24,9 +25,6 @@ from ringbalance.results.findings import Finding
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.rules.validity import LARGEST_COMPRESSION
-
-if TYPE_CHECKING:
-    from ringbalance.reduced_model.calibration import Calibration
 
 PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 """Gas pressures of the law's table, over the scene's own."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.tune import tune
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reports.prose import untraced
 from ringbalance.results.numbers import MISSING
 from ringbalance.scene import Scene

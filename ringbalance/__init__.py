@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
-    from ringbalance.reduced_model.calibration import Calibration as Calibration
+    from ringbalance.reduced_model.calibration_record import Calibration as Calibration
     from ringbalance.reduced_model.law.flow_law import Flow as Flow
     from ringbalance.reduced_model.law.flow_law import FlowLaw as FlowLaw
     from ringbalance.reduced_model.law.flow_law import Regime as Regime
@@ -66,7 +66,7 @@ register_function("with_values", place="ringbalance.scene.changes:with_values")
 register_function("scene_lines", place="ringbalance.scene.describe:scene_lines")
 
 _HOME = {
-    "Calibration": "ringbalance.reduced_model.calibration",
+    "Calibration": "ringbalance.reduced_model.calibration_record",
     "Command": "ringbalance.controller.algorithms.algorithm",
     "Comparison": "ringbalance.controller.compare",
     "CompleteLaw": "ringbalance.reduced_model.law.model",

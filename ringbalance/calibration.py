@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ringbalance.reduced_model.calibration import Calibration
 from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.law.paper_law import paper_law as paper_law_of
 from ringbalance.scene.changes import checked_scene

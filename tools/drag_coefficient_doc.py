@@ -14,7 +14,8 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reports.pages.drag_coefficient import SECTION
 from ringbalance.reports.section import Record, Work
 from ringbalance.reports.studies.drag_map import DragMap

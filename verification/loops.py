@@ -12,7 +12,8 @@ import numpy as np
 
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
-from ringbalance.reduced_model.calibration import Calibration, calibrate, chamber_and_law
+from ringbalance.reduced_model.calibration import calibrate, chamber_and_law
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.estimates import steady
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.loss import VELOCITIES
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reports.figures.drag_coefficient import drag_figures
 from ringbalance.reports.section import Record, Section, Work

@@ -9,7 +9,7 @@ from ringbalance.controller.ensemble.samples import ASSUMED_INFLUENCE
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reports.pages.requirements import (
     CAPACITY,
     SMALLEST,

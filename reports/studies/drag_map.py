@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.operating.point import priming_pressure
 from ringbalance.reports.studies.drag_point import DragPoint

@@ -12,7 +12,7 @@ import pytest
 
 import ringbalance
 from ringbalance.controller.simulation import Outcome, Simulation
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 

@@ -7,7 +7,8 @@ import math
 
 import pytest
 
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.scene import loop_models, models
 
 DISC = models.Disc(

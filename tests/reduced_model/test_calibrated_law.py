@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.estimates import range_flow
 from ringbalance.reduced_model.law.building import calibrated_law, nominal_law

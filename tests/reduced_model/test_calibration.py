@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Disc, Scene

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from scipy.optimize import fsolve, minimize_scalar
 
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.calibration import Calibration, calibrated_model
+from ringbalance.reduced_model.calibration import calibrated_model
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.law.building import calibrated_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.models import Scene
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reports.studies.drag_map import DragMap, LiquidVerdicts

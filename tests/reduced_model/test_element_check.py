@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ringbalance.physics.results import StatusCode
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
 from ringbalance.reduced_model.chamber.values import RingValues
 from ringbalance.scene.loop_models import Shaft

@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.terms import LEFT_OUT, NOT_MODELLED, TERMS, ModelUsed, models_used
 from ringbalance.reduced_model.time_scales import first_gas_time
 from ringbalance.scene.models import Scene

@@ -11,7 +11,8 @@ import pytest
 from scipy.optimize import brentq
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.operating.residual import reach_share, residual_fill_ratio

@@ -9,7 +9,8 @@ import pytest
 from rich.console import Console
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import RowStatus, _row_status, calibration_document
 from ringbalance.results.findings import sentences
 from ringbalance.scene import Scene

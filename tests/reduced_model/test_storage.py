@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.reduced_model.calibration import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.loading import load_law
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model

@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
 from ringbalance.reduced_model.tube.path import path_angle, path_radius
 from ringbalance.scene.models import Scene

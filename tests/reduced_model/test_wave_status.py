@@ -10,7 +10,8 @@ import pytest
 
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing.response import sloshing_response
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.terms import _wave_mean, wave_height
 from ringbalance.reduced_model.chamber.values import by_quadrature
 from ringbalance.reduced_model.documents import calibration_document

@@ -12,7 +12,8 @@ from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.terms import IN_INJECTIONS, models_used
 from ringbalance.scene import bundled_scene, load_scene

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene

@@ -14,7 +14,8 @@ from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.mesh.geometry import liquid_first_moment, surface_radius
-from ringbalance.reduced_model.calibration import Calibration, calibrate
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import scene_from

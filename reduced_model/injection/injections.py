@@ -74,17 +74,38 @@ class Injections:
     def shortest(self) -> float | None:
         """Valve-open time that just primes the tube, s; None where the gas starts no flow.
 
-        That which fills the chamber where the tube is never primed.
+        Where the tube is never primed, the time in which the chamber fills and liquid has passed the crest.
         """
         path = self._passed(2 * _TAIL, _TAIL)
-        if path.motion.record.event is Event.BLOCKED or self.steady <= 0:
+        blocked = path.motion.record.event is Event.BLOCKED or path.fill == self.pair.fill
+        if blocked or self.steady <= 0:
             return None
         if path.filled is not None:
             return path.filled
+        return max(self._filling_time, self._arrival)
+
+    @property
+    def _filling_time(self) -> float:
+        """Of the driven chamber without flow, s."""
         line, supply = self.dynamics.line, self.dynamics.gas_pressure + self.dynamics.ambient_pressure
         fill = self.pair.opposite_fill if self.chamber else self.pair.fill
         volume = (1 - fill) * self.dynamics.chamber_volume + self.dynamics.dead_volume
         return 0.0 if line is None else float(line.filling_time(supply, volume=volume))
+
+    @property
+    def _arrival(self) -> float:
+        """When lifted liquid reaches the end of the crest under a valve that stays open, s."""
+        if self.dynamics.lift is None:
+            return 0.0
+        early, late = 0.0, _TAIL
+        while late - early > _TIME_ERROR:
+            middle = (early + late) / 2
+            _, place, side = self._passed(2 * _TAIL, middle).motion.lifted
+            if side != 0 and place >= self.dynamics.column.crest_ends[self.chamber]:
+                late = middle
+            else:
+                early = middle
+        return late
 
     def moved(self, opening: float) -> float:
         """Fill ratio that has left the driven chamber when all is at rest after an opening, s."""

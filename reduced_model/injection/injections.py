@@ -31,6 +31,8 @@ _TIME_ERROR: Final = 1e-6
 """s, of a valve-open time."""
 _DOUBLINGS: Final = 12
 """Of the time by which an opening may be longer than the steady velocity has it."""
+_RUN_BACK: Final = 0.01
+"""Part of what an injection has moved that may run back as its column swings out."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,12 +127,16 @@ class Injections:
             return np.inf
         return float(brentq(lambda time: self.moved(time) - amount, least, longest + more, xtol=_TIME_ERROR))
 
-    def dead_time(self, amount: float) -> float:
+    def dead_time(self, amount: float) -> float | None:
         """Of the injection that moves a fill ratio, or of the shortest sure one that moves more, s.
 
-        Zero where the gas cannot move so much.
+        Zero where the gas cannot move so much; None where what it has moved runs back with the valves shut.
         """
         if self.shortest is None:
             return 0.0
         opening = self.opening(amount, least=self.shortest)
-        return opening - self.moved(opening) / self.steady if np.isfinite(opening) else 0.0
+        held = opening if np.isfinite(opening) else self.shortest
+        moved, back = self.moved(held), self._passed(held, held + _TAIL).ran_back
+        if back > _RUN_BACK * (abs(moved) + back):
+            return None
+        return opening - moved / self.steady if np.isfinite(opening) else 0.0

@@ -64,7 +64,7 @@ def test_example_in_the_document_loads(load: Callable[[Mapping[str, Any]], Scene
     [
         ("disc", models.Disc, {"geometry", *keys_of(MeshKeys)}),
         ("liquid", models.Liquid, {"density_uncertainty", "viscosity_uncertainty", "source"}),
-        ("tube", models.Tube, {"models"}),
+        ("tube", models.Tube, set()),
         ("gas", models.Gas, set()),
         ("environment", loop_models.Environment, set()),
         ("rotor", loop_models.Rotor, {"initial_vibration", "initial_amplitude", "initial_phase"}),

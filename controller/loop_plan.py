@@ -73,8 +73,8 @@ class LoopPlan:
     """Type `LOOP`, shape (1,)."""
     plant: Records
     """Type `PLANT`, shape (1,)."""
-    assumed: Records
-    """The same as the law-based algorithm has it."""
+    assumed: Records | None
+    """The same as the law-based algorithm has it; None for the others."""
     memory: Records
     """Type `RUN`, shape (1,), with what the algorithm remembers at the start."""
     liquid: Records
@@ -117,7 +117,7 @@ class LoopPlan:
         loop["rises_tolerated"], loop["most_samples"] = controller.rises_tolerated, most_samples
         loop["sensed"], loop["to_time_limit"] = sensed or not built_in, to_time_limit
         loop["exact"] = not sensed and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0
-        assumed = controller.plant.copy() if isinstance(controller, LawBased) else plant
+        assumed = controller.plant.copy() if isinstance(controller, LawBased) else None
         liquid = controller.liquid() if isinstance(controller, BuiltIn) else np.zeros(0, dtype=MOTION)
         return cls(loop=loop, plant=plant, assumed=assumed, memory=memory, liquid=liquid)
 
@@ -172,7 +172,7 @@ class RunsInHand:
         continue_runs(
             plan.loop[0],
             self._plant[0],
-            plan.assumed[0],
+            None if plan.assumed is None else plan.assumed[0],
             self.runs,
             self._motions,
             self._liquid,

@@ -1,14 +1,9 @@
-"""The tables of docs/is-k-50-right.md as Markdown, straight from the map; as a program, rewrites the page.
-
-python tools/drag_coefficient_doc.py docs/is-k-50-right.md
-"""
+"""The tables of docs/is-k-50-right.md as Markdown, straight from the map, for `generated_docs`."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -21,7 +16,6 @@ from ringbalance.reports.section import Record, Work
 from ringbalance.reports.studies.drag_map import DragMap
 from ringbalance.results.numbers import MISSING, given, measured, number, percent, shown
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.files import write_whole
 from ringbalance.verification.runner import paper_scene
 
 _VISCOSITIES: Final = (0.7e-6, 1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4)
@@ -147,23 +141,3 @@ def _hidden_table(apparent: Record, calibration: Calibration) -> str:
             )
         )
     return _table(("velocity", "gas", "k of the tube", "Eq. 18 reads", "Eq. 19 is off by"), rows)
-
-
-def filled(page: str) -> str:
-    """The page with its generated parts renewed."""
-    for name, text in document_tables().items():
-        start, end = f"<!-- {name} -->\n", f"\n<!-- /{name} -->"
-        before, _, rest = page.partition(start)
-        page = before + start + text + end + rest.partition(end)[2]
-    return page
-
-
-def main(arguments: list[str]) -> int:
-    """Rewrite the page in place."""
-    path = Path(arguments[0])
-    write_whole(path, filled(path.read_text(encoding="utf-8")))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

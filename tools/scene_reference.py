@@ -1,18 +1,13 @@
-"""Write the tables of docs/scene-file.md from the declarations of the keys, the liquids and the units.
-
-python tools/scene_reference.py            prints the page with fresh tables
-python tools/scene_reference.py --write    puts them into docs/scene-file.md
-"""
+"""Tables of docs/scene-file.md from the declarations of keys, liquids and units, for `generated_docs`."""
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Mapping
 from pathlib import Path
 
 from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS
-from ringbalance.scene import known_liquids, write_whole
+from ringbalance.scene import known_liquids
 from ringbalance.scene.faults import toml_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
@@ -130,9 +125,9 @@ def when_left_out(key: Key) -> str:
     return "**needed**" if key.presence.kind == "needed" else key.presence.otherwise
 
 
-def fresh(page: str) -> str:
-    """The page with its tables written again."""
-    tables = {
+def tables() -> dict[str, str]:
+    """Tables of the page, by name."""
+    return {
         "units": unit_reference(),
         "liquid_ring_keys": key_reference(LIQUID_RING, "At the top of the file"),
         "eccentric_mass_keys": key_reference(
@@ -140,19 +135,3 @@ def fresh(page: str) -> str:
         ),
         "liquids": liquid_reference(),
     }
-    return BLOCK.sub(lambda match: f"<!-- table: {match[1]} -->\n{tables[match[1]]}\n<!-- end -->", page)
-
-
-def main() -> None:
-    """Write the page, or print it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--write", action="store_true", help="put the tables into the page")
-    page = fresh(PAGE.read_text(encoding="utf-8"))
-    if parser.parse_args().write:
-        write_whole(PAGE, page)
-    else:
-        print(page, end="")
-
-
-if __name__ == "__main__":
-    main()

@@ -35,6 +35,8 @@ _NODES: Final = np.linspace(-8.0, 0.2, 22)
 """ln u of the nodes from which roots start, from that of a loss of all the pressure in one velocity head."""
 _SLOPES: Final = (0.3, 5.0)
 """d ln(head)/d ln u, between which steps are taken."""
+_STEEPEST: Final = 50.0
+"""The same within a transition, of a step of the search."""
 _ENOUGH: Final = 1e-6
 """Relative error of a head that belongs to a velocity, of which the last step leaves a thousandth."""
 _TINY: Final = 1e-14
@@ -227,7 +229,8 @@ def growing_root(
     """Where growing functions reach values, by safeguarded secant steps.
 
     Args: `function_of`: y(x) of some rows, by number. `slope`: dy/dx about `start`. `where`: rows that count.
-    Returns: x, of y to 1e-9, each row by itself; elsewhere `start`.
+    Returns: x after the step that follows a miss of y below 1e-6, which leaves about a thousandth of it;
+        each row by itself; elsewhere `start`.
     """
     x, rows = start.copy(), np.flatnonzero(where)
     low, high = np.full(start.shape, _LEAST), np.full(start.shape, _MOST)
@@ -242,7 +245,7 @@ def growing_root(
         low[rows], high[rows] = np.where(miss < 0, here, low[rows]), np.where(miss > 0, here, high[rows])
         step = here - before[rows]
         chord = (miss - missed[rows]) / np.where(np.abs(step) > _TINY, step, np.nan)
-        slope[rows] = np.where(np.isfinite(chord), np.clip(chord, *_SLOPES), slope[rows])
+        slope[rows] = np.where(np.isfinite(chord), np.clip(chord, _SLOPES[0], _STEEPEST), slope[rows])
         then = here - miss / slope[rows]
         inside = (then > low[rows]) & (then < high[rows])
         left = (np.abs(miss) > _ENOUGH) & (high[rows] - low[rows] > _TINY)

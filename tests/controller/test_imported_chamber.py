@@ -64,7 +64,8 @@ def test_a_member_of_an_ensemble_is_the_run(exact: Scene, model: BalancerModel, 
     run, plain = (simulate(exact, m) for m in (bent, model))
     found = simulate_members(exact, bent, members=Members.alike(exact, size=2))
     assert abs(run.amplitude[-1] - plain.amplitude[-1]) > 1e-8
-    assert found.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=1e-13)
+    # The longer steps of a member are allowed 1e-6 in fill, and a fill moves the vibration by some 50 um.
+    assert found.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=5e-11)
     assert found.samples[0] == len(run.samples)
 
 

@@ -183,8 +183,12 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
                 x, primed[pair] = second.after(
                     done.fill_before, total, second.scene.gas.pressure, done.duration, primed=primed[pair]
                 )
-                worst = max(worst, abs(x - done.fill_after))
-                x, rest = done.fill_after, rest - done.duration
+                closed = int(np.argmin(np.abs(run.time - (start + done.duration))))
+                seen = float(run.fill_ratio[letters[driven[pair]]][closed])
+                worst = max(worst, abs(x - seen))
+                x, rest = seen, rest - done.duration
+                later = run.fill_ratio[letters[done.chamber]][until]
+                worst = max(worst, abs(done.fill_after - float(later)))
             if (primed[pair] or second.scene.tube.hump_radius is None) and rest > 0:
                 begun = x
                 x, primed[pair] = second.after(x, total, 0.0, rest, primed=True)

@@ -171,7 +171,7 @@ def test_the_same_scene_gives_the_same_document(scene: Scene, found: Tuning) -> 
 def test_what_runs_reach_with_a_slow_gas_line_is_within_reach(scene: Scene, found: Tuning) -> None:
     # Nothing is known of the scene's own line: the default range leaves it open.
     assert found.reachable is None
-    given = replace(scene, gas=replace(scene.gas, conductance=2e-9, critical_ratio=0.3, valve_lag=0.005))
+    given = replace(scene, gas=replace(scene.gas, conductance=2e-9, critical_ratio=0.3, valve_lag=0.01))
     answer = tuned(given)
     # The smallest correction leaves the limit unsure; the runs settle all the same, and they decide.
     assert answer.gas_line[0].above_limit

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import example_measurements
-import measurement_tables
+import generated_docs
 import pytest
 
 from ringbalance.cli import main
@@ -237,8 +237,8 @@ def test_what_cannot_be_fitted_is_refused(words: list[str], told: str, run: Run)
 
 
 def test_the_page_has_every_kind_and_its_example_can_be_read(paper_scene: Scene) -> None:
-    page = measurement_tables.FIT_PAGE.read_text(encoding="utf-8")
-    assert measurement_tables.fresh(page, "fit_kinds", measurement_tables.fit_kind_table()) == page
+    page = generated_docs.text_of("docs/fit.md")
+    assert generated_docs.fresh(page, generated_docs.PARTS["docs/fit.md"]()) == page
     example = page.split("## Files of measurements")[1].split("```")[1].lstrip("\n")
     found, faults = _observations_of(example.encode(), file="example", scene=paper_scene)
     assert faults == ()

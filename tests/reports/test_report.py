@@ -58,7 +58,7 @@ def few_cases(kept: Path) -> Iterator[None]:
     found: list[Any] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evidence_module, "load_cases", cases)
-        patch.setattr(saved_module, "code_folder", lambda: kept)
+        patch.setattr(saved_module, "code_root", lambda: kept)
         patch.setattr(consequences_module, "find_consequences", consequences)
         yield
 

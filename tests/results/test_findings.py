@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-import finding_table
+import generated_docs
 import pytest
 
 from ringbalance.results import findings
@@ -13,7 +12,6 @@ from ringbalance.results.findings import Finding, Sentence, sentences, value_tex
 from ringbalance.results.numbers import SCALES
 from ringbalance.results.rows import Quantity
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "findings.md"
 PLACES = re.compile(r"\{(\w+)(?::([^};]*))?(?:;(\d))?\}")
 
 
@@ -30,7 +28,8 @@ def test_a_sentence_fills_its_numbers_in_units_that_exist(code: str) -> None:
 
 
 def test_the_documentation_lists_every_code_as_the_program_has_it() -> None:
-    assert DOCUMENT.read_text(encoding="utf-8") == finding_table.document()
+    page = generated_docs.text_of("docs/findings.md")
+    assert generated_docs.fresh(page, generated_docs.PARTS["docs/findings.md"]()) == page
 
 
 def test_a_number_that_is_missing_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:

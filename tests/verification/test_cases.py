@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from measurement_tables import README, fresh, standing_table
+from generated_docs import fresh, standing_table, text_of
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -381,7 +381,7 @@ def test_light_cases_hold_at_level_heavy(paper_scene: Scene) -> None:
 def test_the_readme_has_the_table_of_what_stands_behind_each_quantity(
     results: Mapping[str, CaseResult],
 ) -> None:
-    page = README.read_text(encoding="utf-8")
+    page = text_of("README.md")
     table = standing_table([case_document(results[case.id]) for case in load_cases()])
-    assert fresh(page, "standing", table) == page
+    assert fresh(page, {"standing": table}) == page
     assert "| Residual liquid over the port | no data |" in page

@@ -7,7 +7,6 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from ringbalance.controller import outcome
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
 from ringbalance.controller.document import simulation_document
@@ -22,12 +21,6 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 
 BUNDLED = ("liquid_ring_paper", "perfluorinated_oil", "silicone_oil_100cst", "six_chamber")
 LINE = {"conductance": 1e-7, "critical_ratio": 0.3, "dead_volume": 5e-6, "valve_lag": 2e-5}
-
-
-@pytest.fixture(autouse=True)
-def no_remedies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What mends a run that ends at its time limit is no estimate, and takes longer than so short a run."""
-    monkeypatch.setattr(outcome, "standing_remedy", lambda *_: "")
 
 
 def short(scene: Scene) -> Scene:

@@ -7,7 +7,7 @@ import tomllib
 from dataclasses import replace
 from importlib.resources import files
 
-import measurement_tables
+import generated_docs
 import numpy as np
 import pytest
 from scipy.stats import binomtest
@@ -260,7 +260,7 @@ def test_every_bundled_set_of_a_kind_that_is_predicted_has_its_columns() -> None
 
 
 def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() -> None:
-    page = measurement_tables.PAGE.read_text(encoding="utf-8")
-    assert measurement_tables.fresh(page, "kinds", measurement_tables.kind_table()) == page
+    page = generated_docs.text_of("docs/measurements.md")
+    assert generated_docs.fresh(page, generated_docs.PARTS["docs/measurements.md"]()) == page
     example = page.split("```")[1]
     assert len(compare(Measurements.parsed(example, file="example")).measured) == 3

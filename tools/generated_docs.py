@@ -1,0 +1,174 @@
+"""Write every generated part of the documents, and the equations as they are set.
+
+python tools/generated_docs.py            exit code 1 where one of them is not what the program says now
+python tools/generated_docs.py --write    writes them
+
+A part stands in its page between `<!-- table: NAME -->` and `<!-- end -->`.
+"""
+
+from __future__ import annotations
+
+import json
+import lzma
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import scene_reference
+from drag_coefficient_doc import document_tables
+from typesetting import typeset
+
+from ringbalance.identification.data.kinds import KINDS as FIT_KINDS
+from ringbalance.identification.data.kinds import DataKind
+from ringbalance.reports.equations import equations as report_equations
+from ringbalance.reports.saved import saved_cases
+from ringbalance.results.findings import sentences
+from ringbalance.scene import write_whole
+from ringbalance.verification.catalogue import load_cases
+from ringbalance.verification.document import case_document, definition_document
+from ringbalance.verification.runner import paper_scene, run_case
+from ringbalance.verification.standing import HEADS, standing_rows
+from ringbalance.verification.validation.kinds import KINDS
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+EQUATIONS: Final = ROOT / "reports" / "data" / "equations.json.xz"
+_BLOCK: Final = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
+_PLACE: Final = re.compile(r"\{(\w+)[^}]*\}")
+
+
+def kind_table() -> str:
+    """Kinds of data and their columns."""
+    return _markdown(
+        ("kind", "measured column", "what it is", "further columns"),
+        [
+            (
+                f"`{name}`",
+                f"`{kind.measured}`",
+                kind.title,
+                "; ".join(
+                    f"`{column}`: {text}" for column, text in {**kind.columns, **kind.optional}.items()
+                ),
+            )
+            for name, kind in KINDS.items()
+        ],
+    )
+
+
+def fit_kind_table() -> str:
+    """Kinds of data that a fit takes, and their columns."""
+    return _markdown(
+        ("kind", "what it is", "measured", "further columns"),
+        [
+            (
+                f"`{name}`",
+                kind.title + (", eccentric masses" if kind.balancer == "eccentric_mass" else ""),
+                "; ".join(_explained(kind, measured=True)),
+                "; ".join(_explained(kind, measured=False)),
+            )
+            for name, kind in FIT_KINDS.items()
+        ],
+    )
+
+
+def _explained(kind: DataKind, *, measured: bool) -> list[str]:
+    """The columns that are measured, or the others, with what they hold."""
+    letters = ["`chamber`: letter of the driven chamber"] if kind.has_chamber and not measured else []
+    return letters + [
+        f"`{column.head}`: {column.meaning}"
+        + (" (optional)" if column.optional else "")
+        + (f" (instead of `{kind.one_of[0]}`)" if column.name in kind.one_of[1:] else "")
+        for column in kind.columns
+        if column.measured == measured
+    ]
+
+
+def standing_table(cases: Sequence[Mapping[str, Any]]) -> str:
+    """What stands behind each quantity, by the documents of the cases; heavy ones count as kept."""
+    kept = {case["id"]: {"verdict": case["verdict"], "numbers": case["numbers"]} for case in saved_cases()}
+    return _markdown(HEADS, standing_rows([{**case, **kept.get(case["id"], {})} for case in cases]))
+
+
+def _markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def finding_table() -> str:
+    """Codes of findings, with what stands under them."""
+    return _markdown(
+        ("code", "severity", "values", "sentence"),
+        [
+            (
+                f"`{code}`",
+                each.severity,
+                ", ".join(f"`{name}`" for name in each.values),
+                _PLACE.sub(r"*\1*", each.text),
+            )
+            for code, each in sentences().items()
+        ],
+    )
+
+
+def equations() -> bytes:
+    """SVG of each equation of the report and of the cases by its LaTeX, as the file keeps them."""
+    latex = {
+        *(each.latex for each in report_equations().values()),
+        *(e for c in load_cases() for e in c.equations),
+    }
+    return lzma.compress(json.dumps({each: typeset(each) for each in sorted(latex)}).encode(), preset=9)
+
+
+PARTS: Final[Mapping[str, Callable[[], Mapping[str, str]]]] = MappingProxyType(
+    {
+        "docs/scene-file.md": scene_reference.tables,
+        "docs/measurements.md": lambda: {"kinds": kind_table()},
+        "docs/fit.md": lambda: {"fit_kinds": fit_kind_table()},
+        "docs/findings.md": lambda: {"findings": finding_table()},
+        "docs/is-k-50-right.md": document_tables,
+        "README.md": lambda: {"standing": standing_table(_documents())},
+    }
+)
+"""Generated parts by page."""
+
+
+def fresh(page: str, tables: Mapping[str, str]) -> str:
+    """A page with its parts written again. Raises: ValueError: it has others than these."""
+    names = _BLOCK.findall(page)
+    if sorted(names) != sorted(tables):
+        raise ValueError(f"the page has {names}, written are {sorted(tables)}")
+    return _BLOCK.sub(lambda match: f"<!-- table: {match[1]} -->\n{tables[match[1]]}\n<!-- end -->", page)
+
+
+def text_of(name: str) -> str:
+    """A page as it stands."""
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def _documents() -> list[dict[str, Any]]:
+    """Cases that compare with measurements, run; of the others their text."""
+    scene = paper_scene()
+    return [
+        case_document(run_case(case.id, scene=scene))
+        if case.kind == "validation"
+        else definition_document(case)
+        for case in load_cases()
+    ]
+
+
+def main(arguments: list[str]) -> int:
+    """Write what changed, or say so."""
+    written = {name: fresh(text_of(name), tables()).encode() for name, tables in PARTS.items()}
+    written[str(EQUATIONS.relative_to(ROOT))] = equations()
+    stale = [name for name, content in written.items() if (ROOT / name).read_bytes() != content]
+    for name in stale:
+        print(name)
+        if "--write" in arguments:
+            write_whole(ROOT / name, written[name])
+    return int(bool(stale) and "--write" not in arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -83,7 +83,8 @@ class Injections:
         if blocked or self.steady <= 0:
             return None
         if path.filled is not None:
-            return path.filled
+            # Shut at the very instant, round-off would decide whether the tube is primed.
+            return path.filled + _TIME_ERROR
         return max(self._filling_time, self._arrival)
 
     @property

@@ -188,7 +188,8 @@ def _answer(scene: Scene, end: _LineEnd, model: BalancerModel) -> LineAnswer:
         if correction > 0:
             amount = limit * moved / correction
             dead = injections.dead_time(amount)
-            standing = _at_equal_fills(scene, dead, rate=limit / amount * injections.steady)
+            if dead is not None:
+                standing = _at_equal_fills(scene, dead, rate=limit / amount * injections.steady)
     return LineAnswer(
         end=end.name,
         conductance=line.conductance,

@@ -31,7 +31,7 @@ def dead_times(scene: Scene, model: BalancerModel) -> tuple[float, ...]:
     """Of every chamber at the balanced fills, for a correction of the size of the limit, s.
 
     Empty where runs model neither the filling of gas nor the lift to the crest; zero for a chamber that the
-    gas cannot drive.
+    gas cannot drive, and for all where liquid runs back, for which no longer opening makes up.
     """
     modelled = terms_modelled(run_models(scene=scene, model=model))
     if not {FILLING, HELD} & set(modelled):
@@ -44,16 +44,14 @@ def dead_times(scene: Scene, model: BalancerModel) -> tuple[float, ...]:
         Injections.of(dynamics, model, fill=float(x), total=total, chamber=i // half)
         for i, x in enumerate(driven)
     )
-    return tuple(
-        _dead_time(scene, each, rate=float(b)) for each, b in zip(injections, rates.T.ravel(), strict=True)
-    )
+    lost = [_dead_time(scene, each, rate=b) for each, b in zip(injections, rates.T.flat, strict=True)]
+    return tuple(0.0 if None in lost else round(max(each or 0.0, 0.0), _DIGITS) for each in lost)
 
 
-def _dead_time(scene: Scene, injections: Injections, *, rate: float) -> float:
+def _dead_time(scene: Scene, injections: Injections, *, rate: float) -> float | None:
     if rate <= 0.0:
         return 0.0
-    lost = injections.dead_time(scene.controller.limit / rate * injections.steady)
-    return round(max(lost, 0.0), _DIGITS)
+    return injections.dead_time(scene.controller.limit / rate * injections.steady)
 
 
 def compensated(scene: Scene, model: BalancerModel, dead: tuple[float, ...]) -> Scene:

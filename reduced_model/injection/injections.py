@@ -31,6 +31,8 @@ _TIME_ERROR: Final = 1e-6
 """s, of a valve-open time."""
 _DOUBLINGS: Final = 12
 """Of the time by which an opening may be longer than the steady velocity has it."""
+_RUN_BACK: Final = 0.01
+"""Part of what an injection has moved that may run back as its column swings out."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,17 +76,38 @@ class Injections:
     def shortest(self) -> float | None:
         """Valve-open time that just primes the tube, s; None where the gas starts no flow.
 
-        That which fills the chamber where the tube is never primed.
+        Where the tube is never primed, the time in which the chamber fills and liquid has passed the crest.
         """
         path = self._passed(2 * _TAIL, _TAIL)
-        if path.motion.record.event is Event.BLOCKED or self.steady <= 0:
+        blocked = path.motion.record.event is Event.BLOCKED or path.fill == self.pair.fill
+        if blocked or self.steady <= 0:
             return None
         if path.filled is not None:
             return path.filled
+        return max(self._filling_time, self._arrival)
+
+    @property
+    def _filling_time(self) -> float:
+        """Of the driven chamber without flow, s."""
         line, supply = self.dynamics.line, self.dynamics.gas_pressure + self.dynamics.ambient_pressure
         fill = self.pair.opposite_fill if self.chamber else self.pair.fill
         volume = (1 - fill) * self.dynamics.chamber_volume + self.dynamics.dead_volume
         return 0.0 if line is None else float(line.filling_time(supply, volume=volume))
+
+    @property
+    def _arrival(self) -> float:
+        """When lifted liquid reaches the end of the crest under a valve that stays open, s."""
+        if self.dynamics.lift is None:
+            return 0.0
+        early, late = 0.0, _TAIL
+        while late - early > _TIME_ERROR:
+            middle = (early + late) / 2
+            _, place, side = self._passed(2 * _TAIL, middle).motion.lifted
+            if side != 0 and place >= self.dynamics.column.crest_ends[self.chamber]:
+                late = middle
+            else:
+                early = middle
+        return late
 
     def moved(self, opening: float) -> float:
         """Fill ratio that has left the driven chamber when all is at rest after an opening, s."""
@@ -104,12 +127,16 @@ class Injections:
             return np.inf
         return float(brentq(lambda time: self.moved(time) - amount, least, longest + more, xtol=_TIME_ERROR))
 
-    def dead_time(self, amount: float) -> float:
+    def dead_time(self, amount: float) -> float | None:
         """Of the injection that moves a fill ratio, or of the shortest sure one that moves more, s.
 
-        Zero where the gas cannot move so much.
+        Zero where the gas cannot move so much; None where what it has moved runs back with the valves shut.
         """
         if self.shortest is None:
             return 0.0
         opening = self.opening(amount, least=self.shortest)
-        return opening - self.moved(opening) / self.steady if np.isfinite(opening) else 0.0
+        held = opening if np.isfinite(opening) else self.shortest
+        moved, back = self.moved(held), self._passed(held, held + _TAIL).ran_back
+        if back > _RUN_BACK * (abs(moved) + back):
+            return None
+        return opening - moved / self.steady if np.isfinite(opening) else 0.0

@@ -86,11 +86,37 @@ def test_the_dead_time_is_that_of_the_plant(
     dynamics = plant_of(given, calibrated, "gas filling", "tube inertia", "valve lag", LIFT)
     injections = Injections.of(dynamics, calibrated, fill=fill, total=0.5)
     wanted = 0.02 * injections.steady
-    opening = injections.dead_time(wanted) + 0.02
+    dead = injections.dead_time(wanted)
+    assert dead is not None
+    opening = dead + 0.02
     moved = fill - pulse(dynamics, opening, np.array([3.0]), fill=fill).fill
     assert moved == pytest.approx(wanted, rel=1e-3)
     # Without it most of the injection only fills gas.
     assert fill - pulse(dynamics, 0.02, np.array([3.0]), fill=fill).fill < 0.5 * wanted
+
+
+def test_a_tube_that_is_never_primed_needs_the_time_to_pass_the_crest(plant_of: Plant, scene: Scene) -> None:
+    """A fast line has filled the chamber before a viscous liquid is over the crest."""
+    gas = replace(scene.gas, conductance=1e-7, critical_ratio=0.3, valve_lag=1e-3)
+    viscous = replace(scene, gas=gas, liquid=replace(scene.liquid, kinematic_viscosity=1e-4))
+    law = BalancerModel.of(calibrate(viscous).flow_law)
+    dynamics = plant_of(viscous, law, "gas filling", "tube inertia", LIFT)
+    injections = Injections.of(dynamics, law, fill=0.25, total=0.5)
+    (answer,) = line_answers(viscous, law)
+    assert answer.shortest_opening is not None
+    assert injections.moved(answer.filling_time) == 0.0
+    assert answer.shortest_opening > 2 * answer.filling_time
+    assert answer.smallest_correction is not None
+    assert answer.smallest_correction > 0.0
+
+
+def test_what_runs_back_has_no_dead_time(plant_of: Plant, scene: Scene) -> None:
+    """Without a crest the full tube lets the fuller chamber give back what an injection has moved."""
+    gas = replace(scene.gas, conductance=1e-7, critical_ratio=0.3, valve_lag=1e-3)
+    full = replace(scene, gas=gas, tube=replace(scene.tube, hump_radius=None))
+    law = BalancerModel.of(calibrate(full).flow_law)
+    dynamics = plant_of(full, law, "gas filling", "tube inertia")
+    assert Injections.of(dynamics, law, fill=0.25, total=0.5).dead_time(0.01) is None
 
 
 def test_a_line_that_is_not_given_is_a_range(calibrated: BalancerModel, scene: Scene) -> None:

@@ -20,6 +20,7 @@ from typing import Any, get_args
 from cyclopts import App, CycloptsError, MissingArgumentError, Parameter, Token, UnknownCommandError, convert
 
 import ringbalance
+from ringbalance.scene.platform.processes import seldom_collected
 from ringbalance.signals import interrupts
 from ringbalance.streams import discard_unwritten, drop_unusable_size, interpreter_error, prepare_streams
 
@@ -70,8 +71,6 @@ THREAD_COUNTS = (
     "VECLIB_MAXIMUM_THREADS",
     "NUMEXPR_NUM_THREADS",
 )
-COLLECTED = (50_000, 20, 20)
-"""New objects, and searches of each generation of them, before garbage is looked for."""
 EXAMPLE_SCENES = ("my_disc.toml", "other_disc.toml")
 
 
@@ -182,16 +181,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Before numpy is imported, and whatever the user set: one thread gives the same sums on every machine.
     os.environ.update(dict.fromkeys(THREAD_COUNTS, "1"))
     drop_unusable_size(os.environ)
-    # Modules, and what compiles them, make many objects and little garbage: a tenth of the time went into the
-    # search for it.
-    gc.set_threshold(*COLLECTED)
     # An interpreter that ends looks for garbage in all that it holds, which its process gives back anyway.
     atexit.register(gc.freeze)
     if refusal := prepare_streams() or interpreter_error():
         _say(f"ringbalance: {refusal}")
         return BAD_INPUT
     try:
-        with interrupts():
+        # Modules, and what compiles them, make many objects and little garbage: looking for it took a tenth.
+        with interrupts(), seldom_collected():
             return _run_guarded(arguments)
     except KeyboardInterrupt:
         _say("ringbalance: interrupted; nothing was left half-written")

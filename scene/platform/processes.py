@@ -22,7 +22,7 @@ _R = TypeVar("_R")
 
 _THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _LOG: Final = logging.getLogger("ringbalance")
-_COLLECTED_AT: Final = (10_000, 50, 1000)
+_COLLECTED_AT: Final = (50_000, 50, 1000)
 """Objects between two collections, then collections of one generation for one of the next.  The interpreter's
 own 700, 10, 10 look through all that stays (modules, meshes, results): 4 % of a report's processor time."""
 _WORKER_ENDED: Final = (

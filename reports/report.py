@@ -33,7 +33,8 @@ from ringbalance.reports.summary import lead_sentence
 from ringbalance.results.result import csv_text
 from ringbalance.scene import AnyScene, Scene, liquid_ring_scene
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.processes import Workers, beside, seldom_collected
+from ringbalance.scene.platform.garbage import seldom_collected
+from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.runner import paper_scene
 

@@ -44,10 +44,9 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.model import BalancerModel, completed_model, lacking
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
-from ringbalance.results.findings import Finding
 from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.paths import with_values_at

@@ -27,10 +27,9 @@ from ringbalance.controller.balancer import (
     vibrating,
 )
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
-from ringbalance.results.findings import Finding
 from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.paths import with_values_at
 from ringbalance.scene.uncertain import NORMAL_95

@@ -30,7 +30,8 @@ from ringbalance.reports.tables import FOLDER as TABLES
 from ringbalance.reports.tables import csv_tables
 from ringbalance.scene import AnyScene, Scene, liquid_ring_scene
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.processes import Workers, beside, seldom_collected
+from ringbalance.scene.platform.garbage import seldom_collected
+from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.runner import paper_scene
 

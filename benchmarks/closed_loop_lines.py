@@ -19,7 +19,7 @@ from ringbalance.controller.ensemble import (
 )
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.members import Members
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.transfers import Drive, closed_form
 

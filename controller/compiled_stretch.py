@@ -6,10 +6,10 @@ import math
 
 from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL
 from ringbalance.controller.loop_records import GAS_POINTS, NOTICEABLE, TAIL_POINTS, Record, pair_moment
+from ringbalance.reduced_model.injection.dynamics import WORK, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance, least_later, opening_within
-from ringbalance.reduced_model.injection.records import WORK, X
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import in_place
 

@@ -14,15 +14,12 @@ import numpy as np
 
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text, line_warning
-from ringbalance.reduced_model.injection.dynamics import gives_forces
-from ringbalance.reduced_model.injection.records import Event
+from ringbalance.reduced_model.injection.dynamics import Event, gives_forces
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG, neglected_in_injections
-from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import given
-from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity
-from ringbalance.results.table import Table, models_table
+from ringbalance.results.result import Rows, Table, models_table
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray, finite
 
 

@@ -17,10 +17,10 @@ from ringbalance.controller.loop_records import AT_REST, HELD, IDLE, NOTICEABLE,
 from ringbalance.controller.members import BLOCK, LARGEST_RATIO, Members, MemberUncertainty
 from ringbalance.controller.terms import check_fit, dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
-from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
-from ringbalance.reduced_model.operating.residual import Drawing
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
+from ringbalance.reduced_model.residual_liquid import Drawing
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from ringbalance.controller.rotor import MAX_CHAMBERS
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.platform.compiled import in_place
 

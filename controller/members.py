@@ -10,13 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.reduced_model.chamber.closed_forms import measured_closed_forms
+from ringbalance.reduced_model.chamber.values import measured_closed_forms
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
-from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.operating.residual import FACTOR, Drawing
+from ringbalance.reduced_model.residual_liquid import FACTOR, Drawing
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, in_batches
 from ringbalance.scene.joint import direction_sides

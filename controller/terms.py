@@ -11,7 +11,7 @@ from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.gas import GasLine
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.injection.dynamics import Dynamics, gives_forces
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import FILLING, HELD, IN_INJECTIONS, INERTIA, LAG, ModelUsed, models_used
 from ringbalance.scene.describe import scene_fault

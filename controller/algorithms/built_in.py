@@ -23,7 +23,7 @@ from ringbalance.controller.loop_records import (
     USABLE,
     Record,
 )
-from ringbalance.reduced_model.injection.records import MOTION
+from ringbalance.reduced_model.injection.dynamics import MOTION
 from ringbalance.scene.platform.compiled import in_place
 
 NO_SAMPLE: Final = "no usable sample"

@@ -10,9 +10,8 @@ import numpy as np
 
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.flow_law import FlowLaw
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import stalled_fill_ratio
+from ringbalance.reduced_model.law.flow_law import BalancerModel, FlowLaw
+from ringbalance.reduced_model.residual_liquid import stalled_fill_ratio
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.loop_models import Rotor
 

@@ -19,7 +19,7 @@ from ringbalance.controller.loop import MAX_SAMPLES, simulate
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.injection.pair import Passage
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene

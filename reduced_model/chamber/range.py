@@ -12,7 +12,7 @@ from ringbalance.mesh.geometry import chamber_volume, liquid_area, surface_radiu
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.results import Status, StatusCode
-from ringbalance.physics.sloshing.range import SMALL
+from ringbalance.physics.sloshing import SMALL
 from ringbalance.reduced_model.chamber.gravity import closed_ring
 from ringbalance.reduced_model.chamber.terms import MEAN, chamber_contributions, wave_height
 from ringbalance.reduced_model.contribution import Contribution, percent

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, head_square, surface_radius, wall_square
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE
 from ringbalance.reduced_model.chamber.values import (
     by_closed_form,
     by_quadrature,

@@ -20,8 +20,8 @@ from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.operating.residual import residual_fill_ratio
 from ringbalance.reduced_model.terms import ModelUsed
-from ringbalance.results.findings import Finding
 from ringbalance.results.result import PresentedResult
+from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

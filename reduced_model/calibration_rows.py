@@ -20,11 +20,9 @@ from ringbalance.reduced_model.documents import (
 )
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.results.findings import Finding, sentences
 from ringbalance.results.numbers import believed, given, rounded
-from ringbalance.results.result import Rows
-from ringbalance.results.rows import Parts, Quantity, around
-from ringbalance.results.table import Table, models_table
+from ringbalance.results.result import Rows, Table, models_table
+from ringbalance.results.rows import Finding, Parts, Quantity, around, sentences
 
 _NAMES: Final = MappingProxyType(
     {

@@ -20,7 +20,7 @@ from ringbalance.reduced_model.gas_line import standing_amplitude
 from ringbalance.reduced_model.injection.injections import Injections
 from ringbalance.reduced_model.law.model import BalancerModel
 from ringbalance.reduced_model.terms import FILLING, HELD
-from ringbalance.results.findings import Finding
+from ringbalance.results.rows import Finding
 from ringbalance.scene.models import Scene
 
 _DIGITS: Final = 4

@@ -9,7 +9,7 @@ import numpy as np
 
 from ringbalance.mesh.faceting import SMOOTH, axis_beside_shaft, faceting, inward_share
 from ringbalance.reduced_model.chamber.values import drawing_shares
-from ringbalance.results.findings import Finding
+from ringbalance.results.rows import Finding
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Scene
 

@@ -30,7 +30,7 @@ from ringbalance.reduced_model.injection.column import (
 )
 from ringbalance.reduced_model.injection.gas import gas_volume, line_rates
 from ringbalance.reduced_model.injection.records import P, Record, U, X
-from ringbalance.scene.platform.compilation.compiled import in_place, inlined
+from ringbalance.scene.platform.compiled import in_place, inlined
 
 _BEHIND: Final = 0.54956
 _ARRIVES: Final = 0.62435

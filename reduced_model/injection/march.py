@@ -46,7 +46,7 @@ from ringbalance.reduced_model.injection.step import (
     take,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 _ROUND_OFF: Final = 1e-12
 """s, of the clock of a valve."""

@@ -18,7 +18,7 @@ from ringbalance.reduced_model.injection.gas import gas_volume, line_rates, near
 from ringbalance.reduced_model.injection.lift import lift_rates, lift_speed
 from ringbalance.reduced_model.injection.records import WORK, P, Record, U, X
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place, inlined
+from ringbalance.scene.platform.compiled import in_place, inlined
 
 _STAGES: Final = 4
 _GAMMA: Final = 0.57282

@@ -298,8 +298,10 @@ def _broadcast(
     critical_ratio: npt.ArrayLike,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """The first three in one shape, and the share of turbulent flow."""
-    numbers = (np.asarray(v, dtype=np.float64) for v in (friction_factor, reynolds, rotation_reynolds))
-    return *np.broadcast_arrays(*numbers), turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
+    f, re, rotation = np.broadcast_arrays(
+        *(np.asarray(v, dtype=np.float64) for v in (friction_factor, reynolds, rotation_reynolds))
+    )
+    return f, re, rotation, turbulent_share(reynolds=re, critical_ratio=critical_ratio)
 
 
 def _laminar_excess(bend: Bend, bore: float, re: FloatArray) -> tuple[FloatArray, FloatArray]:

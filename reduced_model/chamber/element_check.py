@@ -15,8 +15,7 @@ from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.pressure.imported import solved_ring
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
-from ringbalance.reduced_model.chamber.closed_forms import chamber_closed_forms, chamber_pressure
-from ringbalance.reduced_model.chamber.values import RingValues
+from ringbalance.reduced_model.chamber.values import RingValues, chamber_closed_forms, chamber_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 from ringbalance.scene.describe import scene_fault

@@ -24,7 +24,7 @@ from ringbalance.physics.pressure.solve import (
 )
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
+from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.results.numbers import given
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry

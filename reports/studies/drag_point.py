@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from ringbalance.physics.tube.loss import TUBE_INPUTS, corrected_state, flow_states, model_parts, range_notes
 from ringbalance.physics.tube.state import TubeState
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
+from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow

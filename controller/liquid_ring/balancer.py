@@ -24,11 +24,10 @@ from ringbalance.controller.balancer import (
     requirements_of,
     vibrating,
 )
-from ringbalance.controller.document import simulation_history
-from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
-from ringbalance.controller.line_runs import line_runs, line_runs_table
+from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
+from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.members import Members, MemberUncertainty
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models

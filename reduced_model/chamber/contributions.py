@@ -20,7 +20,7 @@ from ringbalance.mesh.geometry import (
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.results import Status, StatusCode
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE, SMALL
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE, SMALL
 from ringbalance.reduced_model.chamber.tilted_ring import closed_ring
 from ringbalance.reduced_model.chamber.values import (
     by_closed_form,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from ringbalance.controller.ensemble.samples import ASSUMED_INFLUENCE
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.members import ASSUMED_INFLUENCE
 from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration_record import Calibration

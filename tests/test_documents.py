@@ -20,7 +20,7 @@ from ringbalance.controller.eccentric_mass.tuning import eccentric_tuning_docume
 from ringbalance.reports.extremes_cli import base_of
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.verification.extremes.study import Size, find_extremes
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "commands.md"

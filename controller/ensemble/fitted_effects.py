@@ -11,8 +11,8 @@ from ringbalance.reduced_model.chamber.values import measured_closed_forms
 from ringbalance.reduced_model.core import Answers
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, in_batches
-from ringbalance.scene.joint import direction_sides
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import direction_sides
 
 LINE_KEYS: Final = ("conductance", "critical_ratio", "dead_volume", "valve_lag")
 """Of a chamber's gas line, which drawn devices may have of their own."""

@@ -19,7 +19,7 @@ from ringbalance.controller.ensemble.monte_carlo import (
 from ringbalance.controller.ensemble.run import EnsemblePlan
 from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.transfers import Drive, closed_form
 

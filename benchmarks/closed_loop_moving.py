@@ -31,7 +31,7 @@ from ringbalance.controller.ensemble.run import RELATIVE_ERROR
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.models import Scene
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import Fault, SceneError

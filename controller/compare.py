@@ -13,10 +13,8 @@ import numpy as np
 from ringbalance.controller.balancer import Balancer, CommonRotor, Draws
 from ringbalance.controller.tuning.dead_time import offset_text
 from ringbalance.reduced_model.terms import ModelUsed
-from ringbalance.results.findings import Finding, Value
-from ringbalance.results.result import Result, Rows
-from ringbalance.results.rows import Quantity
-from ringbalance.results.table import Table
+from ringbalance.results.result import Result, Rows, Table
+from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.faults import Fault, SceneError

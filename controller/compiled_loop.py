@@ -42,11 +42,11 @@ from ringbalance.controller.loop_records import (
     USABLE,
     Record,
 )
+from ringbalance.reduced_model.injection.dynamics import P, X
 from ringbalance.reduced_model.injection.events import rests, would_start
 from ringbalance.reduced_model.injection.gas import gas_volume
-from ringbalance.reduced_model.injection.records import P, X
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 _has_held: Final = in_place(has_held)
 _has_risen: Final = in_place(has_risen)

@@ -11,12 +11,10 @@ import numpy as np
 
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_text, line_warning
-from ringbalance.reduced_model.injection.records import Event
+from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.reduced_model.terms import neglected_in_injections
-from ringbalance.results.findings import Finding
-from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity
-from ringbalance.results.table import Table, models_table
+from ringbalance.results.result import Rows, Table, models_table
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray, finite
 
 

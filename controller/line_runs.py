@@ -13,7 +13,7 @@ from ringbalance.reduced_model.injection.dynamics import gives_forces
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.results.numbers import given
-from ringbalance.results.table import Table
+from ringbalance.results.result import Table
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,12 +25,10 @@ from ringbalance.controller.run_findings import run_findings
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import loop_factor
-from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.injection.dynamics import RELATIVE_ERROR
-from ringbalance.reduced_model.injection.records import EVENTS
-from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
+from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, Regime
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import ComplexArray, FloatArray

@@ -28,9 +28,8 @@ from ringbalance.controller.loop_records import (
 from ringbalance.controller.moment_table import MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
-from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.records import MOTION, WORKSPACE
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE, Dynamics
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from ringbalance.controller.formulas import piece_rise
 from ringbalance.controller.loop_records import MOMENT_NODES
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 _piece_rise: Final[Any] = in_place(piece_rise)
 

@@ -20,7 +20,7 @@ from ringbalance.controller.simulation import (
     noise_floor,
 )
 from ringbalance.controller.tuning.loop_factor import LoopFactor
-from ringbalance.reduced_model.injection.records import Event
+from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

@@ -12,8 +12,8 @@ from ringbalance.controller.simulation import NOISE_DEVIATIONS, Injection, Outco
 from ringbalance.controller.tuning.dead_time import standing_finding
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.controller.tuning.recommendation import recommended_gain
-from ringbalance.reduced_model.operating.residual import Holding
-from ringbalance.results.findings import Finding, Value, sentences
+from ringbalance.reduced_model.residual_liquid import Holding
+from ringbalance.results.rows import Finding, Value, sentences
 
 MANY_OVERSHOOTS: Final = 2
 

@@ -15,13 +15,13 @@ from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
 from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.results import Status
-from ringbalance.reduced_model.chamber.range import chamber_status
+from ringbalance.reduced_model.chamber.contributions import chamber_status
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.reduced_model.terms import ModelUsed
-from ringbalance.results.findings import Finding
 from ringbalance.results.result import PresentedResult
+from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 from ringbalance.physics.gas import GasLine
 from ringbalance.reduced_model.injection.dynamics import Dynamics, gives_forces
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import (
     FILLING,

@@ -25,7 +25,7 @@ from ringbalance.identification.parameters import FitError, Parameter
 from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
-from ringbalance.physics.tube.uncertainty import BUILT_CAUSES, MODEL_CAUSES
+from ringbalance.physics.tube.loss import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.scene.joint import with_model_error
 from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene

@@ -20,19 +20,18 @@ import numpy as np
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.physics.results import Status
 from ringbalance.reduced_model.calibration import chamber_and_law
+from ringbalance.reduced_model.chamber.contributions import chamber_fills, chamber_status
 from ringbalance.reduced_model.chamber.element_check import ImportedElements, scene_ring
-from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.chamber.values import RingValues, paper_closed_forms
-from ringbalance.reduced_model.law.building import nominal_law
+from ringbalance.reduced_model.law.calibrated_law import nominal_law
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.terms import TERMS, models_used
 from ringbalance.results.numbers import MISSING, number, percent
-from ringbalance.results.result import Result, Rows
+from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Quantity
-from ringbalance.results.table import Table
 from ringbalance.scene import load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.joint import without_fitted
@@ -181,6 +180,7 @@ def models_table(quantity: Record, times: Mapping[str, Sequence[Record]]) -> Tab
         heads=("Model", "Error", "Designs a second"),
         rows=rows,
         note="" if quantity["status"]["code"] == "ok" else quantity["status"]["text"],
+        style="",
     )
 
 

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
 from ringbalance.controller.formulas import valve_time
 from ringbalance.controller.loop_records import LOOP, NO_PHASE, RUN, TOO_SHORT, UNUSABLE, USABLE, Record
-from ringbalance.reduced_model.injection.records import MOTION
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.reduced_model.injection.dynamics import MOTION
+from ringbalance.scene.platform.compiled import in_place
 
 NO_SAMPLE: Final = "no usable sample"
 """Reason that every algorithm gives for doing nothing on a dropped sample or a NaN."""

@@ -9,8 +9,8 @@ from ringbalance.controller.algorithms.trial import Trial
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene

@@ -20,13 +20,13 @@ from ringbalance.controller.loop_records import LAW_BASED, Record
 from ringbalance.controller.moment_table import MomentTable, pair_moment
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.injection.column import steady
+from ringbalance.reduced_model.injection.dynamics import EVENTS, WORKSPACE, Event, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance
 from ringbalance.reduced_model.injection.pair import Motion, packed
-from ringbalance.reduced_model.injection.records import EVENTS, WORKSPACE, Event, X
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 PRIOR_STANDARD_DEVIATION: Final = 0.5
 """Standard deviation, relative, of the assumed influence coefficient before the first operation."""

@@ -10,7 +10,7 @@ from typing import Final, Literal
 from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
 from ringbalance.controller.formulas import vector_gas_time, vector_shares
 from ringbalance.controller.loop_records import TARGET_VECTOR, Record
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 OnReversal = Literal["reset", "accumulate"]
 _vector_gas_time: Final = in_place(vector_gas_time)

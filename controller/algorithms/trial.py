@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
 from ringbalance.controller.loop_records import NO_PHASE, TRIAL, Record
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 
 @dataclass(frozen=True, kw_only=True)

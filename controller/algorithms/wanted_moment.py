@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.loop_records import Record
 from ringbalance.controller.moment_table import pair_moment
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 END_STEP: Final = 1e-3
 """Share of the range of x over which a slope at its end is taken."""

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.chamber.closed_forms import measured_closed_forms
+from ringbalance.reduced_model.chamber.values import measured_closed_forms
 from ringbalance.reduced_model.core import Answers
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, in_batches

@@ -15,9 +15,9 @@ from ringbalance.controller.checks import check_fit
 from ringbalance.controller.ensemble.run import EnsemblePlan, MemberRuns
 from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
-from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError

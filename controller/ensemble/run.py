@@ -14,8 +14,8 @@ from ringbalance.controller.formulas import AT_REST, HELD, IDLE, NOTICEABLE, RIS
 from ringbalance.controller.loop_plan import LoopPlan, Records
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import Drawing
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import Drawing
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene

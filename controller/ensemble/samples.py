@@ -18,10 +18,9 @@ from ringbalance.controller.ensemble.fitted_effects import (
     fitted_effects,
 )
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
-from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.operating.residual import FACTOR, Drawing
+from ringbalance.reduced_model.residual_liquid import FACTOR, Drawing
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, Scene
 from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value

@@ -38,14 +38,14 @@ from ringbalance.controller.tuning.search import recommended
 from ringbalance.controller.tuning.settling import drawn_run
 from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.calibration import calibrated_model, chamber_and_law, law_by_name
-from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import gives_forces
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel, completed_model, lacking
+from ringbalance.reduced_model.law.flow_law import BalancerModel, completed_model, lacking
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
-from ringbalance.results.findings import Finding
 from ringbalance.results.result import Rows
+from ringbalance.results.rows import Finding
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths

@@ -11,12 +11,10 @@ import numpy as np
 
 from ringbalance.controller.formulas import NOTICEABLE
 from ringbalance.controller.rotor import chamber_directions
-from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
 from ringbalance.reduced_model.injection.pair import PairState, Record, opened, pass_time
-from ringbalance.reduced_model.injection.records import Event
-from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import stalled_fill_ratio
+from ringbalance.reduced_model.law.flow_law import BalancerModel, FlowLaw, Regime
+from ringbalance.reduced_model.residual_liquid import stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Disc

@@ -30,8 +30,8 @@ from ringbalance.controller.liquid_ring.reach import (
 from ringbalance.controller.loop_records import RUN
 from ringbalance.controller.moment_table import MomentTable
 from ringbalance.controller.rotor import chamber_directions
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio, stalled_fill_ratio
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

@@ -17,10 +17,9 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_gas
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import Drawing, Holding, stalled_fill_ratio
-from ringbalance.results.findings import Finding
-from ringbalance.results.rows import Quantity
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import Drawing, Holding, stalled_fill_ratio
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene

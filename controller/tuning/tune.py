@@ -35,9 +35,9 @@ from ringbalance.controller.tuning.search import (
 )
 from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
 from ringbalance.controller.tuning.view import tuning_rows
-from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import neglected_in_injections
 from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import finite

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from ringbalance.reports.section import Record, Section, Table
+from ringbalance.reports.section import Record, Section
+from ringbalance.results.result import Table
 from ringbalance.verification.extremes.study import axis_rows
 
 CASE: Final = "extremes"

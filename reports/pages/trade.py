@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.section import Record, Section, Table, Work
+from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.result import Table
 from ringbalance.scene.models import Scene
 from ringbalance.verification.trade import TradeStudy, error_text, models_table, trade_study
 
@@ -50,7 +51,7 @@ def _quantity(quantity: Record, times: Record) -> Record:
     return {
         "title": title,
         "status": table.note,
-        "models": Table(caption=table.caption, heads=table.heads, rows=table.rows, style=""),
+        "models": table,
         "figure": _figure(quantity, speed, title),
     }
 

@@ -17,7 +17,7 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene

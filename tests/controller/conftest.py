@@ -17,8 +17,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection import column
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage, Switch, pass_time
-from ringbalance.reduced_model.law.flow_law import Flow, Regime
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.arrays import BoolArray, FloatArray

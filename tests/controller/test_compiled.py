@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from ringbalance.controller import compiled_loop, moment_table
-from ringbalance.scene.platform.compilation.compiled import compiled, compiled_sources
+from ringbalance.scene.platform.compiled import compiled, compiled_sources
 
 
 def _sum_of_sines(values: np.ndarray[Any, np.dtype[np.float64]], factor: float) -> float:
@@ -66,7 +66,7 @@ def test_what_compiled_code_alone_calls_has_no_machine_code_of_its_own() -> None
 PROGRAM = """
 import numba
 from numba.core import config
-from ringbalance.scene.platform.compilation.compiled import compiled, compiled_sources
+from ringbalance.scene.platform.compiled import compiled, compiled_sources
 from ringbalance.controller import compiled_loop
 before = config.CACHE_DIR
 def twice(x):

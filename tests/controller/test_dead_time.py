@@ -26,7 +26,7 @@ from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.tune import tune, tuning_document
 from ringbalance.reduced_model.gas_line import line_answers, line_warning, standing_amplitude
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_middle
 from ringbalance.scene.models import Scene
 

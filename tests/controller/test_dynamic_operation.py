@@ -15,12 +15,10 @@ from scipy.optimize import brentq
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
 from ringbalance.reduced_model.injection.pair import PairState, Passage, pass_time
-from ringbalance.reduced_model.injection.records import Event
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, Scene
 

@@ -23,11 +23,9 @@ from ringbalance.reduced_model.gas_line import (
     line_text,
     line_warning,
 )
-from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.injections import Injections
-from ringbalance.reduced_model.injection.pair import Passage
-from ringbalance.reduced_model.injection.records import Event
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
+from ringbalance.reduced_model.injection.pair import Injections, Passage
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.models import Scene
 

@@ -23,9 +23,9 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.loop_records import LOOP, MOMENT_NODES, RUN
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
+from ringbalance.reduced_model.injection.dynamics import WORKSPACE
 from ringbalance.reduced_model.injection.pair import Motion, packed
-from ringbalance.reduced_model.injection.records import WORKSPACE
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.scene.models import Scene
 

@@ -8,7 +8,7 @@ import pytest
 
 from ringbalance.controller.line_runs import line_runs, line_runs_document, line_runs_table
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 
 

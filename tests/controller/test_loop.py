@@ -18,7 +18,7 @@ from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import MAX_SAMPLES, simulate
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene

@@ -13,7 +13,7 @@ import pytest
 from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.liquid_ring.reach import starting_pressure
 from ringbalance.controller.rotor import chamber_directions, chamber_letters, disc_unbalance, wrapped
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 

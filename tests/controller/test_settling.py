@@ -27,9 +27,9 @@ from ringbalance.controller.tuning.loop_factor import (
 )
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.injection.pair import PairState
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.models import Scene
 
 RingOf = Callable[..., LiquidRing]

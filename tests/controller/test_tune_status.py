@@ -19,7 +19,7 @@ from ringbalance.controller.tuning.search import Candidate, Search, search, with
 from ringbalance.controller.tuning.settling import SettlingTimes
 from ringbalance.controller.tuning.tune import _status_of, tune
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty

@@ -10,11 +10,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import number
-from ringbalance.results.result import Result, Rows
-from ringbalance.results.rows import Quantity
-from ringbalance.results.table import Cells, Table
+from ringbalance.results.result import Cells, Result, Rows, Table
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import AXES, Axis

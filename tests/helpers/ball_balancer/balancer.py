@@ -27,9 +27,8 @@ from ringbalance.controller.balancer import (
     with_settings,
 )
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
-from ringbalance.results.findings import Finding
 from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.uncertain import NORMAL_95
 

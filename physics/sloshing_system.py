@@ -39,7 +39,7 @@ from skfem.models.poisson import mass, unit_load
 
 from ringbalance.mesh.chamber import FREE_SURFACE, chamber_mesh
 from ringbalance.mesh.section import Section, middle_section
-from ringbalance.physics.pressure.elements import stiffness
+from ringbalance.physics.pressure.solve import stiffness
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 from ringbalance.scene.models import Disc

@@ -15,7 +15,7 @@ from ringbalance.physics.tube.draw_down import port_depth
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.tube.flow import column_pressure, tube_path
-from ringbalance.results.findings import Finding
+from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import half_widths

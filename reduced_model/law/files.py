@@ -13,8 +13,7 @@ from typing import Any, Final, cast
 import numpy as np
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
-from ringbalance.reduced_model.law.flow_law import FORMAT, VERSION
-from ringbalance.reduced_model.law.model import CompleteLaw
+from ringbalance.reduced_model.law.flow_law import FORMAT, VERSION, CompleteLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment
 from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty

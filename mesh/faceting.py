@@ -15,9 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.cut.integrals import gauss
-from ringbalance.mesh.cut.patches import wall_patches
-from ringbalance.mesh.cut.table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
+from ringbalance.mesh.chamber_table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
+from ringbalance.mesh.wall_integrals import gauss, wall_patches
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, edges_of
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
@@ -59,7 +58,7 @@ class _Faceting:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DrawingError:
+class _DrawingError:
     """Expanded uncertainties (95 %) by facets and table, along the fills."""
 
     volume: float
@@ -81,7 +80,7 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
     patches, outer = wall_patches(geometry)
     first, second, ends = _shared_edges(facets[:, :corners])
     areas = _areas(patches)
-    normals = normals_at(patches, *np.array(_MIDDLES[corners]).T).reshape(-1, 3)
+    normals = _normals_at(patches, *np.array(_MIDDLES[corners]).T).reshape(-1, 3)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     bend = np.arccos(np.clip((normals[first] * normals[second]).sum(axis=1), -1, 1))
     shares = _share(geometry, facets, corners)
@@ -105,11 +104,11 @@ def faceting(geometry: ChamberGeometry) -> _Faceting:
 
 def _areas(patches: FloatArray) -> FloatArray:
     places, weights = gauss(3)
-    normals = normals_at(patches, np.repeat(places, 3), np.tile(places, 3))
+    normals = _normals_at(patches, np.repeat(places, 3), np.tile(places, 3))
     return np.asarray(np.linalg.norm(normals, axis=-1) @ np.outer(weights, weights).ravel())
 
 
-def normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
+def _normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
     """X_u x X_v at points, shape (patches, points, 3)."""
     one, zero = np.ones_like(u), np.zeros_like(u)
     at = [np.stack([one, t, t**2]) for t in (u, v)]
@@ -137,7 +136,7 @@ def _share(geometry: ChamberGeometry, facets: IntArray, corners: int) -> FloatAr
     return np.where(straight, _FLAT, _QUADRATIC)
 
 
-def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> DrawingError:
+def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> _DrawingError:
     """Expanded uncertainties by facets in place of curved walls, and by the table between its nodes.
 
     At a fixed fill ratio the surface moves by what the whole chamber and by what the wet walls hold more;
@@ -155,7 +154,7 @@ def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> Drawi
     aside = np.abs(
         [table.surface(np.sqrt(np.maximum(level + s * moved, 0.0)))[1] - centroid for s in (-1, 1)]
     )
-    return DrawingError(
+    return _DrawingError(
         volume=float(missed.sum()) + TOLERANCE * table.volume,
         moment=turned + TOLERANCE * table.columns[1, 0],
         centroid=aside.max(axis=0) + (missed.sum() / table.volume + SLOPE_TOLERANCE) * centroid,
@@ -199,7 +198,7 @@ def inward_share(geometry: ChamberGeometry) -> float:
     u, v = np.repeat(places, 3), np.tile(places, 3)
     powers = np.einsum("ip,jp->ijp", *(np.stack([np.ones_like(t), t, t**2]) for t in (u, v)))
     at = np.einsum("nijx,ijp->npx", patches[outer], powers)
-    normals = normals_at(patches[outer], u, v)
+    normals = _normals_at(patches[outer], u, v)
     area = np.linalg.norm(normals, axis=-1)
     radial = (normals[..., :2] * at[..., :2]).sum(axis=-1)
     inward = radial < _INWARD * area * np.linalg.norm(at[..., :2], axis=-1)

@@ -1,12 +1,16 @@
 """Integrals over the liquid outside a free surface, exactly, by integrals over the walls alone.
 
-The liquid is where q = |r - c|^2 - s z exceeds L: outside a circle about c (s = 0) or a paraboloid.  With
-h = q - L, w = (r - c).n/|r - c|^2 dA, e the direction of r - c across the shaft and a^2 = |r - c|^2 - h, the
+The walls of an imported chamber are polynomial patches, X(u, v) = sum c_ij u^i v^j, i and j up to 2. Facets
+of all kinds are of that form: bilinear and serendipity quadrilaterals as they are, triangles with their
+corner 2 drawn out to the side v = 1, xi = u (1 - v), eta = v.
+
+The liquid is where q = |r - c|^2 - s z exceeds L: outside a circle about c (s = 0) or a paraboloid. With h =
+q - L, w = (r - c).n/|r - c|^2 dA, e the direction of r - c across the shaft and a^2 = |r - c|^2 - h, the
 divergence theorem gives, over the walls outside the surface,
 
     V = int h/2 w,    int (r - c) dV = int (|r - c|^3 - a^3)/3 e w,
 
-because h e/(2 |r - c|) has the divergence 1 and vanishes on the free surface.  A wall that the surface
+because h e/(2 |r - c|) has the divergence 1 and vanishes on the free surface. A wall that the surface
 crosses is halved until the crossing is a graph over one of its two coordinates; then Gauss points on either
 side of its ends give all digits.
 """
@@ -15,12 +19,113 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from math import comb
 from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.cut.patches import halved, mirror, to_bernstein
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, key_of
+from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
+
+Powers = tuple[tuple[int, int], ...]
+_QUAD: Final[Powers] = ((0, 0), (1, 0), (1, 1), (0, 1))
+_SERENDIPITY: Final[Powers] = (*_QUAD, (2, 0), (0, 2), (2, 1), (1, 2))
+_TRIANGLE: Final[Powers] = ((0, 0), (1, 0), (0, 1))
+_SHAPES: Final[dict[int, tuple[Powers, Powers]]] = {
+    3: (_TRIANGLE, ((0, 0), (2, 0), (0, 2))),
+    6: (((*_TRIANGLE, (2, 0), (1, 1), (0, 2))), ((0, 0), (2, 0), (0, 2), (1, 0), (1, 1), (0, 1))),
+    4: (_QUAD, ((0, 0), (2, 0), (2, 2), (0, 2))),
+    8: (_SERENDIPITY, ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1))),
+    9: (
+        (*_SERENDIPITY, (2, 2)),
+        ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)),
+    ),
+}
+"""Monomials, and places of the nodes in halves, by the number of nodes."""
+
+
+@cache
+def _coefficients(nodes: int) -> FloatArray:
+    """From the places of a facet's nodes to c_ij, shape (9, nodes)."""
+    monomials, places = _SHAPES[nodes]
+    xi, eta = (np.array(p) / 2 for p in zip(*places, strict=True))
+    local = np.linalg.inv(np.stack([xi**i * eta**j for i, j in monomials], axis=1))
+    spread = np.zeros((3, 3, nodes))
+    for (i, j), row in zip(monomials, local, strict=True):
+        if nodes in (3, 6):  # u^i (1 - v)^i v^j
+            for k in range(i + 1):
+                spread[i, j + k] += comb(i, k) * (-1) ** k * row
+        else:
+            spread[i, j] += row
+    return spread.reshape(9, nodes)
+
+
+def wall_patches(geometry: ChamberGeometry) -> tuple[FloatArray, BoolArray]:
+    """All walls of a chamber, X_u x X_v outward.
+
+    Returns: c, m, shape (patches, 3, 3, 3) by power of u, of v, and axis; whether it is of the outer wall.
+    """
+    facets = boundary_facets(geometry)
+    patches = _coefficients(facets.shape[1]) @ geometry.points[facets]
+    corners, nodes = corners_of(geometry.kind), len(geometry.points)
+    outer = key_of(geometry.boundaries[OUTER_WALL][:, :corners], nodes)
+    return patches.reshape(-1, 3, 3, 3), np.isin(key_of(facets[:, :corners], nodes), outer)
+
+
+@cache
+def _to_bernstein(degree: int) -> FloatArray:
+    """From powers to Bernstein coefficients, by which a polynomial is bounded on [0, 1]."""
+    size = degree + 1
+    return np.array([[comb(j, i) / comb(degree, i) for i in range(size)] for j in range(size)])
+
+
+@cache
+def _half_maps(degree: int) -> tuple[FloatArray, ...]:
+    """On powers: of the two halves of [0, 1]."""
+    to = _to_bernstein(degree)
+    low = np.array([[comb(j, i) / 2**j for i in range(degree + 1)] for j in range(degree + 1)])
+    return tuple(np.asarray(np.linalg.solve(to, half @ to)) for half in (low, low[::-1, ::-1]))
+
+
+@cache
+def _mirror(degree: int) -> FloatArray:
+    """On powers: from u to 1 - u."""
+    to = _to_bernstein(degree)
+    return np.asarray(np.linalg.solve(to, to[::-1]))
+
+
+def _halved(values: FloatArray, *, across: BoolArray) -> FloatArray:
+    """The polynomials sum c_ij u^i v^j on both halves of the unit square, shape (2 n, ...).
+
+    Args: `across`: whether it is cut at v = 1/2 and not at u = 1/2, shape (n,).
+    """
+    turned = np.where(across.reshape(-1, *[1] * (values.ndim - 1)), values.swapaxes(1, 2), values)
+    parts = [np.einsum("ai,ni...->na...", half, turned) for half in _half_maps(values.shape[1] - 1)]
+    return np.concatenate(
+        [np.where(across.reshape(-1, *[1] * (values.ndim - 1)), p.swapaxes(1, 2), p) for p in parts]
+    )
+
+
+def split_patches(patches: FloatArray, flags: BoolArray, *, longest: float) -> tuple[FloatArray, BoolArray]:
+    """Patches halved until none is longer across the shaft than a share of its distance from it."""
+    done: list[tuple[FloatArray, BoolArray]] = []
+    for _ in range(_SPLITS):
+        control = np.einsum("ai,bj,nijx->nabx", _to_bernstein(2), _to_bernstein(2), patches)[..., :2]
+        distance = np.linalg.norm(control, axis=-1).mean(axis=(1, 2))
+        length = [np.linalg.norm(np.ptp(control, axis=a), axis=-1).max(axis=1) for a in (1, 2)]
+        large = np.maximum(*length) > longest * distance
+        done.append((patches[~large], flags[~large]))
+        patches, flags = (
+            _halved(patches[large], across=(length[1] > length[0])[large]),
+            np.tile(flags[large], 2),
+        )
+    done.append((patches, flags))
+    return np.concatenate([p for p, _ in done]), np.concatenate([f for _, f in done])
+
+
+_SPLITS: Final = 16
+
 
 PLAIN_POINTS: Final = 6
 """Gauss points along each side of a patch that no surface crosses."""
@@ -92,7 +197,7 @@ def walls_about(
 
 
 def _bernstein(level: FloatArray) -> FloatArray:
-    to = to_bernstein(4)
+    to = _to_bernstein(4)
     return np.asarray(to @ level @ to.T)
 
 
@@ -202,7 +307,7 @@ def _crossed(walls: Walls, levels: FloatArray, patch: IntArray, number: IntArray
         flat = np.abs(np.diff(bounds[left], axis=1)).max(axis=(1, 2)) < np.abs(
             np.diff(bounds[left], axis=2)
         ).max(axis=(1, 2))
-        patches, excess = halved(patches[left], across=flat), halved(excess[left], across=flat)
+        patches, excess = _halved(patches[left], across=flat), _halved(excess[left], across=flat)
         outer, number, share = (np.tile(each[left], 2) for each in (outer, number, share / 2))
     return total
 
@@ -215,7 +320,7 @@ def _size(walls: Walls) -> float:
 def _turned(values: FloatArray) -> FloatArray:
     """The same polynomials of v and 1 - u, which keeps the direction of X_u x X_v."""
     size = values.shape[1]
-    mirrored = np.tensordot(values, mirror(size - 1), axes=(1, 1))
+    mirrored = np.tensordot(values, _mirror(size - 1), axes=(1, 1))
     return np.moveaxis(mirrored, -1, 1).swapaxes(1, 2)
 
 

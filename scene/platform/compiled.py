@@ -3,23 +3,32 @@
 Numba looks only at a function's own file to see whether kept code is stale, though it holds the code of
 every compiled function that it calls.  The files that it is kept in are therefore named after all of their
 sources.
+
+Numba turns a result that is an array or a named tuple into a Python object by calling Python functions, and
+does not look whether such a call failed.  A signal that has arrived during the compiled call is handled in
+the first of them: when its handler raises, as that of Ctrl-C does, an array ends in an error of the
+interpreter, and a named tuple, with a null pointer in it, the process in a segmentation fault.  Handlers
+therefore only take note during the call, and act after it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
+from types import FrameType
 from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
 from numba.core import registry, sigutils, types
 from numba.core.compiler_lock import global_compiler_lock
 
-from ringbalance.scene.platform.compilation.cache import KeptCode
-from ringbalance.scene.platform.compilation.signals import signals_deferred, signals_live
+from ringbalance.scene.platform.kept_code import KeptCode
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -158,11 +167,11 @@ class _Guarded(_Called):
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the compiled function."""
-        with signals_deferred():
+        with _signals_deferred():
             return super().__call__(*args, **kwargs)
 
     def _compile_for_args(self, *args: Any, **kwargs: Any) -> Any:
-        with signals_live():
+        with _signals_live():
             return super()._compile_for_args(*args, **kwargs)
 
 
@@ -180,8 +189,91 @@ _COMPILED: Final = ("controller", "reduced_model/injection")
 
 def compiled_sources() -> tuple[Path, ...]:
     """Every source that holds functions that are compiled, and the machinery's own."""
-    machinery, root = Path(__file__).parent, Path(__file__).parents[3]
+    here, root = Path(__file__), Path(__file__).parents[2]
     plain = {root / "controller/formulas.py", root / "physics/gas.py"}
     sources = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
     marked = [path for path in sources if _MARK in path.read_bytes()]
-    return tuple(sorted([*machinery.glob("*.py"), *plain, *marked]))
+    return tuple(sorted([here, here.with_name("kept_code.py"), *plain, *marked]))
+
+
+_Handler = Callable[[int, FrameType | None], Any]
+
+_NAMES: Final = (
+    "SIGINT",
+    "SIGTERM",
+    "SIGHUP",
+    "SIGBREAK",
+    "SIGALRM",
+    "SIGPROF",
+    "SIGVTALRM",
+    "SIGXCPU",
+    "SIGUSR1",
+    "SIGUSR2",
+)
+_SIGNALS: Final = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
+"""Whose handlers may raise: those that end a program or limit its time."""
+
+
+class _Deferred:
+    """A signal's handler that takes note; the one before it is called later."""
+
+    def __init__(self, before: _Handler) -> None:
+        self.before = before
+        self.arrived = False
+
+    def __call__(self, _number: int, _frame: FrameType | None) -> None:
+        """Take note."""
+        self.arrived = True
+
+
+@contextmanager
+def _signals_deferred() -> Iterator[None]:
+    """Let Python's signal handlers act at the end of the block, in the main thread; elsewhere none ever run.
+
+    _Handlers that are not Python functions, such as the system's own for SIGTERM, act at once as before.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    deferred: dict[int, _Deferred] = {}
+    try:
+        for number in _SIGNALS:
+            before = signal.getsignal(number)
+            if callable(before) and not isinstance(before, _Deferred):
+                deferred[number] = _Deferred(before)
+                signal.signal(number, deferred[number])
+        yield
+    finally:
+        _give_back(deferred)
+
+
+def _give_back(deferred: dict[int, _Deferred]) -> None:
+    """Put every handler back into its place, whatever those raise whose signal has arrived."""
+    if not deferred:
+        return
+    number, handler = deferred.popitem()
+    try:
+        signal.signal(number, handler.before)
+        if handler.arrived:
+            handler.before(number, None)
+    finally:
+        _give_back(deferred)
+
+
+@contextmanager
+def _signals_live() -> Iterator[None]:
+    """Within `_signals_deferred`: let handlers act at once again, for Python code that takes long."""
+    main = threading.current_thread() is threading.main_thread()
+    found = {number: signal.getsignal(number) for number in _SIGNALS} if main else {}
+    deferred = {number: held for number, held in found.items() if isinstance(held, _Deferred)}
+    try:
+        for number, handler in deferred.items():
+            signal.signal(number, handler.before)
+        for number, handler in deferred.items():
+            if handler.arrived:
+                handler.arrived = False
+                handler.before(number, None)
+        yield
+    finally:
+        for number, handler in deferred.items():
+            signal.signal(number, handler)

@@ -10,9 +10,9 @@ import numpy.typing as npt
 import pytest
 from block_discs import imported, turned
 
-from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.ensemble.samples import Members
+from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.members import Members
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.law.calibrated_law import nominal_law
 from ringbalance.reduced_model.law.flow_law import BalancerModel, MomentCurve

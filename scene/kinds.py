@@ -102,15 +102,15 @@ def written(value: float, unit: str) -> str:
     return format_quantity(value, _DIMENSIONS[unit], unit)
 
 
-def above_noise(key: str, unit: str) -> Rule:
-    """A limit is above the standard deviation, `key` of [sensor], of what it is compared with."""
+def limit_above_noise(noise_key: str, unit: str) -> Rule:
+    """The rule that a limit is above the standard deviation of what is measured."""
 
-    def rule(limit: float, noise: float) -> Finding | None:
+    def above(limit: float, noise: float) -> Finding | None:
         if limit > noise:
             return None
+        least = written(noise, unit)
         return Finding(
-            problem=f"the limit is below the sensor noise ({key} {written(noise, unit)})",
-            allowed=f"above {written(noise, unit)}",
+            problem=f"the limit is below the sensor noise ({noise_key} {least})", allowed=f"above {least}"
         )
 
-    return rule
+    return above

@@ -10,7 +10,16 @@ from typing import Final
 from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS, SpeedPoint
 from ringbalance.scene.keys.declaration import Entries
 from ringbalance.scene.keys.schema import ORIGIN
-from ringbalance.scene.kinds import Check, Finding, Rule, SceneKind, above_noise, check, reader_of, written
+from ringbalance.scene.kinds import (
+    Check,
+    Finding,
+    Rule,
+    SceneKind,
+    check,
+    limit_above_noise,
+    reader_of,
+    written,
+)
 
 _ROUNDING = 1e-9
 
@@ -121,7 +130,7 @@ CHECKS: tuple[Check, ...] = (
     check(_masses_apart, "masses.initial_angle", _ARC, _GUIDE, moot=(_masses_fit_track,)),
     *(check(_step_is_multiple, step, "sensor.step") for step in _STEPS),
     check(_moves_in_order, "fine_tuning.stop", "fine_tuning.step"),
-    check(above_noise("position_noise", "mm"), "supervisor.limit", "sensor.position_noise"),
+    check(limit_above_noise("position_noise", "mm"), "supervisor.limit", "sensor.position_noise"),
     *_width_checks(),
 )
 

@@ -26,7 +26,7 @@ from typing import Final
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.fields import LETTERS
 from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.kinds import Check, Finding, above_noise, check, written
+from ringbalance.scene.kinds import Check, Finding, check, limit_above_noise, written
 from ringbalance.scene.models import Liquid
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
@@ -191,7 +191,7 @@ CHECKS: tuple[Check, ...] = (
     ),
     check(_gas_times_in_order, *_GAS_TIMES),
     check(period_covers_lag, "controller.period", "gas.valve_lag"),
-    check(above_noise("amplitude_noise", "um"), "controller.limit", "sensor.amplitude_noise"),
+    check(limit_above_noise("amplitude_noise", "um"), "controller.limit", "sensor.amplitude_noise"),
     *(
         check(_trial_time_executed, path, *_GAS_TIMES, when=_by_trial, moot=(_gas_times_in_order,))
         for path in _TRIAL_TIMES

@@ -13,7 +13,7 @@ import pytest
 from synthetic_rigs import Rig, fitted, rig
 
 from ringbalance.cli import main
-from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
+from ringbalance.controller.members import Members, MemberUncertainty
 from ringbalance.identification.balancers import changed
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.device import Device, Models

@@ -1,29 +1,25 @@
-"""The members of an ensemble: what differs between them."""
+"""The members of an ensemble: what differs between them, with what was fitted together."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.ensemble.fitted_effects import (
-    INFLUENCE,
-    LAG,
-    LINE_KEYS,
-    MOMENT,
-    RATE,
-    fitted_effects,
-)
+from ringbalance.reduced_model.chamber.values import measured_closed_forms
+from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.residual_liquid import FACTOR, Drawing
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs, in_batches
 from ringbalance.scene.models import Gas, Scene
-from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value
+from ringbalance.scene.uncertain import NORMAL_95, direction_sides, half_widths, nominal_value
 
 BLOCK: Final = 8192
 """Members that are drawn and carried together."""
@@ -35,6 +31,10 @@ LARGEST_RATIO: Final = 0.99
 """A critical ratio is below one."""
 ASSUMED_INFLUENCE: Final = 0.05
 ASSUMED_LAG: Final = math.radians(3.0)
+LINE_KEYS: Final = ("conductance", "critical_ratio", "dead_volume", "valve_lag")
+"""Of a chamber's gas line, which drawn devices may have of their own."""
+RATE, MOMENT, INFLUENCE, LAG = range(4)
+"""Rows of `_fitted_effects` before those of `LINE_KEYS`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class MemberUncertainty:
     draw_down: float = 0.0
     """Relative, of the depth over a port at which gas enters it."""
     together: FloatArray | None = None
-    """`fitted_effects` of inputs that were fitted together, which are in none of the others; None: none."""
+    """`_fitted_effects` of inputs that were fitted together, which are in none of the others; None: none."""
 
     @property
     def whole_lag_angle(self) -> float:
@@ -88,7 +88,7 @@ class MemberUncertainty:
         coefficient = scene.rotor.influence_coefficient
         together = None
         if scene.fitted.quantities:
-            together = fitted_effects(scene, of_flow=isinstance(model.flow, CalibratedLaw))
+            together = _fitted_effects(scene, of_flow=isinstance(model.flow, CalibratedLaw))
         return cls(
             velocity=velocity[0],
             moment=moment[0],
@@ -200,7 +200,7 @@ class Members:
 
 
 def _drawn_together(effects: FloatArray | None, *, seed: int, block: int) -> tuple[FloatArray, FloatArray]:
-    """Factors by what was fitted together, rows as in `fitted_effects`, and changes of the lag angle."""
+    """Factors by what was fitted together, rows as in `_fitted_effects`, and changes of the lag angle."""
     if effects is None:
         return np.ones((LAG + 1 + len(LINE_KEYS), BLOCK)), np.zeros(BLOCK)
     random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(block, 2)))
@@ -268,3 +268,40 @@ def _moment(scene: Scene, model: BalancerModel) -> tuple[float, str]:
     if factor is None:
         return own, "the law's own, and the density"
     return math.hypot(own, factor / scene.disc.moment_factor), "the law's own, density and lambda's factor"
+
+
+def _fitted_effects(scene: Scene, *, of_flow: bool) -> FloatArray:
+    """Changes along each direction of the fitted inputs by one expanded uncertainty (95 %).
+
+    Args: `of_flow`: whether the flow is that of the scene's own tube, and not a law's that is given.
+    Returns: Shape (8, directions): of ln S u/V, the rate at which a chamber empties at equal fills; of ln U,
+        the moment; of ln kappa; of the lag angle, rad; and of the logarithms of `LINE_KEYS`.
+    """
+    sides = [side for both in direction_sides(scene).values() for side in both]
+    if not sides:
+        return np.zeros((LAG + 1 + len(LINE_KEYS), 0))
+    values = in_batches(sides, partial(_effects_on, of_flow=of_flow))
+    return np.asarray((values[:, 1::2] - values[:, ::2]) / 2)
+
+
+def _effects_on(designs: Designs, *, of_flow: bool) -> FloatArray:
+    scene, whole = designs.scene, np.ones(designs.size)
+    moment = measured_closed_forms(scene=scene, fill_ratio=scene.disc.max_fill_ratio)[1]
+    line = [getattr(scene.gas, key) for key in LINE_KEYS]
+    rows = [
+        _log_rate(designs) if of_flow else 0.0,
+        np.log(moment),
+        np.log(scene.rotor.influence_coefficient),
+        scene.rotor.lag_angle,
+        # A dead volume of zero has no logarithm, and no effect.
+        *(0.0 if value is None else np.log(np.where(np.asarray(value) > 0, value, 1.0)) for value in line),
+    ]
+    return np.array([row * whole for row in rows])
+
+
+def _log_rate(designs: Designs) -> FloatArray:
+    """ln(S u/V) of a primed tube; zero where nothing flows."""
+    answers = Answers.of(designs)
+    u = answers.primed_velocity
+    rate = designs.scene.tube.area * np.where(u > 0, u, 1.0) / answers.chamber_volume
+    return np.where(u > 0, np.log(rate), 0.0)

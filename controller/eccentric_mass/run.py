@@ -43,6 +43,7 @@ from ringbalance.controller.eccentric_mass.plant import (
 from ringbalance.controller.eccentric_mass.resolution import rotor_covariance
 from ringbalance.controller.eccentric_mass.run_record import (
     EccentricRun,
+    Record,
     StageSpan,
     eccentric_document,
     eccentric_rows,
@@ -82,33 +83,6 @@ class _Profile(NamedTuple):
     """Of the corners, s."""
     speeds: FloatArray
     """At the corners, rad/s."""
-
-
-class Record(NamedTuple):
-    """What one run leaves, a row for each sample."""
-
-    state: FloatArray
-    """Of the plant, shape (n, 8)."""
-    voltage: FloatArray
-    """V, from this sample on, shape (n, 2)."""
-    energy: FloatArray
-    """Electrical, taken since the start, J, shape (n,)."""
-    stage: IntArray
-    """Shape (n,)."""
-    cause: IntArray
-    """Shape (n,)."""
-    hold: IntArray
-    """Shape (n,)."""
-    goal: FloatArray
-    """rad, shape (n, 2)."""
-    imbalance: FloatArray
-    """Estimate along the rotor's axes, kg m, shape (n, 2)."""
-    imbalance_covariance: FloatArray
-    """kg^2 m^2, shape (n, 2, 2)."""
-    friction_arm: FloatArray
-    """Estimates, m, shape (n, 2)."""
-    friction_variance: FloatArray
-    """m^2, shape (n, 2)."""
 
 
 def recorded(

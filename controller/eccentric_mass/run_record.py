@@ -6,12 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from ringbalance.controller.document import amplitude_line
-from ringbalance.controller.eccentric_mass.run import Record
 from ringbalance.controller.eccentric_mass.targets import Targets
 from ringbalance.results.numbers import given
 from ringbalance.results.result import PresentedResult, Rows, Table
@@ -23,6 +22,33 @@ _NOTHING: Final = 1e-6
 """Share of the limit below which a vibration is round-off."""
 _FINAL_TIME: Final = 1.0
 """Over which the final amplitude is averaged, s."""
+
+
+class Record(NamedTuple):
+    """What one run leaves, a row for each sample."""
+
+    state: FloatArray
+    """Of the plant, shape (n, 8)."""
+    voltage: FloatArray
+    """V, from this sample on, shape (n, 2)."""
+    energy: FloatArray
+    """Electrical, taken since the start, J, shape (n,)."""
+    stage: IntArray
+    """Shape (n,)."""
+    cause: IntArray
+    """Shape (n,)."""
+    hold: IntArray
+    """Shape (n,)."""
+    goal: FloatArray
+    """rad, shape (n, 2)."""
+    imbalance: FloatArray
+    """Estimate along the rotor's axes, kg m, shape (n, 2)."""
+    imbalance_covariance: FloatArray
+    """kg^2 m^2, shape (n, 2, 2)."""
+    friction_arm: FloatArray
+    """Estimates, m, shape (n, 2)."""
+    friction_variance: FloatArray
+    """m^2, shape (n, 2)."""
 
 
 class EccentricOutcome(StrEnum):

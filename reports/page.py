@@ -14,7 +14,7 @@ from typing import Final
 
 from PIL import Image
 
-from ringbalance.reduced_model.budget import UNSTATED
+from ringbalance.reduced_model.calibration_record import UNSTATED
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
 from ringbalance.reports.figure import Drawing

@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from ringbalance.physics.gas import LAMINAR_RATIO, flow_shape, flow_shape_slope
-from ringbalance.reduced_model.injection.records import P, Record, X
+from ringbalance.reduced_model.injection.dynamics import P, Record, X
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import in_place, inlined
 

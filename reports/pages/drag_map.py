@@ -17,25 +17,23 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from ringbalance.physics.tube.loss import flow_states, range_notes
+from ringbalance.physics.tube.loss import TUBE_INPUTS, corrected_state, flow_states, model_parts, range_notes
 from ringbalance.physics.tube.state import TubeState
-from ringbalance.physics.tube.uncertainty import TUBE_INPUTS, corrected_state, model_parts
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
+from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.point import priming_pressure
+from ringbalance.reduced_model.operating_point import priming_pressure
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.reduced_model.tube.regime import TubeEnds, can_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
-from ringbalance.scene.joint import input_sides, without_fitted
 from ringbalance.scene.liquids import known_liquids, liquid_at
 from ringbalance.scene.models import HumpGas, Liquid, Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, input_sides, nominal_value, without_fitted
 
 BORES: Final = (0.2e-3, 5e-3)
 """m: the map's range, widened when the scene's own bore lies near its edge."""

@@ -33,7 +33,7 @@ from ringbalance.reports.run_figures import (
     over_time,
 )
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.summary import OPEN
+from ringbalance.results.requirements import OPEN
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
 _KEY: Final = re.compile(r"\b[a-z_]+\.[a-z_]+\b")

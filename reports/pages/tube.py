@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
+from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reports.figure import (
     AS_PAPER,
     FOUND,

@@ -1,4 +1,6 @@
-"""The friction formula beside a mixing-length solution, on smooth and on sand-rough walls.
+"""
+friction_blend: The blend of laminar and turbulent friction: exact where laminar, without a jump, one velocity a head.
+mixing_length: The friction formula beside a mixing-length solution, on smooth and on sand-rough walls.
 
 Turbulent flow in a straight tube by Prandtl's mixing length: in wall units (friction velocity, nu) the shear
 stress is tau = r/R of the wall's, and
@@ -7,6 +9,7 @@ stress is tau = r/R of the wall's, and
 
 so that the bulk velocity is U+ = int s r^2 dr/R^2.  l is Nikuradse's mixing length with van Driest's damping;
 sand undoes the damping and then moves the origin.
+
 """
 
 from __future__ import annotations
@@ -28,6 +31,42 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 from ringbalance.verification.validation.comparison import friction
 from ringbalance.verification.validation.kinds import measurements
+
+_TURBULENT: Final = 4000.0
+_STEP: Final = 1.01
+
+
+def friction_blend(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The blend of laminar and turbulent friction: exact where laminar, without a jump, one velocity a head."""
+    laminar = np.geomspace(1, 1000, 200)
+    sweep = np.exp(np.arange(np.log(100), np.log(1e5), np.log(_STEP)))
+    curve = _friction(sweep, defect)
+    found = {
+        "laminar": np.max(np.abs(_friction(laminar, defect) * laminar / 64 - 1)),
+        "jump": np.max(np.abs(np.diff(curve) / curve[:-1])),
+        "head_slope": np.min(np.diff(np.log(curve * sweep**2)) / np.log(_STEP)),
+    }
+    return Evidence(
+        found=as_found(**found),
+        series=(
+            figure(
+                "friction factor of a smooth tube",
+                ("Reynolds number", "1", sweep),
+                Curve("blend", "1", curve),
+                Curve("64/Re", "1", 64 / sweep, style="reference"),
+                log=True,
+            ),
+        ),
+    )
+
+
+def _friction(reynolds: FloatArray, defect: str | None) -> FloatArray:
+    f = friction_factor(reynolds=reynolds, relative_roughness=0.0)
+    if defect == "sudden_switch":
+        turbulent = 0.316 * reynolds**-0.25
+        return np.where(reynolds < 2040, 64 / reynolds, np.where(reynolds < _TURBULENT, turbulent, f))
+    return f / 4 if defect == "fanning_factor" else f
+
 
 _NIKURADSE_SLOPE = 0.4
 _UNDAMPED = 60.0
@@ -75,7 +114,17 @@ _CLOSURES: Final = MappingProxyType(
 )
 
 
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+def mixing_length(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The friction formula beside a mixing-length solution, on smooth and on sand-rough walls.
+
+    Turbulent flow in a straight tube by Prandtl's mixing length: in wall units (friction velocity, nu) the shear
+    stress is tau = r/R of the wall's, and
+
+        (1 + l^2 s) s = tau,    s = -du/dr = 2 tau/(1 + sqrt(1 + 4 l^2 tau)),    u(R) = 0
+
+    so that the bulk velocity is U+ = int s r^2 dr/R^2.  l is Nikuradse's mixing length with van Driest's damping;
+    sand undoes the damping and then moves the origin.
+    """
     closure = _CLOSURES[defect]
 
     def by_length(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:

@@ -1,4 +1,6 @@
-"""A tube with two bends over a crest, turning, solved in three dimensions; a heavy run."""
+"""
+bent_tube_3d: A tube with two bends over a crest, turning, solved in three dimensions; a heavy run.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,7 @@ _DEVELOPED: Final = (5.0, 1.0)
 """Where flow has developed again: from and to, bores before the outlet."""
 
 
-reference = dict.fromkeys(("straight", "explained"), Reference(value=1.0))
+_bent_tube_3d_reference = dict.fromkeys(("straight", "explained"), Reference(value=1.0))
 
 
 def path_over_crest(scene: Scene, refinement: float) -> tuple[Segment, ...]:
@@ -135,7 +137,8 @@ def _straight(flow: BentTubeFlow, scene: Scene) -> float:
     return gradient / (32 * float(table.value))
 
 
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """A tube with two bends over a crest, turning, solved in three dimensions; a heavy run."""
     meshes = _MESHES if defect is None else _MESHES[1:2]
     flows: list[BentTubeFlow] = []
     losses: list[float] = []

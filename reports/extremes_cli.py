@@ -13,8 +13,8 @@ from rich.padding import Padding
 from rich.table import Table
 
 from ringbalance.reports.pages.extremes import axis_rows
-from ringbalance.reports.section import Cells
 from ringbalance.results.numbers import number
+from ringbalance.results.result import Cells
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.faults import Fault, SceneError, toml_text
 from ringbalance.scene.loader import load_scene

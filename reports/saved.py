@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from ringbalance.reports.provenance import versions
 from ringbalance.scene.faults import toml_text
-from ringbalance.scene.platform.compilation.cache import (
+from ringbalance.scene.platform.kept_code import (
     OTHER,
     checked_content,
     code_root,

@@ -20,7 +20,7 @@ from typing import Any, get_args
 from cyclopts import App, CycloptsError, MissingArgumentError, Parameter, Token, UnknownCommandError, convert
 
 import ringbalance
-from ringbalance.scene.platform.processes import seldom_collected
+from ringbalance.scene.platform.garbage import seldom_collected
 from ringbalance.signals import interrupts
 from ringbalance.streams import discard_unwritten, drop_unusable_size, interpreter_error, prepare_streams
 

@@ -27,7 +27,7 @@ ErrorCause = Literal[
     "pressure of the cavity",
     "start of the flow",
 ]
-"""What a model may be off by: those of k, as `physics.tube.uncertainty.MODEL_CAUSES`, and those above."""
+"""What a model may be off by: those of k, as `physics.tube.loss.MODEL_CAUSES`, and those above."""
 ERROR_NAME: Final = re.compile(r"model: ([^,]+)(?:, (even|odd))?")
 """Name of one standard deviation of a cause's even part, where none is named, or of its odd part."""
 LARGEST_ERROR: Final = 2.5
@@ -39,7 +39,7 @@ Deviations = Annotated[float, number(Bounds(at_least=-100, at_most=100))]
 class ModelError:
     """Error of a model itself, supposed, drawn or fitted, in standard deviations of its stated uncertainty.
 
-    What the parts do stands with `physics.tube.uncertainty.with_errors`; of a cause beside k the first alone
+    What the parts do stands with `physics.tube.loss.with_errors`; of a cause beside k the first alone
     counts.
     """
 

@@ -24,11 +24,11 @@ from rich.text import Text
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.physics.results import Status
 from ringbalance.reduced_model.calibration import chamber_and_law
+from ringbalance.reduced_model.chamber.contributions import chamber_fills, chamber_status
 from ringbalance.reduced_model.chamber.element_check import ImportedElements, scene_ring
-from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.chamber.range import chamber_fills, chamber_status
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.chamber.values import RingValues, paper_closed_forms
-from ringbalance.reduced_model.law.building import nominal_law
+from ringbalance.reduced_model.law.calibrated_law import nominal_law
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT

@@ -10,11 +10,9 @@ import numpy as np
 
 from ringbalance.controller.document import amplitude_line
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import given
-from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity, around
-from ringbalance.results.table import Table
+from ringbalance.results.result import Rows, Table
+from ringbalance.results.rows import Finding, Quantity, around
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.uncertain import NORMAL_95
 

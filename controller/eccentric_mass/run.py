@@ -19,8 +19,8 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings, believed_whirl
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets, target_angles
-from ringbalance.results.findings import Finding
 from ringbalance.results.result import Presentation
+from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 

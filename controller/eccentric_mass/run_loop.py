@@ -27,7 +27,7 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
 from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 NOISES = 8
 """Random numbers that one sample takes: four of vibration, two angles, two rates."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.run_loop import Record
 from ringbalance.controller.eccentric_mass.strategy.targets import Targets
-from ringbalance.results.findings import Finding
 from ringbalance.results.result import PresentedResult
+from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 
 _NOTHING: Final = 1e-6

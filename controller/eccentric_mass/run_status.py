@@ -10,7 +10,7 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.strategy.plan import HELD, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.strategy.supervisor import STALLED_SHARE
-from ringbalance.results.findings import Finding, Value, sentences
+from ringbalance.results.rows import Finding, Value, sentences
 from ringbalance.scene.arrays import FloatArray
 
 _NOTICEABLE_STALL: Final = 0.05

@@ -7,12 +7,11 @@ the tables of such a file; all is loaded for such a file only.
 """
 
 import math
-import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
 
@@ -48,6 +47,7 @@ from ringbalance.scene.keys.fields import (
 from ringbalance.scene.keys.schema import Schema, Table
 from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.origins import InputUncertainty, SceneFile
+from ringbalance.scene.paths import moved_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 Frame = Literal["rotor", "laboratory"]
@@ -209,45 +209,6 @@ ECCENTRIC_MASS = Schema.of(
 """A scene whose balancer is two eccentric masses."""
 
 
-_PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[([01])\])?")
-
-
-def eccentric_value(scene: EccentricScene, path: str) -> float:
-    """SI value at a path, such as "rotor.mass" or "masses.friction_arm[0]"."""
-    table, key, entry = _placed(path)
-    value = getattr(getattr(scene, table), key)
-    return float(value if entry is None else value[entry])
-
-
-def eccentric_moved(scene: EccentricScene, path: str, move: Callable[[float], float]) -> EccentricScene:
-    """Copy a scene of eccentric masses with the value at a path moved, SI; nothing is checked again.
-
-    A path without an entry, such as "masses.friction_arm", moves the values of both masses.
-    """
-    table, key, entry = _placed(path)
-    record = getattr(scene, table)
-    value = getattr(record, key)
-    moved: Any
-    if isinstance(value, tuple):
-        moved = tuple(move(old) if entry in (None, place) else old for place, old in enumerate(value))
-    else:
-        moved = move(value)
-    changed: dict[str, Any] = {table: replace(record, **{key: moved})}
-    return replace(scene, **changed)
-
-
-def eccentric_with(scene: EccentricScene, value: float, *, name: str) -> EccentricScene:
-    """The same with a value in place of the one at a path."""
-    return eccentric_moved(scene, name, lambda _: value)
-
-
-def _placed(path: str) -> tuple[str, str, int | None]:
-    match = _PATH.fullmatch(path)
-    if match is None:
-        raise ValueError(f"{path!r} is no path of a scene")
-    return match[1], match[2], None if match[3] is None else int(match[3])
-
-
 def eccentric_drawn(scene: EccentricScene, random: np.random.Generator) -> EccentricScene:
     """The scene with every stated input drawn: relative ones log-normal, so that none changes its sign.
 
@@ -261,9 +222,9 @@ def eccentric_drawn(scene: EccentricScene, random: np.random.Generator) -> Eccen
         both = [f"{uncertain.quantity}[{place}]" for place in (0, 1)]
         alone = [name for name in both if name not in together]
         for path in [uncertain.quantity] if len(alone) == len(both) else alone:
-            scene = eccentric_moved(scene, path, move)
+            scene = moved_at(scene, path, move)
     for each, change in zip(scene.fitted.quantities, scene.fitted.drawn(random).tolist(), strict=True):
-        scene = eccentric_moved(scene, each.quantity, partial(_by, change, each.unit in _ANGLES))
+        scene = moved_at(scene, each.quantity, partial(_by, change, each.unit in _ANGLES))
     return scene
 
 

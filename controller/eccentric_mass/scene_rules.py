@@ -11,7 +11,7 @@ from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS, 
 from ringbalance.scene.keys.declaration import Entries
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import SceneKind
-from ringbalance.scene.rules.check import Check, Finding, Rule, check, reader_of, written
+from ringbalance.scene.rules.check import Check, Finding, Rule, check, limit_above_noise, reader_of, written
 
 _ROUNDING = 1e-9
 
@@ -85,16 +85,6 @@ def _moves_in_order(stop: float, step: float) -> Finding | None:
     )
 
 
-def _limit_above_position_noise(limit: float, noise: float) -> Finding | None:
-    """The limit is above the standard deviation of a measured coordinate."""
-    if limit > noise:
-        return None
-    return Finding(
-        problem=f"the limit is below the sensor noise (position_noise {written(noise, 'mm')})",
-        allowed=f"above {written(noise, 'mm')}",
-    )
-
-
 def _widths_below(names: tuple[str, ...]) -> Rule:
     """No stated uncertainty is larger than its quantity, of those whose values follow the widths."""
 
@@ -132,7 +122,7 @@ CHECKS: tuple[Check, ...] = (
     check(_masses_apart, "masses.initial_angle", _ARC, _GUIDE, moot=(_masses_fit_track,)),
     *(check(_step_is_multiple, step, "sensor.step") for step in _STEPS),
     check(_moves_in_order, "fine_tuning.stop", "fine_tuning.step"),
-    check(_limit_above_position_noise, "supervisor.limit", "sensor.position_noise"),
+    check(limit_above_noise("position_noise", "mm"), "supervisor.limit", "sensor.position_noise"),
     *_width_checks(),
 )
 

@@ -12,11 +12,11 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.ensemble.samples import MemberUncertainty, starting_flow
+from ringbalance.controller.members import MemberUncertainty, starting_flow
 from ringbalance.controller.tuning.loop_factor import LoopFactor, vibration_rates
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.scene.arrays import FloatArray

@@ -22,7 +22,7 @@ from ringbalance.identification.predict.injections import INJECTION
 from ringbalance.identification.predict.positionings import POSITIONING
 from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.tube.uncertainty import corrected_state
+from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ringbalance.physics.gas import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
-from ringbalance.physics.tube.uncertainty import corrected_state
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
+from ringbalance.physics.tube.loss import corrected_state
+from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.regime import (
     CLEARING_UNCERTAINTY,

@@ -11,14 +11,14 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.physics.tube.uncertainty import (
+from ringbalance.physics.tube.loss import (
     corrected_state,
     model_parts,
     uncertainty_parts,
     unfitted_parts,
     with_errors,
 )
+from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, level_table, refined_table
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,

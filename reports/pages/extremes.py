@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from ringbalance.reports.section import Cells, Record, Section, Table
+from ringbalance.reports.section import Record, Section
 from ringbalance.results.numbers import number
+from ringbalance.results.result import Cells, Table
 
 CASE: Final = "extremes"
 

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.section import Record, Section, Table, Work
+from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.numbers import MISSING, number, percent
+from ringbalance.results.result import Table
 from ringbalance.scene.models import Scene
 from ringbalance.verification.trade import TradeStudy, trade_study
 

@@ -12,10 +12,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.loss import flow_states, range_notes
+from ringbalance.physics.tube.loss import TUBE_INPUTS, corrected_state, flow_states, model_parts, range_notes
 from ringbalance.physics.tube.state import TubeState
-from ringbalance.physics.tube.uncertainty import TUBE_INPUTS, corrected_state, model_parts
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
+from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow

@@ -71,3 +71,17 @@ def reader_of(schema: Schema, checks: tuple[Check, ...]) -> Callable[..., tuple[
 def written(value: float, unit: str) -> str:
     """An SI value in a unit, such as "44.5 mm"."""
     return format_quantity(value, _DIMENSIONS[unit], unit)
+
+
+def limit_above_noise(noise_key: str, unit: str) -> Rule:
+    """The rule that a limit is above the standard deviation of what is measured."""
+
+    def above(limit: float, noise: float) -> Finding | None:
+        if limit > noise:
+            return None
+        least = written(noise, unit)
+        return Finding(
+            problem=f"the limit is below the sensor noise ({noise_key} {least})", allowed=f"above {least}"
+        )
+
+    return above

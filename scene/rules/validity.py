@@ -12,7 +12,7 @@ a factor of 2.3 at n = 3.  The program takes the first, and refuses to above n =
 **Density of the liquid.**  A pressure p makes it denser by p/K.  Up to 2 % the mean of a ring, in which the
 pressure rises from the gas's to the wall's, is off by no more than a usual tolerance of 1 %.  A tube that no
 more than p drives is no faster than (2 p/rho)^(1/2), so 2 % is also 0.2 of the speed of sound, (K/rho)^(1/2).
-This is no refusal but a status of what is calculated, `reduced_model.chamber.range`.
+This is no refusal but a status of what is calculated, `reduced_model.chamber.contributions`.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.fields import LETTERS
 from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.rules.check import Check, Finding, check, written
+from ringbalance.scene.rules.check import Check, Finding, check, limit_above_noise, written
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 
@@ -48,16 +48,6 @@ def period_covers_lag(period: float, lag: float) -> Finding | None:
     return Finding(
         problem=f"the next sample would be taken before the valve has moved (valve_lag {written(lag, 's')})",
         allowed=f"at least {written(lag, 's')}",
-    )
-
-
-def _limit_above_noise(limit: float, noise: float) -> Finding | None:
-    """The limit is above the standard deviation of the measured amplitude."""
-    if limit > noise:
-        return None
-    return Finding(
-        problem=f"the limit is below the sensor noise (amplitude_noise {written(noise, 'um')})",
-        allowed=f"above {written(noise, 'um')}",
     )
 
 
@@ -122,7 +112,7 @@ CHECKS: tuple[Check, ...] = (
     ),
     check(_gas_times_in_order, *_GAS_TIMES),
     check(period_covers_lag, "controller.period", "gas.valve_lag"),
-    check(_limit_above_noise, "controller.limit", "sensor.amplitude_noise"),
+    check(limit_above_noise("amplitude_noise", "um"), "controller.limit", "sensor.amplitude_noise"),
     *(
         check(_trial_time_executed, path, *_GAS_TIMES, when=_by_trial, moot=(_gas_times_in_order,))
         for path in _TRIAL_TIMES

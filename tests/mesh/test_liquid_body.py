@@ -15,7 +15,7 @@ from ringbalance.mesh.quadratic_tetrahedra import (
     scikit_fem_mesh,
     tetrahedra,
 )
-from ringbalance.physics.pressure.elements import quadratic_basis, side
+from ringbalance.physics.pressure.solve import quadratic_basis, side
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.narrowing import liquid_ring_scene

@@ -16,7 +16,6 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
-from ringbalance.mesh.cut.integrals import gauss
 from ringbalance.mesh.geometry import (
     chamber_volume,
     half_angle,
@@ -25,8 +24,8 @@ from ringbalance.mesh.geometry import (
     surface_radius,
 )
 from ringbalance.mesh.quadratic_tetrahedra import derivatives, shapes, tetrahedra
-from ringbalance.reduced_model.chamber.closed_forms import chamber_closed_forms
-from ringbalance.reduced_model.chamber.values import drawing_shares
+from ringbalance.mesh.wall_integrals import gauss
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms, drawing_shares
 from ringbalance.scene import liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry

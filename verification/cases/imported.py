@@ -14,18 +14,23 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.mesh.chamber import FREE_SURFACE
-from ringbalance.mesh.cut.integrals import LONGEST, Walls, integrals, walls_about
-from ringbalance.mesh.cut.patches import split_patches, wall_patches
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.liquid_body import Level as SurfaceLevel
 from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
+from ringbalance.mesh.wall_integrals import (
+    LONGEST,
+    Walls,
+    integrals,
+    split_patches,
+    wall_patches,
+    walls_about,
+)
 from ringbalance.physics.convergence import gci
-from ringbalance.physics.pressure.elements import quadratic_basis, side
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
-from ringbalance.physics.pressure.solve import solve_on
-from ringbalance.reduced_model.chamber.closed_forms import chamber_closed_forms
+from ringbalance.physics.pressure.solve import quadratic_basis, side, solve_on
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc, Scene

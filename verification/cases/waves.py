@@ -16,9 +16,14 @@ import numpy as np
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.mesh.section import middle_section
-from ringbalance.physics.sloshing.modes import default_sloshing_cells, resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing.response import SloshingResponse, sloshing_response
-from ringbalance.physics.sloshing.system import (
+from ringbalance.physics.sloshing import (
+    SloshingResponse,
+    default_sloshing_cells,
+    resonant_fills,
+    sloshing_modes,
+    sloshing_response,
+)
+from ringbalance.physics.sloshing_system import (
     SloshingSystem,
     imported_system,
     section_system,
@@ -182,7 +187,7 @@ def imported_waves(scene: Scene, level: Level, defect: str | None = None) -> Evi
     if defect == "forcing_backwards":
         waves = replace(waves, mixed=-waves.mixed)
     imported_system.cache_clear()
-    with patch("ringbalance.physics.sloshing.system.section_system", _mutated(defect)):
+    with patch("ringbalance.physics.sloshing_system.section_system", _mutated(defect)):
         found = sloshing_modes(disc=disc, fill_ratio=_FILL, modes=_IMPORTED_WAVES_MODES).frequency_ratio
         swing = sloshing_response(
             disc=disc, fill_ratio=_FILL, angular_velocity=1.0, kinematic_viscosity=0.0, gravity=0.0

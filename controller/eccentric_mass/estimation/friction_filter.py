@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 
 class TrackModel(NamedTuple):

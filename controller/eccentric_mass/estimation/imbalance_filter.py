@@ -22,7 +22,7 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
     sandwich,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 Pair = tuple[float, float]
 

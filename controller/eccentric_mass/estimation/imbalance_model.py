@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 _GAUSS_POINTS: FloatArray
 _GAUSS_WEIGHTS: FloatArray

@@ -26,10 +26,9 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
 )
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
-    eccentric_value,
-    eccentric_with,
 )
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.paths import value_at, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 _LONGEST_STEPS = 2_000
@@ -65,9 +64,9 @@ def rotor_covariance(
 
     middle = estimated(scene)
     for each in stated:
-        value = eccentric_value(scene, each.quantity)
+        value = value_at(scene, each.quantity)
         off = value + each.absolute(value) / NORMAL_95
-        plant = eccentric_with(scene, off, name=each.quantity)
+        plant = with_values_at(scene, {each.quantity: off})
         change = estimated(plant) - middle
         found += np.outer(change, change)
     return found

@@ -31,7 +31,7 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     write_derivative,
 )
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 LONGEST: Final = 0.1
 """Greatest product of a substep and the plant's fastest rate."""

@@ -18,7 +18,7 @@ from ringbalance.controller.eccentric_mass.plant.plant import LOCKED, SIZE, STUC
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 from ringbalance.scene.units import format_quantity
 
 MOST_SUBSTEPS: Final = 30_000_000

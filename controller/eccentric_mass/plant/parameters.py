@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, Motor
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 
 class PlantParameters(NamedTuple):

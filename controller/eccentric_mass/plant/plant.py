@@ -42,7 +42,7 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 SLIDING: Final = 0
 STUCK: Final = 1

@@ -14,7 +14,7 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
     Progress,
 )
 from ringbalance.controller.eccentric_mass.strategy.targets import Tuning
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 
 @compiled

@@ -21,7 +21,7 @@ from ringbalance.controller.eccentric_mass.strategy.plan import (
 from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw, StrategySettings
 from ringbalance.controller.eccentric_mass.strategy.supervisor import FRICTION, IMBALANCE
 from ringbalance.controller.eccentric_mass.strategy.targets import wrapped
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 _BREAKS_AWAY: Final = 3.0
 """Standard deviations of a friction arm beyond its estimate with which a mass at rest is set going."""

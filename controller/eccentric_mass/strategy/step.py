@@ -58,7 +58,7 @@ from ringbalance.controller.eccentric_mass.strategy.supervisor import (
     supervise,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 _LARGEST_TURN: Final = 0.05
 """Of a mass within one step of the imbalance filter, rad, which takes its path as straight."""

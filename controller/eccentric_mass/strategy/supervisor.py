@@ -55,7 +55,7 @@ from ringbalance.controller.eccentric_mass.strategy.targets import (
     tuning_place,
     tuning_start,
 )
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 # Plain numbers: the compiler takes enumerations, but not as fast.
 WAITING, IMBALANCE, FRICTION, POSITIONING, CHECK, CORRECTION, FINE_TUNING, REST, FAILED = map(int, Stage)

@@ -155,9 +155,7 @@ class Mutation:
 class _Study:
     """The function that computes a case, in place of a `case.py`."""
 
-    of: Annotated[
-        str, Pattern(r"[a-z0-9_]+(\.[a-z0-9_]+){2,}", "a function of this room: folder.module.name")
-    ]
+    of: Annotated[str, Pattern(r"[a-z0-9_]+(\.[a-z0-9_]+){2,}", "folder.module.function")]
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Further arguments by name, where several cases share it."""
 

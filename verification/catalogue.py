@@ -32,7 +32,7 @@ class UnknownCaseError(KeyError):
 
 
 def case_code(case_id: str) -> CaseCode:
-    """The function that a case's text names, with `<name>_ends` beside it where there is one, or its `case.py`.
+    """The function that a case's text names, with `<name>_ends` where there is one; else its `case.py`.
 
     Raises: UnknownCaseError: no such id; the text names the nearest one.
     """

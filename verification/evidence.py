@@ -203,8 +203,8 @@ class Evidence:
 class CaseCode(Protocol):
     """A case's computation.
 
-    Beside `compute` it may have `ends(scene)`: a shorter way to what is judged, which is asked for at the ends
-    of the assumed inputs' ranges.
+    Beside `compute` it may have `ends(scene)`: a shorter way to what is judged, or to the part that assumed
+    inputs move, which is asked for at the ends of their ranges.
     """
 
     def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:

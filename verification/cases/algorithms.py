@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -45,7 +46,7 @@ _STEPS: Final = {
 """First trial, long step, short step and period, s: each from barely visible to barely below the limit."""
 _STEP_NAMES: Final = ("first trial", "long step", "short step", "period")
 _BOUND: Final = 5.0
-_TRIAL: Final = {"first_trial": 0.02, "long_step": 0.1, "short_step": 0.005}
+_TRIAL: Final[Mapping[str, Any]] = {"first_trial": 0.02, "long_step": 0.1, "short_step": 0.005}
 """Steps with which the trial algorithm settles at every phase, s."""
 
 
@@ -172,11 +173,11 @@ def faster(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     runs = {period: _at_all_phases(aimed, scene, period) for period in PERIODS}
     judged = [_compared(scene, *pair) for pair in runs.values()]
     rows = [
-        (period, phase, *pair)
+        (period, phase, target, trial)
         for period, both in runs.items()
-        for phase, *pair in zip(PHASES, *both, strict=True)
+        for phase, target, trial in zip(PHASES, *both, strict=True)
     ]
-    targets, trials = ([row[column] for row in rows] for column in (2, 3))
+    targets, trials = [target for _, _, target, _ in rows], [trial for _, _, _, trial in rows]
     table = Table(
         name="settling times of both algorithms",
         columns={

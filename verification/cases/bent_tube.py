@@ -1,6 +1,4 @@
-"""
-bent_tube_3d: A tube with two bends over a crest, turning, solved in three dimensions; a heavy run.
-"""
+"""A tube with two bends over a crest, turning, solved in three dimensions; a heavy run."""
 
 from __future__ import annotations
 
@@ -42,9 +40,6 @@ _FORMAL_ORDER: Final = 4.0
 _FACTORS: Final = {None: 1.0, "coriolis_halved": 0.5}
 _DEVELOPED: Final = (5.0, 1.0)
 """Where flow has developed again: from and to, bores before the outlet."""
-
-
-_bent_tube_3d_reference = dict.fromkeys(("straight", "explained"), Reference(value=1.0))
 
 
 def path_over_crest(scene: Scene, refinement: float) -> tuple[Segment, ...]:
@@ -159,6 +154,7 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
             "explained": Found(value=losses[-1] / explained, numerical=half_width / explained / 2),
             "convergence": Found(value=half_width / losses[-1]),
         },
+        reference=dict.fromkeys(("straight", "explained"), Reference(value=1.0)),
         numbers={
             "k": losses[-1],
             "unknowns": float(fine.solution.statistics.unknowns),

@@ -1,17 +1,4 @@
-"""
-driven_fig9_run_up: The run-up through the critical speed, balanced at low speed and locked.
-
-The critical speed that the paper prints leaves the eccentric masses out.
-
-driven_fig7_positioning: Two imbalances balanced at constant speed: positioning (Fig. 7), and with fine tuning after it (Fig. 8).
-driven_fig8_fine_tuning: Masses ten degrees beside their targets, then tuned by trial.
-driven_bound: Appendix B: the printed force beside the largest one, and the corrected bound beside a run.
-
-The printed argument shows that the energy falls while the rotor's fixed-frame velocity exceeds Y/C_B, and
-concludes that the motion is bounded.  That does not follow: nothing is said of the displacement, and the
-energy may rise while the velocity is small.  Integrating the impulse response does give a bound.
-
-"""
+"""The eccentric-mass paper's runs: positioning, fine tuning and run-up (Figs. 7 to 9), and their bound."""
 
 from __future__ import annotations
 
@@ -44,9 +31,6 @@ _RPM = 30 / np.pi
 _PRINTED = 135.0
 
 
-_run_up_reference = {"critical": Reference(value=_PRINTED, uncertainty=from_rounding(1.0))}
-
-
 def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """The run-up through the critical speed, balanced at low speed and locked.
 
@@ -64,6 +48,7 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     peak = largest if defect else _run_up_peak(balanced, after=begins)[0]
     return Evidence(
         found={"critical": Found(value=critical, corrected=without), "peak": Found(value=peak / largest)},
+        reference={"critical": Reference(value=_PRINTED, uncertainty=from_rounding(1.0))},
         numbers={"locked": largest, "balanced": peak, "peak_speed": _RPM * speed, "without": without},
         series=(
             _amplitude_figure(
@@ -110,7 +95,8 @@ _PAPER_ERROR = math.radians(10.0)
 
 
 def positioning(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """Two imbalances balanced at constant speed: positioning (Fig. 7), and with fine tuning after it (Fig. 8).
+    """Two imbalances balanced at constant speed: positioning (Fig. 7), and with fine tuning after it
+    (Fig. 8).
 
     Amplitudes before, on the way and after."""
     found = BalancingFigure.seven(scene) if defect is None else BalancingFigure.eight(scene, time_limit=30.0)

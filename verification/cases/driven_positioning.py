@@ -1,13 +1,4 @@
-"""
-driven_fig6_effort: What positioning costs over weights and speed, and which friction compensation makes it grow.
-
-The paper's index is the integral of the regulator's torque alone.  Whirl and compensated friction are not in
-it: what the regulator has to do is the move itself and the friction that compensation leaves.
-
-driven_fig6_weights: What positioning costs over the weights and the mass ratio, by the efforts of Fig. 6.
-driven_stability: Where a mass comes to rest under the regulator with friction, and the poles of the linear loop.
-driven_collision: The least distance of two masses on the way to targets that are assigned by the paper's rule.
-"""
+"""The eccentric-mass paper's positioning: its effort (Fig. 6), where masses rest, how near they come."""
 
 from __future__ import annotations
 
@@ -45,8 +36,8 @@ _SHARES = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
 def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """What positioning costs over weights and speed, and which friction compensation makes it grow.
 
-    The paper's index is the integral of the regulator's torque alone.  Whirl and compensated friction are not in
-    it: what the regulator has to do is the move itself and the friction that compensation leaves.
+    The paper's index is the integral of the regulator's torque alone.  Whirl and compensated friction are
+    not in it: what the regulator has to do is the move itself and the friction that compensation leaves.
 
 
         Growth of the effort with the speed."""

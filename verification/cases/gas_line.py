@@ -1,7 +1,4 @@
-"""
-claim_18_gas_hole: The largest fill that leaves a point of the chamber dry at every angle, at rest and at every speed.
-gas_tube: The paper's chamber with a real gas tube: a mesh from CAD against the sector less a cylinder.
-"""
+"""The gas line's mouth: the fills that leave it dry, and a chamber that its tube reaches into."""
 
 from __future__ import annotations
 
@@ -39,20 +36,25 @@ from ringbalance.verification.evidence import (
     NotRunError,
     Reference,
     Series,
+    as_found,
     figure,
     from_half_width,
 )
 
-_GRIDS = ((30, 45, 4), (60, 90, 8))
+_GRIDS: Final = ((30, 45, 4), (60, 90, 8))
 """Radial and angular cells, and of an imported cell Gauss points along each direction; coarse and fine."""
-_ANGLES = np.linspace(0.0, np.pi, 181)
+_ANGLES: Final = np.linspace(0.0, np.pi, 181)
 """Of the shaft; the chamber is symmetric about its centre line."""
-_HOLE = "gas_hole"
+_HOLE: Final = "gas_hole"
 """Boundary of an imported chamber that is the mouth of its gas line."""
-_JUDGED = ("stopped", "running", "any_speed")
-_DOWNWARD = _ANGLES[:1]
-_OFFSETS = np.array([0.02, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 20.0])
+_JUDGED: Final = ("stopped", "running", "any_speed")
+_OFFSETS: Final = np.array([0.02, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 20.0])
 """g/omega^2 in units of R2: from a centred ring to almost a plane."""
+_FILE: Final = Path(__file__).parent / "gas_tube" / "data" / "scene.toml"
+_RADIUS, _TIP = 2e-3, 31e-3
+"""Of the tube outside, and radius of its mouth, m; as tools/example_chambers.py draws them."""
+_DEEP: Final = 0.8
+"""Fill ratio at which part of the tube is under the surface."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,36 +69,38 @@ class _Cells:
     """Distance over which the surface passes a cell, m."""
 
 
-def gas_hole_ends(scene: Scene) -> dict[str, float]:
-    return _margins(scene, _angles(scene.disc), _GRIDS[0])
+def gas_hole_ends(scene: Scene) -> Evidence:
+    """On the coarse grid."""
+    disc, angles = scene.disc, _angles(scene.disc)
+    cells = _cells(disc, *_GRIDS[0])
+    safe = _safe_fills(scene, cells, _hole(disc, _safest_radius(disc, cells, angles)), angles)
+    return Evidence(
+        found=as_found(**{f"margin_{state}": safe[state] - disc.max_fill_ratio for state in _JUDGED})
+    )
 
 
 def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """The largest fill that leaves a point of the chamber dry at every angle, at rest and at every speed.
-
-    Safe fills at rest, at full speed and between.
+    """The largest fill that leaves a point of the chamber dry at every angle, at rest and at any speed.
 
     Raises: NotRunError: the shaft is vertical, or there is no gravity.
     """
     if scene.environment.shaft != "horizontal" or scene.environment.gravity == 0:
         raise NotRunError("the claim is about a horizontal shaft under gravity")
     disc = scene.disc
-    angles = _DOWNWARD if defect == "upright_only" else _angles(disc)
+    angles = _ANGLES[:1] if defect == "upright_only" else _angles(disc)
     coarse, fine = (_cells(disc, *grid) for grid in _GRIDS)
     best = _safest_radius(disc, fine, angles)
     hole = _hole(disc, best)
-    offset = scene.environment.gravity / scene.rotor.speed**2
-    rough, safe = (_safe_fills(disc, cells, hole, offset, angles) for cells in (coarse, fine))
-    found = {
-        f"margin_{state}": Found(
-            value=fill - disc.max_fill_ratio, numerical=from_half_width(abs(fill - rough[state]))
-        )
-        for state, fill in safe.items()
-        if state in _JUDGED
-    }
+    rough, safe = (_safe_fills(scene, cells, hole, angles) for cells in (coarse, fine))
     ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
     return Evidence(
-        found=found,
+        found={
+            f"margin_{state}": Found(
+                value=safe[state] - disc.max_fill_ratio,
+                numerical=from_half_width(abs(safe[state] - rough[state])),
+            )
+            for state in _JUDGED
+        },
         numbers={
             "best_radius": best,
             "hole_radius": float(np.abs(hole).mean()),
@@ -107,16 +111,8 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "safe_at_ring": _safe_at_rest(fine, _on_centre_line(ring), angles),
             "between_margin": safe["turning"] - safe["stopped"],
         },
-        series=(_figure(disc, fine, offset),),
+        series=(_over_radius(scene, fine),),
     )
-
-
-def _margins(scene: Scene, angles: FloatArray, grid: tuple[int, int, int]) -> dict[str, float]:
-    disc, offset = scene.disc, scene.environment.gravity / scene.rotor.speed**2
-    cells = _cells(disc, *grid)
-    hole = _hole(disc, _safest_radius(disc, cells, angles))
-    safe = _safe_fills(disc, cells, hole, offset, angles)
-    return {f"margin_{state}": safe[state] - disc.max_fill_ratio for state in _JUDGED}
 
 
 def _angles(disc: Disc) -> FloatArray:
@@ -137,18 +133,20 @@ def _on_centre_line(radius: float) -> ComplexArray:
     return np.array([radius], dtype=np.complex128)
 
 
-def _safe_fills(
-    disc: Disc, cells: _Cells, hole: ComplexArray, offset: float, angles: FloatArray
-) -> Mapping[str, float]:
+def _safe_fills(scene: Scene, cells: _Cells, hole: ComplexArray, angles: FloatArray) -> Mapping[str, float]:
     """Safe fills with a hole: at full speed, at rest, at any speed between, at the worst."""
     stopped = _safe_at_rest(cells, hole, angles)
-    turning = _safe_turning(cells, hole, _OFFSETS * disc.outer_radius, angles)
+    turning = _safe_turning(cells, hole, _OFFSETS * scene.disc.outer_radius, angles)
     return {
-        "running": _safe_turning(cells, hole, np.array([offset]), angles),
+        "running": _safe_turning(cells, hole, _offset(scene), angles),
         "stopped": stopped,
         "turning": turning,
         "any_speed": min(stopped, turning),
     }
+
+
+def _offset(scene: Scene) -> FloatArray:
+    return np.array([scene.environment.gravity / scene.rotor.speed**2])
 
 
 def _cells(disc: Disc, radial: int, angular: int, points: int) -> _Cells:
@@ -238,11 +236,12 @@ def _safest_radius(disc: Disc, cells: _Cells, angles: FloatArray) -> float:
     return float(result.x)
 
 
-def _figure(disc: Disc, cells: _Cells, offset: float) -> Series:
+def _over_radius(scene: Scene, cells: _Cells) -> Series:
+    disc = scene.disc
     radius = np.linspace(disc.inner_radius, disc.outer_radius, 61)
     points, angles = [_on_centre_line(r) for r in radius], _angles(disc)
     rest = np.array([_safe_at_rest(cells, point, angles[::4]) for point in points])
-    running = np.array([_safe_turning(cells, point, np.array([offset]), angles[::30]) for point in points])
+    running = np.array([_safe_turning(cells, point, _offset(scene), angles[::30]) for point in points])
     return figure(
         "largest fill that leaves the gas hole dry",
         ("radius of the hole on the centre line", "m", radius),
@@ -250,13 +249,6 @@ def _figure(disc: Disc, cells: _Cells, offset: float) -> Series:
         Curve("stopped, worst angle", "1", rest),
         Curve("largest fill", "1", np.full(radius.shape, disc.max_fill_ratio), style="paper"),
     )
-
-
-_FILE: Final = Path(__file__).parent / "data" / "scene.toml"
-_RADIUS, _TIP = 2e-3, 31e-3
-"""Of the tube outside, and radius of its mouth, m; as tools/example_chambers.py draws them."""
-_DEEP: Final = 0.8
-"""Fill ratio at which part of the tube is under the surface."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -314,72 +306,57 @@ class _Exact:
         )
 
 
-def _gas_tube_reference(scene: Scene) -> Mapping[str, Reference]:
-    exact = _Exact(scene=scene, radius=_RADIUS)
-    half, full, deep = (exact.surface(x) for x in _fills(scene))
-    values = {
-        "volume": exact.volume(scene.disc.inner_radius),
-        "moment": exact.moment(full),
-        "moment_deep": exact.moment(deep),
-        "lever": exact.lever(half),
-    }
-    return {name: Reference(value=value) for name, value in values.items()}
-
-
 def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """The paper's chamber with a real gas tube: a mesh from CAD against the sector less a cylinder.
 
-    Totals of the mesh, and what the tube changes. Raises: SceneError: the file of the case is damaged."""
-    own = _with_tube(scene)
-    if defect == "without_the_tube":
-        own = scene
+    Raises: SceneError: the file of the case is damaged.
+    """
+    with_tube = replace(scene, disc=_disc_with_tube())
+    meshed = scene if defect == "without_the_tube" else with_tube
     if defect == "drawn_too_wide":
-        width = 1.001 * own.disc.axial_width
-        own = with_value(scene=own, quantity="axial_width", value=width)
-    fills = np.array(_fills(scene))
-    _, moment, ratio = chamber_closed_forms(scene=own, fill_ratio=fills)
-    shares = drawing_shares(own.disc, fills)
-    volume = chamber_volume(disc=own.disc)
-
-    def found(value: float, share: float) -> Found:
-        return Found(value=value, numerical=from_half_width((share + 1e-8) * abs(value)))
-
-    bare, tube = _Exact(scene=scene, radius=0.0), _Exact(scene=scene, radius=_RADIUS)
-    hole = gas_hole(_with_tube(scene), level)
+        meshed = with_value(scene=meshed, quantity="axial_width", value=1.001 * meshed.disc.axial_width)
+    largest = scene.disc.max_fill_ratio
+    fills = np.array([largest / 2, largest, _DEEP])
+    _, moment, ratio = chamber_closed_forms(scene=meshed, fill_ratio=fills)
+    shares = drawing_shares(meshed.disc, fills)
+    values = {
+        "volume": (chamber_volume(disc=meshed.disc), shares.volume),
+        "moment": (moment[1], shares.moment[1]),
+        "moment_deep": (moment[2], shares.moment[2]),
+        "lever": (ratio[0], shares.moment[0]),
+    }
+    bare, exact = (_totals(_Exact(scene=scene, radius=radius), fills) for radius in (0.0, _RADIUS))
+    hole = gas_hole(with_tube, level).numbers
     return Evidence(
         found={
-            "volume": found(volume, shares.volume),
-            "moment": found(float(moment[1]), float(shares.moment[1])),
-            "moment_deep": found(float(moment[2]), float(shares.moment[2])),
-            "lever": found(float(ratio[0]), float(shares.moment[0])),
+            name: Found(
+                value=float(value), numerical=from_half_width((float(share) + 1e-8) * abs(float(value)))
+            )
+            for name, (value, share) in values.items()
         },
+        reference={name: Reference(value=value) for name, value in exact.items()},
         numbers={
-            "volume_change": _change(bare, tube, lambda exact: exact.volume(scene.disc.inner_radius)),
-            "moment_change": _change(bare, tube, lambda exact: exact.moment(exact.surface(fills[1]))),
-            "lever_change": _change(bare, tube, lambda exact: exact.lever(exact.surface(fills[0]))),
+            **{f"{name}_change": exact[name] / bare[name] - 1 for name in ("volume", "moment", "lever")},
             "thickness": 2 * _RADIUS,
             "tip": _TIP,
-            "ring_radius": float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio)),
-            "safe_stopped": hole.numbers["safe_stopped"],
-            "safe_running": hole.numbers["safe_running"],
+            "ring_radius": float(surface_radius(disc=scene.disc, fill_ratio=largest)),
+            "safe_stopped": hole["safe_stopped"],
+            "safe_running": hole["safe_running"],
         },
     )
 
 
-def _fills(scene: Scene) -> tuple[float, float, float]:
-    """Equal fills, the largest, and a deep one."""
-    return scene.disc.max_fill_ratio / 2, scene.disc.max_fill_ratio, _DEEP
-
-
-def _change(bare: _Exact, tube: _Exact, of: Callable[[_Exact], float]) -> float:
-    return of(tube) / of(bare) - 1
+def _totals(exact: _Exact, fills: FloatArray) -> dict[str, float]:
+    """At equal fills, the largest, and a deep one."""
+    half, full, deep = (exact.surface(float(fill)) for fill in fills)
+    return {
+        "volume": exact.volume(exact.scene.disc.inner_radius),
+        "moment": exact.moment(full),
+        "moment_deep": exact.moment(deep),
+        "lever": exact.lever(half),
+    }
 
 
 @lru_cache(maxsize=1)
-def _disc_with_tube() -> Scene:
-    return liquid_ring_scene(load_scene(_FILE))
-
-
-def _with_tube(scene: Scene) -> Scene:
-    """The scene with the case's chamber."""
-    return replace(scene, disc=_disc_with_tube().disc)
+def _disc_with_tube() -> Disc:
+    return liquid_ring_scene(load_scene(_FILE)).disc

@@ -1,8 +1,4 @@
-"""
-imported_chamber: The built-in chamber as a mesh file would give it, against the closed forms and a manufactured solution.
-imported_pressure: Pressure in an imported chamber: a manufactured solution on meshes that become finer, and exact loads.
-round_chamber: A cylinder beside the shaft as an imported chamber: integrals over its walls against lenses of circles.
-"""
+"""Imported chambers against closed forms: totals, pressure with its loads, and walls cut by the surface."""
 
 from __future__ import annotations
 
@@ -56,7 +52,8 @@ def _imported_chamber_reference(scene: Scene) -> Mapping[str, Reference]:
 
 
 def imported_chamber(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """The built-in chamber as a mesh file would give it, against the closed forms and a manufactured solution."""
+    """The built-in chamber as a mesh file would give it, against the closed forms and a manufactured
+    solution."""
     records = [_record(scene.disc, cells, defect) for cells in _CELLS]
     rows = np.array([_totals(scene, record) for record in records])
     names = ("volume", "moment", "lever")
@@ -70,6 +67,7 @@ def imported_chamber(scene: Scene, level: Level, defect: str | None = None) -> E
             "field_order": Found(value=orders[0]),
             "field_error": Found(value=orders[1]),
         },
+        reference=_imported_chamber_reference(scene),
         numbers={"cells": float(len(records[0].cells))},
     )
 
@@ -135,7 +133,8 @@ _OWN: Final = ("surface_off_by_a_percent", "facets_taken_for_the_wall")
 
 
 def imported_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Pressure in an imported chamber: a manufactured solution on meshes that become finer, and exact loads."""
+    """Pressure in an imported chamber: a manufactured solution on meshes that become finer, and exact
+    loads."""
     disc, sizes = scene.disc, _IMPORTED_PRESSURE_LEVELS[level]
     studies = _studies(disc, sizes, None if defect in _OWN else defect)
     rings = [_ring(scene, sizes[1], kind, defect) for kind in ("hexahedron27", "hexahedron")]
@@ -250,7 +249,8 @@ def _segment(radius: FloatArray | float, chord: FloatArray) -> tuple[FloatArray,
 
 
 def round_chamber(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """A cylinder beside the shaft as an imported chamber: integrals over its walls against lenses of circles."""
+    """A cylinder beside the shaft as an imported chamber: integrals over its walls against lenses of
+    circles."""
     disc, cells = scene.disc, _ROUND_CHAMBER_LEVELS[level]
     curved: CellKind = "hexahedron" if defect == "middle_nodes_ignored" else "hexahedron27"
     errors = {

@@ -1,28 +1,4 @@
-"""
-rotating_section: The rotating section at rest, in slow rotation and in fast rotation.
-manufactured_flow: A manufactured flow on the curved half section of a turning tube, every term of the equation at work.
-
-In the plane u = d psi/dz, v = -d psi/dy with psi = sin(a y + 0.3) exp(b z)/5, so that div u = 0; along the
-tube w = 1 + cos(c y) sin(d z + 0.4)/2; p = sin(e y) cos(f z + 0.2).  The body force is what
-
-    inertia (u . grad) u + rotation C u - viscosity lap u + grad p = f
-
-asks for, with velocities given all round.
-
-developing_flow: Decay rates along the turning tube: creeping flow at rest, fast rotation, and the bound that k(u) uses.
-
-How fast laminar flow in a rotating tube becomes developed is the decay along it of what disturbs it.  A small
-steady disturbance of developed flow goes as exp(lambda x/d).  With lengths over d, axial velocity over U and
-mu = lambda Re, its equations in the section are quadratic in mu, pressure and diffusion along the tube
-included:
-
-    [A0 + mu A1 + mu^2 A2] q = 0
-
-A0 is the section's own Jacobian, A1 carries with the axial velocity and couples pressure and continuity along
-the tube, A2 diffuses.  At Re = 0 velocities are over U throughout and mu is lambda itself.  Modes are those
-that are mirror images of themselves in the plane across the rotation axis.
-
-"""
+"""Flow in the section of a turning tube: exact limits, a manufactured solution, decay rates along it."""
 
 from __future__ import annotations
 
@@ -74,7 +50,7 @@ _FACTORS: Final = {None: 1.0, "coriolis_off_by_a_percent": 1.01, "radius_for_bor
 _ROTATING_SECTION_AROUND: Final = {"light": 8, "heavy": 20}
 
 
-_rotating_section_reference = {
+_LIMITS = {
     "slow": Reference(value=1.0),
     "inertia": Reference(value=1.0),
     "ekman": Reference(value=float(np.sqrt(10))),
@@ -95,6 +71,7 @@ def rotating_section(scene: Scene, level: Level, defect: str | None = None) -> E
     gaps = fast / (_LIMIT * np.sqrt(_ROTATING_SECTION_FAST)) - 1
     return Evidence(
         found=as_found(at_rest=abs(rest - 1), slow=slow, inertia=inertia, ekman=gaps[2] / gaps[3]),
+        reference=_LIMITS,
         numbers={"gap": float(gaps[-1])},
         series=(_figure(fast),),
     )
@@ -192,8 +169,8 @@ def body_force(places: FloatArray) -> FloatArray:
 def manufactured_flow(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """A manufactured flow on the curved half section of a turning tube, every term of the equation at work.
 
-    In the plane u = d psi/dz, v = -d psi/dy with psi = sin(a y + 0.3) exp(b z)/5, so that div u = 0; along the
-    tube w = 1 + cos(c y) sin(d z + 0.4)/2; p = sin(e y) cos(f z + 0.2).  The body force is what
+    In the plane u = d psi/dz, v = -d psi/dy with psi = sin(a y + 0.3) exp(b z)/5, so that div u = 0;
+    along the tube w = 1 + cos(c y) sin(d z + 0.4)/2; p = sin(e y) cos(f z + 0.2).  The body force is what
 
         inertia (u . grad) u + rotation C u - viscosity lap u + grad p = f
 
@@ -293,22 +270,20 @@ _TOLERANCE = 1e-8
 _NOT_A_MODE = 0.03
 """Times the expected rate: below, only the flow rate and the pressure level are found, at zero."""
 
-_developing_flow_reference = {"fast": Reference(value=_GEOSTROPHIC)}
-
 
 def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Decay rates along the turning tube: creeping flow at rest, fast rotation, and the bound that k(u) uses.
 
-    How fast laminar flow in a rotating tube becomes developed is the decay along it of what disturbs it.  A small
-    steady disturbance of developed flow goes as exp(lambda x/d).  With lengths over d, axial velocity over U and
-    mu = lambda Re, its equations in the section are quadratic in mu, pressure and diffusion along the tube
-    included:
+    How fast laminar flow in a rotating tube becomes developed is the decay along it of what disturbs it.
+    A small steady disturbance of developed flow goes as exp(lambda x/d).  With lengths over d, axial
+    velocity over U and mu = lambda Re, its equations in the section are quadratic in mu, pressure and
+    diffusion along the tube included:
 
         [A0 + mu A1 + mu^2 A2] q = 0
 
-    A0 is the section's own Jacobian, A1 carries with the axial velocity and couples pressure and continuity along
-    the tube, A2 diffuses.  At Re = 0 velocities are over U throughout and mu is lambda itself.  Modes are those
-    that are mirror images of themselves in the plane across the rotation axis.
+    A0 is the section's own Jacobian, A1 carries with the axial velocity and couples pressure and
+    continuity along the tube, A2 diffuses.  At Re = 0 velocities are over U throughout and mu is lambda
+    itself.  Modes are those that are mirror images of themselves in the plane across the rotation axis.
     """
     coarse, fine = (cells.system() for cells in _MESHES[level])
     rates = slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12).rates
@@ -324,6 +299,7 @@ def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Ev
             fast=(fast[1] * step - fast[0]) / (step - 1),
             bound=max(shares),
         ),
+        reference={"fast": Reference(value=_GEOSTROPHIC)},
         numbers={"slower": fast[0], "faster": fast[1], "least": min(shares)},
         tables=(
             Table(

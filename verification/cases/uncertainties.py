@@ -1,12 +1,4 @@
-"""
-gci_celik2008: Three-mesh grid convergence against the published worked examples.
-gci_behaviour: Grid convergence judged on sequences that were made from their limit.
-coverage: Do the half-widths hold the truth as often as they say, and are they no wider than they need be?
-
-Random discs and fills, finite elements against the closed form; a fixed seed, so the same discs every time.
-
-extremes: The designed set and the axes of the extremes; a heavy run.
-"""
+"""Whether stated uncertainties hold: on published and made-up sequences, random discs and extremes."""
 
 from __future__ import annotations
 
@@ -191,9 +183,6 @@ def _sequences() -> tuple[_Sequence, ...]:
     )
 
 
-_gci_behaviour_reference = {"fitted_order": Reference(value=_FITTED)}
-
-
 def gci_behaviour(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Grid convergence judged on sequences that were made from their limit."""
     sequences = _sequences()
@@ -208,6 +197,7 @@ def gci_behaviour(scene: Scene, level: Level, defect: str | None = None) -> Evid
             missed_limits=missed,
             fitted_order=judged["five levels, third order, noise"].observed_order,
         ),
+        reference={"fitted_order": Reference(value=_FITTED)},
         numbers={"sequences": float(len(sequences))},
         tables=(_gci_behaviour_table(judged),),
     )
@@ -363,7 +353,8 @@ def _coverage_judge(ratios: FloatArray) -> _Coverage:
 def coverage(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Do the half-widths hold the truth as often as they say, and are they no wider than they need be?
 
-    Random discs and fills, finite elements against the closed form; a fixed seed, so the same discs every time.
+    Random discs and fills, finite elements against the closed form; a fixed seed, so the same discs every
+    time.
     """
     results = _coverage(ratios=_ratios(), width_factor=_FACTORS[defect])
     found: dict[str, Found] = {}

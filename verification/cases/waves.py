@@ -1,7 +1,4 @@
-"""
-sloshing: Natural frequencies of the ring against exact waves and sums of cosines, and the fills to avoid.
-imported_waves: Plane waves in the middle section of an imported chamber, against sums of cosines; their order.
-"""
+"""Waves on the ring: natural frequencies and swings against exact waves, in the sector and in a mesh."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ register(
 )
 register(
     "eccentric_mass",
-    scene="ringbalance.controller.eccentric_mass.scene_rules:KIND",
+    scene="ringbalance.controller.eccentric_mass.scene_records:KIND",
     balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
 )
 register_function("with_values", place="ringbalance.scene.changes:with_values")

@@ -12,8 +12,7 @@ import pytest
 import scene_reference
 from generated_docs import fresh, text_of
 
-from ringbalance.controller.eccentric_mass import scene_rules
-from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS
+from ringbalance.controller.eccentric_mass.scene_records import CHECKS, ECCENTRIC_MASS
 from ringbalance.scene import Scene, loop_models, models
 from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.keys.declaration import keys_of
@@ -92,7 +91,7 @@ def test_uncertain_quantities() -> None:
 
 @pytest.mark.parametrize(
     ("schema", "checks"),
-    [(LIQUID_RING, (*shape.CHECKS, *working.CHECKS)), (ECCENTRIC_MASS, scene_rules.CHECKS)],
+    [(LIQUID_RING, (*shape.CHECKS, *working.CHECKS)), (ECCENTRIC_MASS, CHECKS)],
 )
 def test_checks_need_keys_that_exist(schema: Schema, checks: tuple[Check, ...]) -> None:
     for check in checks:

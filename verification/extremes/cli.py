@@ -8,13 +8,6 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Final
 
-from rich.markup import escape
-from rich.padding import Padding
-from rich.table import Table
-
-from ringbalance.reports.pages.extremes import axis_rows
-from ringbalance.results.numbers import number
-from ringbalance.results.result import Cells
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.faults import Fault, SceneError, toml_text
 from ringbalance.scene.loader import load_scene
@@ -25,7 +18,7 @@ from ringbalance.scene.platform.processes import checked_workers
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.design import Base
-from ringbalance.verification.extremes.study import SIZES, Record, find_extremes
+from ringbalance.verification.extremes.study import SIZES, find_extremes
 
 DONE: Final = 0
 BROKEN: Final = 1
@@ -72,35 +65,16 @@ def extremes(
                 ),
                 kept=None if out is None else out / KEPT,
             )
-        told, tables = found.document(), found.tables()
+        text = json_format.dumps(found.to_dict(), allow_nan=False)
         if stage is not None:
-            write_whole(stage / FILE, json_format.dumps(told, allow_nan=False) + "\n")
+            write_whole(stage / FILE, text + "\n")
     if out is not None:
         console.print(f"written to {out}", highlight=False)
     if json:
-        print(json_format.dumps(told, allow_nan=False))
+        print(text)
     else:
-        _show(told, axis_rows(tables["axes"]))
+        results_console().print(found.rows().view(headline=False))
     return BROKEN if found.broken() else DONE
-
-
-def _show(told: Record, rows: list[Cells]) -> None:
-    console = results_console()
-    endings = ", ".join(f"{count} {ending}" for ending, count in told["endings"].items() if count)
-    console.print(f"{told['judged']} points: {endings}", highlight=False)
-    console.print(
-        f"largest residual {number(told['worst_residual'], digits=2)}; largest error "
-        f"{number(told['worst_error_over_half_width'], digits=2)} of its half-width",
-        highlight=False,
-    )
-    table = Table(box=None, header_style="dim", padding=(0, 1))
-    for title in ("input", "stretch", "answer", "loop", "said"):
-        table.add_column(title, overflow="fold")
-    for row in rows:
-        table.add_row(*(escape(text) for text in row))
-    console.print(table, highlight=False)
-    for fault in told["violations"]:
-        console.print(Padding(f"{fault['violations']} at {fault['point']}", (0, 0, 0, 2)), style="red")
 
 
 def base_of(scene: Scene) -> Base:

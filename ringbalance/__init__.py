@@ -54,7 +54,7 @@ __version__ = "0.1.0"
 # The balancers, each one line; a third is one more.
 register(
     "liquid_ring",
-    scene="ringbalance.scene.liquid_ring:KIND",
+    scene="ringbalance.scene.rules.liquid_ring:KIND",
     balancer="ringbalance.controller.liquid_ring.balancer:LiquidRingBalancer",
 )
 register(

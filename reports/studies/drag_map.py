@@ -21,6 +21,7 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.operating_point import priming_pressure
+from ringbalance.reduced_model.tube.regime import crest_margins, driving_pressure
 from ringbalance.reports.studies.drag_point import DragPoint
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.designs import Designs
@@ -308,14 +309,14 @@ class ApparentDrag:
         Raises: ValueError: a law without a crest, or a velocity that is not positive and finite.
         Source: Eq. 18 of the liquid-ring paper and the crest's energy balance.
         """
-        crest, crest_head = law.path.crest, law.heads.hump_head
-        if crest is None or crest_head is None:
+        crest_head = law.heads.hump_head
+        if crest_head is None:
             raise ValueError("a tube without a siphon crest does not separate: give tube.hump_radius")
         u = np.asarray(velocity, dtype=np.float64)
         if not np.all(np.isfinite(u) & (u > 0)):
             raise ValueError("velocity must be positive and finite")
         ends = law.ends(fill_ratio=0.0, opposite_fill_ratio=opposite_fill_ratio)
-        excess = float(ends.driving_pressure() - crest.separation_margin(ends)) / law.density
+        excess = float(driving_pressure(law.path, ends) - crest_margins(law.path, ends)[0]) / law.density
         siphon, lower_bound = (
             2 * np.exp(table(np.log(u))) / u**2 - 1 for table in (law.heads.head, crest_head)
         )

@@ -21,7 +21,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.path import crest_span
-from ringbalance.reduced_model.tube.regime import TubeEnds, can_flow
+from ringbalance.reduced_model.tube.regime import TubeEnds, can_flow, cavity_bounds, crest_margins
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.joint import input_sides, without_fitted
@@ -88,13 +88,13 @@ class DragPoint:
         level = chamber_pressure(scene=varied, fill_ratio=varied.disc.max_fill_ratio / 2) * np.ones(
             designs.size
         )
-        ends, crest = tube.ends(level, level), tube.path.crest
+        ends, path = tube.ends(level, level), tube.path
         column = tube.flow(ends, primed=True)
-        runs = np.asarray(can_flow(ends=ends, crest=crest, primed=True))
-        starts = np.asarray(can_flow(ends=ends, crest=crest, primed=False))
+        runs = np.asarray(can_flow(path, ends, True))
+        starts = np.asarray(can_flow(path, ends, False))
         u = np.where(runs, column.velocity, 1.0)
         excess = np.full(designs.size, -1.0)
-        if crest is not None:
+        if path.crest:
             both = (np.where(runs, v, 1.0) for v in (column.siphon_velocity, column.separation_velocity))
             excess = np.log(next(both)) - np.log(next(both))
         separated = runs & (excess > 0)
@@ -157,7 +157,7 @@ def _width(
 def _drive_width(
     law: CalibratedLaw,
     tube: TubeFlow,
-    ends: TubeEnds[FloatArray],
+    ends: TubeEnds,
     separated: BoolArray,
     density: FloatArray | float,
 ) -> FloatArray:
@@ -167,20 +167,20 @@ def _drive_width(
     levels = ratio * np.sqrt(2) * float(law.hydrostatic_pressure_uncertainty(law.max_fill_ratio / 2))
     of_gas = np.hypot(density, inputs.relative_gas_pressure) * gas
     siphon = np.hypot(levels, of_gas) / np.maximum(np.abs(gas), 1e-100)
-    crest = tube.path.crest
-    if crest is None:
+    path = tube.path
+    if not path.crest:
         return np.asarray(siphon)
-    low, high = crest.cavity_bounds(ends)
+    low, high = cavity_bounds(path, ends)
     squares = (
         levels**2
-        + (density * (gas - crest.vapour_pressure)) ** 2
+        + (density * (gas - path.vapour_pressure)) ** 2
         + (inputs.relative_gas_pressure * gas) ** 2
-        + (2 * inputs.relative_speed * (level - crest.column_pressure)) ** 2
+        + (2 * inputs.relative_speed * (level - path.column_pressure)) ** 2
         + (ratio * inputs.hump_pressure) ** 2
         + inputs.vapour_pressure**2
-        + (max(crest.released, 1 - crest.released) * (high - low)) ** 2
+        + (max(path.released, 1 - path.released) * (high - low)) ** 2
     )
-    over = np.sqrt(squares) / np.maximum(crest.separation_margin(ends), 1e-100)
+    over = np.sqrt(squares) / np.maximum(crest_margins(path, ends)[0], 1e-100)
     return np.asarray(np.where(separated, over, siphon), dtype=np.float64)
 
 

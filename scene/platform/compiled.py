@@ -25,8 +25,10 @@ from types import FrameType
 from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
+import numpy as np
 from numba.core import registry, sigutils, types
 from numba.core.compiler_lock import global_compiler_lock
+from numba.extending import overload, register_jitable
 
 from ringbalance.scene.platform.kept_code import KeptCode
 
@@ -71,6 +73,24 @@ def in_place(function: Callable[P, R]) -> Callable[P, R]:
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """As `in_place`, within each compiled function that calls it: what that does not use costs nothing."""
     return _dispatcher(function, _nrt=False, forceinline=True)
+
+
+def both_ways(function: Callable[P, R]) -> Callable[P, R]:
+    """A plain function for numbers and arrays, which compiled code may call with numbers."""
+    registered: Callable[P, R] = register_jitable(error_model="numpy", _nrt=False, forceinline=True)(function)
+    return registered
+
+
+def chosen(condition: Any, first: Any, second: Any) -> Any:
+    """The first where a condition holds, elsewhere the second; in compiled code of numbers."""
+    return np.where(condition, first, second)
+
+
+def _chosen_number(condition, first, second):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    return lambda condition, first, second: first if condition else second
+
+
+overload(chosen)(_chosen_number)
 
 
 def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
@@ -190,7 +210,9 @@ _COMPILED: Final = ("controller", "reduced_model/injection")
 def compiled_sources() -> tuple[Path, ...]:
     """Every source that holds functions that are compiled, and the machinery's own."""
     here, root = Path(__file__), Path(__file__).parents[2]
-    plain = {root / "controller/formulas.py", root / "physics/gas.py"}
+    plain = {
+        root / each for each in ("controller/formulas.py", "physics/gas.py", "reduced_model/tube/regime.py")
+    }
     sources = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
     marked = [path for path in sources if _MARK in path.read_bytes()]
     return tuple(sorted([here, here.with_name("kept_code.py"), *plain, *marked]))

@@ -117,7 +117,7 @@ def running_tube(scene: Scene, *, head: float) -> Running:
 def running_tubes(scene: Scene, heads: tuple[float, ...]) -> tuple[Running, ...]:
     """The same under several heads at once."""
     head = np.array(heads)
-    found = tube_loss(scene, velocity_of(table=TubeHeads.exact(scene).head, head=head, where=head > 0))
+    found = tube_loss(scene, velocity_of(table=TubeHeads.of(scene).head, head=head, where=head > 0))
     leaving = found.terms.get("exit", np.zeros(len(heads)))
     return tuple(
         Running(

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.cut.faceting import SMOOTH, axis_beside_shaft, faceting, inward_share
+from ringbalance.mesh.faceting import SMOOTH, axis_beside_shaft, faceting, inward_share
 from ringbalance.reduced_model.calibration_record import Budget, Calibration
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.documents import (

@@ -25,7 +25,7 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.state import TubeState, tube_state, tube_state_at
 from ringbalance.reduced_model.chamber.contributions import (

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.physics.tube.uncertainty import INPUT_PART
+from ringbalance.physics.tube.loss import INPUT_PART, tube_loss
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime

@@ -13,8 +13,8 @@ from scipy.optimize import brentq
 
 from ringbalance.physics.gas import vented_pressure
 from ringbalance.physics.pressure.hydrostatics import column_radius
+from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.physics.tube.state import TubeState
-from ringbalance.physics.tube.uncertainty import corrected_state
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, DirectedState
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.tube.flow import column_pressure

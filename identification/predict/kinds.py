@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.optimize import newton
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.device import Device, Models, runs_back
@@ -22,7 +22,7 @@ from ringbalance.identification.predict.injections import INJECTION
 from ringbalance.identification.predict.positionings import POSITIONING
 from ringbalance.identification.predict.predicted import PredictedKind, always, parts, spread_out
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.tube.uncertainty import corrected_state
+from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 

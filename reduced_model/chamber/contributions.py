@@ -20,7 +20,7 @@ from ringbalance.mesh.geometry import (
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.results import Status, StatusCode
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE, SMALL
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE, SMALL
 from ringbalance.reduced_model.chamber.tilted_ring import closed_ring
 from ringbalance.reduced_model.chamber.values import (
     by_closed_form,
@@ -30,7 +30,7 @@ from ringbalance.reduced_model.chamber.values import (
 )
 from ringbalance.scene.arrays import FloatArray, distinct
 from ringbalance.scene.models import Scene
-from ringbalance.scene.rules.validity import LARGEST_COMPRESSION, METAL_DENSITY, bulk_modulus
+from ringbalance.scene.rules.working import LARGEST_COMPRESSION, METAL_DENSITY, bulk_modulus
 
 _NO_BASIS: Final = "the scene gives no basis for an estimate"
 
@@ -328,7 +328,7 @@ def compression(scene: Scene, fills: FloatArray) -> FloatArray:
 
     Returns: Shares along the fills; those above `LARGEST_COMPRESSION` are beyond every model here, and so
         are velocities that such a pressure drives.
-    Source: p = f p_gas + rho omega^2 (R2^2 - a^2)/2; `scene.rules.validity`.
+    Source: p = f p_gas + rho omega^2 (R2^2 - a^2)/2; `scene.rules.working`.
     """
     column = hydrostatic_pressure(
         density=scene.liquid.density,

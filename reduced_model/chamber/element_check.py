@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.cut.table import TOLERANCE, chamber_table
+from ringbalance.mesh.chamber_table import TOLERANCE, chamber_table
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.pressure.imported import solved_ring
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities

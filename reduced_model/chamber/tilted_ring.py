@@ -16,8 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.cut.table import ChamberTable
-from ringbalance.mesh.cut.tilted import tilted_liquid
+from ringbalance.mesh.chamber_table import ChamberTable, tilted_liquid
 from ringbalance.mesh.geometry import (
     half_angle,
     imported_table,

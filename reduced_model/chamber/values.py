@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.cut.faceting import drawing_error
-from ringbalance.mesh.cut.table import chamber_table
+from ringbalance.mesh.chamber_table import chamber_table
+from ringbalance.mesh.faceting import drawing_error
 from ringbalance.mesh.geometry import (
     half_angle,
     head_square,

@@ -32,8 +32,8 @@ from ringbalance.reduced_model.tube.regime import (
     possible_cavity,
 )
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
-from ringbalance.scene.joint import FITTED, direction_sides, independent_half_widths
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import FITTED, direction_sides, independent_half_widths
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,10 +14,6 @@ from ringbalance.reports.prose import evidence_at, read, resting, traced, untrac
 from ringbalance.reports.section import Record
 from ringbalance.reports.summary import (
     LIKELY,
-    MET,
-    MISSED,
-    OPEN,
-    UNASKED,
     above,
     below,
     decided,
@@ -30,6 +26,7 @@ from ringbalance.reports.summary import (
     worst,
 )
 from ringbalance.results.numbers import given, number, percent, shown
+from ringbalance.results.requirements import MET, MISSED, OPEN, UNASKED
 from ringbalance.results.result import Table
 from ringbalance.scene import Scene
 

@@ -203,19 +203,16 @@ def _digest() -> str:
     return total.hexdigest()[:16]
 
 
-_COMPILED: Final = ("controller", "reduced_model/injection")
+_COMPILED: Final = ("controller", "reduced_model")
 """Folders whose functions are compiled, from the package's root."""
 
 
 def compiled_sources() -> tuple[Path, ...]:
     """Every source that holds functions that are compiled, and the machinery's own."""
     here, root = Path(__file__), Path(__file__).parents[2]
-    plain = {
-        root / each for each in ("controller/formulas.py", "physics/gas.py", "reduced_model/tube/regime.py")
-    }
     sources = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
     marked = [path for path in sources if _MARK in path.read_bytes()]
-    return tuple(sorted([here, here.with_name("kept_code.py"), *plain, *marked]))
+    return tuple(sorted([here, here.with_name("kept_code.py"), root / "physics/gas.py", *marked]))
 
 
 _Handler = Callable[[int, FrameType | None], Any]

@@ -175,7 +175,7 @@ def ring_of(scene: models.Scene) -> Callable[..., LiquidRing]:
     def make(model: BalancerModel, *, gas_pressure: float = 0.7e6, chambers: int = 4) -> LiquidRing:
         under = replace(scene, gas=replace(scene.gas, pressure=gas_pressure))
         dynamics = dynamics_of(scene=under, model=model, modelled=())
-        return LiquidRing(model=model, chambers=chambers, dynamics=dynamics)
+        return LiquidRing(model=model, chambers=chambers, dynamics=dynamics, total=0.5)
 
     return make
 

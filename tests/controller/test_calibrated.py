@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ringbalance import bundled_scene, load_scene
-from ringbalance.controller.ensemble.samples import MemberUncertainty
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.members import MemberUncertainty
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import Event

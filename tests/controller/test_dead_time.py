@@ -11,7 +11,7 @@ import pytest
 
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
-from ringbalance.controller.ensemble.monte_carlo import simulate_members
+from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning import search
 from ringbalance.controller.tuning import tune as tune_module

@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.algorithms.algorithm import Measurement
-from ringbalance.controller.ensemble.monte_carlo import (
+from ringbalance.controller.ensemble import (
+    _NOISE,
     QUANTILES,
     Probability,
     simulate_ensemble,
     simulate_members,
 )
-from ringbalance.controller.ensemble.run import _NOISE
-from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.moment_table import MomentTable, pair_moment
+from ringbalance.controller.loop_records import MomentTable, pair_moment
+from ringbalance.controller.members import BLOCK, Members, MemberUncertainty
 from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime

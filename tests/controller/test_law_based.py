@@ -16,8 +16,13 @@ from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
-from ringbalance.controller.algorithms.law_based import LawBased, _gas_time, learnt
-from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
+from ringbalance.controller.algorithms.law_based import (
+    LawBased,
+    _gas_time,
+    fill_for_moment,
+    learnt,
+    split_change,
+)
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.loop_records import LOOP, MOMENT_NODES, RUN

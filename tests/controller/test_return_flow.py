@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
-from ringbalance.controller.ensemble.monte_carlo import simulate_members
+from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.reduced_model.calibration import calibrated_model

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import brentq
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
-from ringbalance.controller.ensemble.monte_carlo import Probability
+from ringbalance.controller.ensemble import Probability
 from ringbalance.controller.tuning.loop_factor import loop_factor, usable_fill, with_driving_gas
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.result import Tuning

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.reduced_model.calibration_record import UNITS
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.document import case_document

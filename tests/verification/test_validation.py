@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import binomtest
 
 from ringbalance.identification.data.measurements import Measurements, MeasurementsError
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
@@ -11,6 +12,7 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import RestsOn
 from ringbalance.verification.eccentric_scenes import changed
+from ringbalance.verification.evidence import CaseCode, Evidence, Reference
 
 KNOWN: Final = ("given", "measured")
 """Origins of a value that somebody vouches for: it is taken as it stands."""
@@ -83,6 +85,47 @@ def overridden(scene: Any, overrides: Mapping[str, float | Literal["absent"]]) -
         change: Callable[..., Any] = _CHANGES.get(scene.balancer, _with_part)
         scene = change(scene, table, **{key: value})
     return scene
+
+
+def references(code: CaseCode, scene: Any) -> Mapping[str, Reference]:
+    """What the judged quantities are compared with, by name."""
+    given = getattr(code, "reference", {})
+    found: Mapping[str, Reference] = given(scene) if callable(given) else given
+    return found
+
+
+def widened(
+    evidence: Evidence,
+    code: CaseCode,
+    scene: Any,
+    assumptions: Sequence[Assumption],
+    *,
+    values: Callable[[Any], Mapping[str, float]],
+) -> Evidence:
+    """Evidence with the reach of its assumed inputs: the case computed at all corners of their ranges.
+
+    What moves is the error, so an input that moves number and reference alike counts for nothing.
+    Args: `values`: the judged numbers on a scene.
+    """
+    if not assumptions:
+        return evidence
+
+    def errors(of: Any) -> Mapping[str, float]:
+        against = references(code, of)
+        return {
+            name: value - (against[name].value if name in against else 0.0)
+            for name, value in values(of).items()
+        }
+
+    here = errors(scene)
+    paths = [one.path for one in assumptions]
+    corners = itertools.product(*((one.low, one.high) for one in assumptions))
+    moved = [errors(overridden(scene, dict(zip(paths, corner, strict=True)))) for corner in corners]
+    found = dict(evidence.found)
+    for name, error in here.items():
+        changes = [one[name] - error for one in moved]
+        found[name] = found[name].moved(min(changes), max(changes))
+    return dataclasses.replace(evidence, found=found)
 
 
 def _range(one: RestsOn, scene: Any, value: float, origin: str) -> tuple[float, float, str]:

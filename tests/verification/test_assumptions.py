@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.verification.assumptions import assumptions_of
+from ringbalance.verification.assumptions import assumptions_of, references
 from ringbalance.verification.case import CaseDefinition, RestsOn
 from ringbalance.verification.catalogue import case_code, load_case
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
-from ringbalance.verification.result import references
 from ringbalance.verification.runner import run_definition
 from ringbalance.verification.verdicts import Metric, Verdict, judge_quantity
 

@@ -54,12 +54,12 @@ __version__ = "0.1.0"
 # The balancers, each one line; a third is one more.
 register(
     "liquid_ring",
-    scene="ringbalance.scene.liquid_ring:KIND",
+    scene="ringbalance.scene.rules.liquid_ring:KIND",
     balancer="ringbalance.controller.liquid_ring.balancer:LiquidRingBalancer",
 )
 register(
     "eccentric_mass",
-    scene="ringbalance.controller.eccentric_mass.scene_rules:KIND",
+    scene="ringbalance.controller.eccentric_mass.scene_records:KIND",
     balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
 )
 register_function("with_values", place="ringbalance.scene.changes:with_values")

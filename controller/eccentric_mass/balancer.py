@@ -23,10 +23,9 @@ from ringbalance.controller.balancer import (
     rotor_fault,
     vibrating,
 )
-from ringbalance.controller.eccentric_mass.document import eccentric_history
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
+from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
 from ringbalance.controller.eccentric_mass.study import eccentric_study, reach_of

@@ -15,9 +15,9 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain, track_model
+from ringbalance.controller.eccentric_mass.settings import lqr_gain, track_model
 from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.paths import with_values_at
 

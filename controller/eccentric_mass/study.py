@@ -12,18 +12,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.document import eccentric_document
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plan import STAGE_NAMES, Stage
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
     eccentric_drawn,
 )
-from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
-from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
-from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.targets import target_angles
 from ringbalance.controller.eccentric_mass.tuning import (
     EccentricTuning,
     eccentric_tuning_document,

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.optimize import newton
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.predict.device import Device, Models, runs_back

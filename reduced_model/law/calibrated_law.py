@@ -26,8 +26,8 @@ from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
 from ringbalance.reduced_model.tube.regime import TubeEnds, TubePath
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
-from ringbalance.scene.joint import FITTED, direction_sides, independent_half_widths
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import FITTED, direction_sides, independent_half_widths
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

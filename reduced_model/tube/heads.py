@@ -28,9 +28,10 @@ from ringbalance.reduced_model.tube.path import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.describe import scene_fault
-from ringbalance.scene.faults import SceneError, toml_text
-from ringbalance.scene.joint import independent_half_widths
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.toml import toml_text
+from ringbalance.scene.uncertain import independent_half_widths
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""

@@ -23,9 +23,8 @@ from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.reduced_model.tube.regime import TubeEnds, can_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
-from ringbalance.scene.joint import input_sides, without_fitted
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, input_sides, nominal_value, without_fitted
 
 _STEP: Final = 1e-5
 """Of ln u, for slopes."""

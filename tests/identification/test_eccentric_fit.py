@@ -13,7 +13,7 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
     eccentric_scene,

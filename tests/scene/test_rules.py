@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from ringbalance.scene.kinds import Finding, limit_above_noise
 from ringbalance.scene.models import Bend
 from ringbalance.scene.rules import shape, working
-from ringbalance.scene.rules.check import Finding, limit_above_noise
 
 RULES = {each.rule.__name__.removeprefix("_"): each.rule for each in (*shape.CHECKS, *working.CHECKS)}
 BENDS = (Bend(angle=1.5, radius=0.004), Bend(angle=1.0, radius=0.002))

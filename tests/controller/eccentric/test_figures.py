@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
-from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque
-from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw
-from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
+from ringbalance.controller.eccentric_mass.settings import DriveLaw
+from ringbalance.controller.eccentric_mass.step import friction_torque
+from ringbalance.controller.eccentric_mass.targets import target_angles
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.verification.cases.driven_bound.case import motion_bound
 from ringbalance.verification.cases.driven_fig4_imbalance.case import (

@@ -6,15 +6,11 @@ import math
 from typing import NamedTuple
 
 from ringbalance.controller.eccentric_mass.control_records import Supervisor
-from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
-    FrictionEstimate,
-    FrictionNoise,
-    TrackModel,
-)
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import ProcessNoise, WhirlModel
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.friction_filter import FrictionEstimate, FrictionNoise, TrackModel
+from ringbalance.controller.eccentric_mass.imbalance_filter import ProcessNoise, WhirlModel
+from ringbalance.controller.eccentric_mass.plan import Gates
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.strategy.plan import Gates
 
 _SMOOTHING_TIME = 0.05
 """Of the angles and rates that arrival is judged by, s."""

@@ -6,7 +6,18 @@ import cmath
 import math
 from typing import Final
 
-from ringbalance.controller.eccentric_mass.strategy.changed_plan import (
+from ringbalance.controller.eccentric_mass.plan import (
+    HELD,
+    MOVING,
+    NOT_YET,
+    RELEASED,
+    Cause,
+    Facts,
+    Findings,
+    Gates,
+    Pair,
+    Plan,
+    Stage,
     averaging_from,
     enter,
     setting_out,
@@ -24,31 +35,16 @@ from ringbalance.controller.eccentric_mass.strategy.changed_plan import (
     with_targets,
     with_trial,
 )
-from ringbalance.controller.eccentric_mass.strategy.correction import (
+from ringbalance.controller.eccentric_mass.targets import (
     Correction,
+    Tuning,
+    assign,
     correction_aim,
     correction_back,
     correction_ends,
     correction_judged,
     correction_start,
     correction_step,
-)
-from ringbalance.controller.eccentric_mass.strategy.plan import (
-    HELD,
-    MOVING,
-    NOT_YET,
-    RELEASED,
-    Cause,
-    Facts,
-    Findings,
-    Gates,
-    Pair,
-    Plan,
-    Stage,
-)
-from ringbalance.controller.eccentric_mass.strategy.targets import (
-    Tuning,
-    assign,
     separation,
     target_angles,
     tuning_next,

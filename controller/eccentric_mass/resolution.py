@@ -12,21 +12,17 @@ import cmath
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
-    MassInput,
-    imbalance_history,
-    start_estimate,
-)
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
+from ringbalance.controller.eccentric_mass.imbalance_filter import (
     FilterMatrices,
+    MassInput,
     ProcessNoise,
     WhirlModel,
     filter_matrices,
+    imbalance_history,
+    start_estimate,
     whirl_transition,
 )
-from ringbalance.controller.eccentric_mass.scene_records import (
-    EccentricScene,
-)
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.paths import value_at, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95

@@ -12,7 +12,7 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import RestsOn
 from ringbalance.verification.eccentric_scenes import changed
-from ringbalance.verification.evidence import CaseCode, Evidence, Reference
+from ringbalance.verification.evidence import Evidence
 
 KNOWN: Final = ("given", "measured")
 """Origins of a value that somebody vouches for: it is taken as it stands."""
@@ -87,35 +87,21 @@ def overridden(scene: Any, overrides: Mapping[str, float | Literal["absent"]]) -
     return scene
 
 
-def references(code: CaseCode, scene: Any) -> Mapping[str, Reference]:
-    """What the judged quantities are compared with, by name."""
-    given = getattr(code, "reference", {})
-    found: Mapping[str, Reference] = given(scene) if callable(given) else given
-    return found
-
-
 def widened(
-    evidence: Evidence,
-    code: CaseCode,
-    scene: Any,
-    assumptions: Sequence[Assumption],
-    *,
-    values: Callable[[Any], Mapping[str, float]],
+    evidence: Evidence, scene: Any, assumptions: Sequence[Assumption], *, at: Callable[[Any], Evidence]
 ) -> Evidence:
     """Evidence with the reach of its assumed inputs: the case computed at all corners of their ranges.
 
     What moves is the error, so an input that moves number and reference alike counts for nothing.
-    Args: `values`: the judged numbers on a scene.
+    Args: `at`: what is judged on another scene, or a part of it.
     """
     if not assumptions:
         return evidence
 
     def errors(of: Any) -> Mapping[str, float]:
-        against = references(code, of)
-        return {
-            name: value - (against[name].value if name in against else 0.0)
-            for name, value in values(of).items()
-        }
+        there = at(of)
+        exact = {name: reference.value for name, reference in there.reference.items()}
+        return {name: found.value - exact.get(name, 0.0) for name, found in there.found.items()}
 
     here = errors(scene)
     paths = [one.path for one in assumptions]

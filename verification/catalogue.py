@@ -5,6 +5,7 @@ What is wrong with a case of a user's own is a `CaseError` in one sentence and s
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import inspect
 import re
@@ -55,15 +56,17 @@ class UnknownCaseError(KeyError):
 
 
 def case_code(case_id: str) -> CaseCode:
-    """The `case.py` of a case, or the study that it shares with others.
+    """The function that a case's text names, with `<name>_ends` where there is one; else its `case.py`.
 
     Raises: UnknownCaseError: no such id; the text names the nearest one.
     """
     study = load_case(case_id).study
-    if study is not None:
-        shared = getattr(cases, study.of).study
-        return cast(CaseCode, SimpleNamespace(compute=partial(shared, **study.settings)))
-    return cast(CaseCode, getattr(cases, f"{case_id}_code"))
+    if study is None:
+        return cast(CaseCode, getattr(cases, f"cases.{case_id}.case"))
+    place, _, name = study.of.rpartition(".")
+    module = getattr(cases, place)
+    compute = partial(getattr(module, name), **study.settings)
+    return cast(CaseCode, SimpleNamespace(compute=compute, ends=getattr(module, f"{name}_ends", None)))
 
 
 @lru_cache(maxsize=64)
@@ -155,9 +158,9 @@ class _Code:
                 f"{self.path}: compute gives {_kind(found)}, not an Evidence or numbers by quantity"
             )
         self._check_names("compute", found.found, complete=True)
-        return found
+        return dataclasses.replace(found, reference={**found.reference, **self._reference(scene)})
 
-    def reference(self, scene: Any) -> Mapping[str, Reference]:
+    def _reference(self, scene: Any) -> Mapping[str, Reference]:
         """What judged quantities are compared with, by name; nothing where the case has none."""
         given = getattr(self.module, "reference", {})
         values = self._called(given, scene) if callable(given) else given

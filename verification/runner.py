@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import lru_cache, partial
@@ -13,7 +13,7 @@ from typing import Any
 from ringbalance.scene import AnyScene, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers, beside
-from ringbalance.verification.assumptions import assumptions_of, overridden, references, widened
+from ringbalance.verification.assumptions import assumptions_of, overridden, widened
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
 from ringbalance.verification.eccentric_scenes import driven_scene
@@ -96,10 +96,10 @@ def _judged(
         evidence = code.compute(mutated, level, built_in)
         rests = [one for one in definition.rests_on if one.path not in prescribed]
         assumptions = assumptions_of(rests, mutated)
-        values = partial(_values, code, level, built_in, (mutated, evidence))
+        at = partial(_evidence_at, code, level, built_in, (mutated, evidence))
         by_corners = [one for one in assumptions if not one.covered]
-        evidence = widened(evidence, code, mutated, by_corners, values=values)
-        quantities = _quantities(definition, evidence, references(code, mutated))
+        evidence = widened(evidence, mutated, by_corners, at=at)
+        quantities = _quantities(definition, evidence)
     except NotRunError as error:
         return outcome(status=str(error))
     except (ValueError, ArithmeticError, RuntimeError) as error:
@@ -122,27 +122,25 @@ def _judged(
     )
 
 
-def _values(
+def _evidence_at(
     code: CaseCode, level: Level, defect: str | None, known: tuple[Any, Evidence], scene: Any
-) -> Mapping[str, float]:
-    """Judged numbers on a scene, by the case's shorter way to them where it has one.
+) -> Evidence:
+    """What is judged on another scene, by the case's shorter way to it where it has one.
 
     Args: `known`: a scene with its evidence.
     """
-    shorter = getattr(code, "values", None)
-    if shorter is not None and defect is None:
-        return dict(shorter(scene))
+    shorter: Callable[[Any], Evidence] | None = getattr(code, "ends", None)
     try:
-        evidence = known[1] if scene == known[0] else code.compute(scene, level, defect)
+        if shorter is not None and defect is None:
+            return shorter(scene)
+        return known[1] if scene == known[0] else code.compute(scene, level, defect)
     except NotRunError as error:
         raise ValueError(f"not at every value of an assumed input: {error}") from error
-    return {name: one.value for name, one in evidence.found.items()}
 
 
-def _quantities(
-    definition: CaseDefinition, evidence: Evidence, against: Mapping[str, Reference]
-) -> tuple[QuantityResult, ...]:
+def _quantities(definition: CaseDefinition, evidence: Evidence) -> tuple[QuantityResult, ...]:
     """Every quantity of a case. Raises: ValueError: what was found is not what the case judges."""
+    against = evidence.reference
     names = {quantity.name for quantity in definition.quantity}
     if set(evidence.found) != names or not set(against) <= names:
         raise ValueError(

@@ -11,31 +11,25 @@ import numpy as np
 from ringbalance.physics.convergence import GridConvergence, GridVerdict, gci
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found
+from ringbalance.verification.evidence import Evidence, Level, Table, as_found
 
 _LIMIT: Final = 1.0
 _FORMAL: Final = 2.0
-_FITTED: Final = 3.0
+_SIZES: Final = np.array([1.0, 2.0, 4.0])
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Sequence:
-    """Values on meshes of size 1, 2, 4 ..., with what must be said of them."""
+    """Values on meshes of size 1, 2 and 4, with what must be said of them."""
 
     name: str
     values: FloatArray
     expected: tuple[GridVerdict, ...]
-    formal_order: float = _FORMAL
     converges: bool = True
 
 
-def _h(levels: int = 3) -> FloatArray:
-    return np.asarray(2.0 ** np.arange(levels), dtype=np.float64)
-
-
 def _sequences() -> tuple[_Sequence, ...]:
-    h = _h()
-    noise = np.array([0.0, 1e-9, -1e-9, 1e-9, 0.0])
+    h = _SIZES
     astray = (GridVerdict.NOT_ASYMPTOTIC, GridVerdict.DIVERGING)
     return (
         _Sequence(name="second order", values=_LIMIT + 1e-3 * h**2, expected=(GridVerdict.MONOTONE,)),
@@ -61,16 +55,7 @@ def _sequences() -> tuple[_Sequence, ...]:
             values=_LIMIT + np.array([0.0, 4e-16, -4e-16]),
             expected=(GridVerdict.ROUND_OFF,),
         ),
-        _Sequence(
-            name="five levels, third order, noise",
-            values=_LIMIT + 1e-4 * _h(5) ** _FITTED + noise,
-            expected=(GridVerdict.MONOTONE,),
-            formal_order=_FITTED,
-        ),
     )
-
-
-reference = {"fitted_order": Reference(value=_FITTED)}
 
 
 def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -84,7 +69,6 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             wrong_verdicts=wrong,
             capped_order=judged["faster than formal"].order,
             missed_limits=missed,
-            fitted_order=judged["five levels, third order, noise"].observed_order,
         ),
         numbers={"sequences": float(len(sequences))},
         tables=(_table(judged),),
@@ -93,8 +77,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
 def _judge(one: _Sequence, defect: str | None) -> GridConvergence:
     values = _by_magnitude(one.values) if defect == "signs_ignored" else one.values
-    formal = 50.0 if defect == "cap_removed" else one.formal_order
-    return gci(values=values.tolist(), sizes=_h(values.size).tolist(), formal_order=formal)
+    formal = 50.0 if defect == "cap_removed" else _FORMAL
+    return gci(values=values.tolist(), sizes=_SIZES.tolist(), formal_order=formal)
 
 
 def _by_magnitude(values: FloatArray) -> FloatArray:

@@ -1,40 +1,60 @@
-"""The largest fill that leaves a point of the chamber dry at every angle, at rest and at every speed."""
+"""The gas line's mouth: the fills that leave it dry, and a chamber that its tube reaches into."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.integrate import quad
+from scipy.optimize import brentq, minimize_scalar
 
-from ringbalance.mesh.geometry import half_angle, surface_radius
+from ringbalance.mesh.geometry import (
+    chamber_volume,
+    half_angle,
+    liquid_area,
+    liquid_first_moment,
+    surface_radius,
+)
 from ringbalance.mesh.quadratic_tetrahedra import derivatives, shapes, tetrahedra
 from ringbalance.mesh.wall_integrals import gauss
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms, drawing_shares
+from ringbalance.scene import liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.uncertain import with_value
 from ringbalance.verification.evidence import (
     Curve,
     Evidence,
     Found,
     Level,
     NotRunError,
+    Reference,
     Series,
+    as_found,
     figure,
     from_half_width,
 )
 
-_GRIDS = ((30, 45, 4), (60, 90, 8))
+_GRIDS: Final = ((30, 45, 4), (60, 90, 8))
 """Radial and angular cells, and of an imported cell Gauss points along each direction; coarse and fine."""
-_ANGLES = np.linspace(0.0, np.pi, 181)
+_ANGLES: Final = np.linspace(0.0, np.pi, 181)
 """Of the shaft; the chamber is symmetric about its centre line."""
-_HOLE = "gas_hole"
+_HOLE: Final = "gas_hole"
 """Boundary of an imported chamber that is the mouth of its gas line."""
-_JUDGED = ("stopped", "running", "any_speed")
-_DOWNWARD = _ANGLES[:1]
-_OFFSETS = np.array([0.02, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 20.0])
+_JUDGED: Final = ("stopped", "running", "any_speed")
+_OFFSETS: Final = np.array([0.02, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 20.0])
 """g/omega^2 in units of R2: from a centred ring to almost a plane."""
+_FILE: Final = Path(__file__).parent / "gas_tube" / "data" / "scene.toml"
+_RADIUS, _TIP = 2e-3, 31e-3
+"""Of the tube outside, and radius of its mouth, m; as tools/example_chambers.py draws them."""
+_DEEP: Final = 0.8
+"""Fill ratio at which part of the tube is under the surface."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,34 +69,38 @@ class _Cells:
     """Distance over which the surface passes a cell, m."""
 
 
-def values(scene: Scene) -> dict[str, float]:
-    return _margins(scene, _angles(scene.disc), _GRIDS[0])
+def gas_hole_ends(scene: Scene) -> Evidence:
+    """On the coarse grid."""
+    disc, angles = scene.disc, _angles(scene.disc)
+    cells = _cells(disc, *_GRIDS[0])
+    safe = _safe_fills(scene, cells, _hole(disc, _safest_radius(disc, cells, angles)), angles)
+    return Evidence(
+        found=as_found(**{f"margin_{state}": safe[state] - disc.max_fill_ratio for state in _JUDGED})
+    )
 
 
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Safe fills at rest, at full speed and between.
+def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The largest fill that leaves a point of the chamber dry at every angle, at rest and at any speed.
 
     Raises: NotRunError: the shaft is vertical, or there is no gravity.
     """
     if scene.environment.shaft != "horizontal" or scene.environment.gravity == 0:
         raise NotRunError("the claim is about a horizontal shaft under gravity")
     disc = scene.disc
-    angles = _DOWNWARD if defect == "upright_only" else _angles(disc)
+    angles = _ANGLES[:1] if defect == "upright_only" else _angles(disc)
     coarse, fine = (_cells(disc, *grid) for grid in _GRIDS)
     best = _safest_radius(disc, fine, angles)
     hole = _hole(disc, best)
-    offset = scene.environment.gravity / scene.rotor.speed**2
-    rough, safe = (_safe_fills(disc, cells, hole, offset, angles) for cells in (coarse, fine))
-    found = {
-        f"margin_{state}": Found(
-            value=fill - disc.max_fill_ratio, numerical=from_half_width(abs(fill - rough[state]))
-        )
-        for state, fill in safe.items()
-        if state in _JUDGED
-    }
+    rough, safe = (_safe_fills(scene, cells, hole, angles) for cells in (coarse, fine))
     ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
     return Evidence(
-        found=found,
+        found={
+            f"margin_{state}": Found(
+                value=safe[state] - disc.max_fill_ratio,
+                numerical=from_half_width(abs(safe[state] - rough[state])),
+            )
+            for state in _JUDGED
+        },
         numbers={
             "best_radius": best,
             "hole_radius": float(np.abs(hole).mean()),
@@ -87,16 +111,8 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "safe_at_ring": _safe_at_rest(fine, _on_centre_line(ring), angles),
             "between_margin": safe["turning"] - safe["stopped"],
         },
-        series=(_figure(disc, fine, offset),),
+        series=(_over_radius(scene, fine),),
     )
-
-
-def _margins(scene: Scene, angles: FloatArray, grid: tuple[int, int, int]) -> dict[str, float]:
-    disc, offset = scene.disc, scene.environment.gravity / scene.rotor.speed**2
-    cells = _cells(disc, *grid)
-    hole = _hole(disc, _safest_radius(disc, cells, angles))
-    safe = _safe_fills(disc, cells, hole, offset, angles)
-    return {f"margin_{state}": safe[state] - disc.max_fill_ratio for state in _JUDGED}
 
 
 def _angles(disc: Disc) -> FloatArray:
@@ -117,18 +133,20 @@ def _on_centre_line(radius: float) -> ComplexArray:
     return np.array([radius], dtype=np.complex128)
 
 
-def _safe_fills(
-    disc: Disc, cells: _Cells, hole: ComplexArray, offset: float, angles: FloatArray
-) -> Mapping[str, float]:
+def _safe_fills(scene: Scene, cells: _Cells, hole: ComplexArray, angles: FloatArray) -> Mapping[str, float]:
     """Safe fills with a hole: at full speed, at rest, at any speed between, at the worst."""
     stopped = _safe_at_rest(cells, hole, angles)
-    turning = _safe_turning(cells, hole, _OFFSETS * disc.outer_radius, angles)
+    turning = _safe_turning(cells, hole, _OFFSETS * scene.disc.outer_radius, angles)
     return {
-        "running": _safe_turning(cells, hole, np.array([offset]), angles),
+        "running": _safe_turning(cells, hole, _offset(scene), angles),
         "stopped": stopped,
         "turning": turning,
         "any_speed": min(stopped, turning),
     }
+
+
+def _offset(scene: Scene) -> FloatArray:
+    return np.array([scene.environment.gravity / scene.rotor.speed**2])
 
 
 def _cells(disc: Disc, radial: int, angular: int, points: int) -> _Cells:
@@ -218,11 +236,12 @@ def _safest_radius(disc: Disc, cells: _Cells, angles: FloatArray) -> float:
     return float(result.x)
 
 
-def _figure(disc: Disc, cells: _Cells, offset: float) -> Series:
+def _over_radius(scene: Scene, cells: _Cells) -> Series:
+    disc = scene.disc
     radius = np.linspace(disc.inner_radius, disc.outer_radius, 61)
     points, angles = [_on_centre_line(r) for r in radius], _angles(disc)
     rest = np.array([_safe_at_rest(cells, point, angles[::4]) for point in points])
-    running = np.array([_safe_turning(cells, point, np.array([offset]), angles[::30]) for point in points])
+    running = np.array([_safe_turning(cells, point, _offset(scene), angles[::30]) for point in points])
     return figure(
         "largest fill that leaves the gas hole dry",
         ("radius of the hole on the centre line", "m", radius),
@@ -230,3 +249,114 @@ def _figure(disc: Disc, cells: _Cells, offset: float) -> Series:
         Curve("stopped, worst angle", "1", rest),
         Curve("largest fill", "1", np.full(radius.shape, disc.max_fill_ratio), style="paper"),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Exact:
+    """The sector between plates less a cylinder along x, by quadrature over y; no mesh."""
+
+    scene: Scene
+    radius: float
+    """Of the cylinder, m; 0 for the bare sector."""
+
+    def _over_tube(self, inside: Callable[[float], float]) -> float:
+        if self.radius == 0:
+            return 0.0
+        width = 2 * self.radius
+
+        def chord(angle: float) -> float:
+            # y = radius sin(angle) takes the root at the cylinder's sides away.
+            y = self.radius * math.sin(angle)
+            return width * math.cos(angle) * inside(y) * self.radius * math.cos(angle)
+
+        return float(quad(chord, -math.pi / 2, math.pi / 2, epsrel=1e-12, epsabs=0, limit=400)[0])
+
+    def volume(self, a: float) -> float:
+        """Outside a surface, m^3."""
+        disc = self.scene.disc
+        tube = self._over_tube(lambda y: max(_TIP - math.sqrt(a * a - y * y), 0.0))
+        return disc.axial_width * float(liquid_area(disc=disc, surface_radius=a)) - tube
+
+    def moment(self, a: float) -> float:
+        """Along x, kg m."""
+        disc = self.scene.disc
+        tube = self._over_tube(lambda y: max(_TIP**2 - (a * a - y * y), 0.0) / 2)
+        sector = disc.axial_width * float(liquid_first_moment(disc=disc, surface_radius=a))
+        return self.scene.liquid.density * (sector - tube)
+
+    def lever(self, a: float) -> float:
+        """lambda, twice the mean of x over the free surface, m."""
+        disc, alpha = self.scene.disc, float(half_angle(disc=self.scene.disc, radius=a))
+
+        def there(y: float) -> float:
+            return 1.0 if math.sqrt(a * a - y * y) < _TIP else 0.0
+
+        area = 2 * a * alpha * disc.axial_width
+        along = 2 * a * a * math.sin(alpha) * disc.axial_width
+        area -= self._over_tube(lambda y: there(y) * a / math.sqrt(a * a - y * y))
+        along -= self._over_tube(lambda y: there(y) * a)
+        return 2 * along / area
+
+    def surface(self, fill: float) -> float:
+        """Radius of the free surface at a fill ratio, m."""
+        disc = self.scene.disc
+        wanted = fill * self.volume(disc.inner_radius)
+        return float(
+            brentq(lambda a: self.volume(a) - wanted, disc.inner_radius, disc.outer_radius, xtol=1e-14)
+        )
+
+
+def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The paper's chamber with a real gas tube: a mesh from CAD against the sector less a cylinder.
+
+    Raises: SceneError: the file of the case is damaged.
+    """
+    with_tube = replace(scene, disc=_disc_with_tube())
+    meshed = scene if defect == "without_the_tube" else with_tube
+    if defect == "drawn_too_wide":
+        meshed = with_value(scene=meshed, quantity="axial_width", value=1.001 * meshed.disc.axial_width)
+    largest = scene.disc.max_fill_ratio
+    fills = np.array([largest / 2, largest, _DEEP])
+    _, moment, ratio = chamber_closed_forms(scene=meshed, fill_ratio=fills)
+    shares = drawing_shares(meshed.disc, fills)
+    values = {
+        "volume": (chamber_volume(disc=meshed.disc), shares.volume),
+        "moment": (moment[1], shares.moment[1]),
+        "moment_deep": (moment[2], shares.moment[2]),
+        "lever": (ratio[0], shares.moment[0]),
+    }
+    bare, exact = (_totals(_Exact(scene=scene, radius=radius), fills) for radius in (0.0, _RADIUS))
+    hole = gas_hole(with_tube, level).numbers
+    return Evidence(
+        found={
+            name: Found(
+                value=float(value), numerical=from_half_width((float(share) + 1e-8) * abs(float(value)))
+            )
+            for name, (value, share) in values.items()
+        },
+        reference={name: Reference(value=value) for name, value in exact.items()},
+        numbers={
+            **{f"{name}_change": exact[name] / bare[name] - 1 for name in ("volume", "moment", "lever")},
+            "thickness": 2 * _RADIUS,
+            "tip": _TIP,
+            "ring_radius": float(surface_radius(disc=scene.disc, fill_ratio=largest)),
+            "safe_stopped": hole["safe_stopped"],
+            "safe_running": hole["safe_running"],
+        },
+    )
+
+
+def _totals(exact: _Exact, fills: FloatArray) -> dict[str, float]:
+    """At equal fills, the largest, and a deep one."""
+    half, full, deep = (exact.surface(float(fill)) for fill in fills)
+    return {
+        "volume": exact.volume(exact.scene.disc.inner_radius),
+        "moment": exact.moment(full),
+        "moment_deep": exact.moment(deep),
+        "lever": exact.lever(half),
+    }
+
+
+@lru_cache(maxsize=1)
+def _disc_with_tube() -> Disc:
+    return liquid_ring_scene(load_scene(_FILE)).disc

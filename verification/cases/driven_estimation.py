@@ -1,8 +1,9 @@
-"""How fast four imbalances become known, and under which covariances that takes the printed time."""
+"""What the eccentric-mass paper estimates: the imbalance (Fig. 4) and the friction arms (Fig. 5)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,8 @@ from ringbalance.controller.eccentric_mass.imbalance_filter import (
 )
 from ringbalance.controller.eccentric_mass.integration import run_plant
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import believed_whirl
 from ringbalance.scene.arrays import FloatArray
@@ -27,7 +30,7 @@ _PRINTED = 3.5
 """Middle of the printed 3 to 4 s."""
 _PAPER_PHASES = (30.0, 100.0, 210.0, 300.0)
 """Of the imbalance in Fig. 4, deg."""
-_CONVERGED = 0.02
+_IMBALANCE_CONVERGED = 0.02
 """Relative error of the imbalance within which its estimate has converged."""
 _SCALES = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0, 1e4)
 """Sensor noise that the filter assumes, over the true one."""
@@ -68,8 +71,9 @@ class _FigureFour:
     """The same time for the first phase, s, shape (scales,); infinite where it is never reached."""
 
 
-def values(scene: EccentricScene) -> dict[str, float]:
-    return _judged(figure_four(scene, scales=(1.0,)))
+def imbalance_ends(scene: EccentricScene) -> Evidence:
+    """With honest covariances alone."""
+    return Evidence(found=as_found(**_judged(figure_four(scene, scales=(1.0,)))))
 
 
 def _judged(found: _FigureFour) -> dict[str, float]:
@@ -85,8 +89,10 @@ def _within(found: _FigureFour, time: float) -> float:
     return min(time, float(found.time[-1]))
 
 
-def compute(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """Convergence times under honest and under ever less honest covariances."""
+def imbalance(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
+    """How fast four imbalances become known, and under which covariances that takes the printed time.
+
+    Convergence times under honest and under ever less honest covariances."""
     found = figure_four(scene)
     judged = _judged(found)
     if defect is not None:
@@ -172,7 +178,7 @@ def estimate_imbalance(
 def _time_of(scene: EccentricScene, record: _ImbalanceRecord, scale: float) -> float:
     states, _ = estimate_imbalance(scene, record, scale=scale)
     error = np.abs(states[:, 4] + 1j * states[:, 5] - record.imbalance) / abs(record.imbalance)
-    return convergence_time(record.time, error, limit=_CONVERGED)
+    return convergence_time(record.time, error, limit=_IMBALANCE_CONVERGED)
 
 
 def figure_four(
@@ -192,3 +198,52 @@ def figure_four(
         scales=np.asarray(scales, dtype=np.float64),
         scaled_time=np.array([_time_of(turned[0], records[0], scale) for scale in scales]),
     )
+
+
+_BEFORE, _AFTER = 0.1, 0.6
+"""Shown around the beginning of the friction stage, s."""
+_PAPER_ARMS = (0.01, 0.005)
+"""Of Fig. 5, m."""
+_FRICTION_CONVERGED = 0.05
+"""Relative error of the friction arm within which its estimate has converged."""
+
+
+def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
+    """Two friction arms found while both masses go round.
+
+    Errors of the friction arms and the time they take."""
+    runs = friction_runs(scene)
+    wrong = 1.1 if defect == "another_friction" else 1.0
+    errors = [np.max(np.abs(run.estimates.friction_arm[-1] / (wrong * arm) - 1)) for arm, run in runs.items()]
+    slowest = max(friction_time(run, arm) for arm, run in runs.items())
+    return Evidence(found=as_found(error=max(errors), slowest=slowest), series=(_figure(runs),))
+
+
+def friction_runs(scene: EccentricScene, *, time_limit: float = 12.0) -> Mapping[float, EccentricRun]:
+    """Runs by their true friction arm, m. Source: Fig. 5 of the paper on eccentric masses."""
+    level = at_constant_speed(scene, time_limit=time_limit)
+    return {a: simulate_eccentric(changed(level, "masses", friction_arm=(a, a))) for a in _PAPER_ARMS}
+
+
+def friction_time(run: EccentricRun, arm: float) -> float:
+    """From the beginning of the friction stage until both estimates keep within 5 %, s."""
+    begun = [stage.start for stage in run.stages if stage.name == "friction estimation"]
+    if not begun:
+        return math.inf
+    error = np.max(np.abs(run.estimates.friction_arm - arm), axis=1) / arm
+    return convergence_time(run.time, error, limit=_FRICTION_CONVERGED) - begun[0]
+
+
+def _figure(runs: Mapping[float, EccentricRun]) -> Series:
+    first = runs[_PAPER_ARMS[0]]
+    begun = next(s.start for s in first.stages if s.name == "friction estimation")
+    time = first.time - begun
+    shown = (time > -_BEFORE) & (time < _AFTER)
+    curves = [
+        Curve(f"{1e3 * arm:g} mm, first mass", "m", thinned(run.estimates.friction_arm[shown, 0]))
+        for arm, run in runs.items()
+    ]
+    count = curves[0].values.size
+    true = [Curve(f"{1e3 * arm:g} mm, printed", "m", np.full(count, arm), style="reference") for arm in runs]
+    when = ("time since the masses started", "s", thinned(time[shown]))
+    return figure("friction arm, estimated", when, *curves, *true)

@@ -1,4 +1,4 @@
-"""The friction formula beside a mixing-length solution, on smooth and on sand-rough walls.
+"""The friction formula: its blend of laminar and turbulent flow, and a mixing-length solution beside it.
 
 Turbulent flow in a straight tube by Prandtl's mixing length: in wall units (friction velocity, nu) the shear
 stress is tau = r/R of the wall's, and
@@ -29,6 +29,8 @@ from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as
 from ringbalance.verification.validation.comparison import friction
 from ringbalance.verification.validation.kinds import measurements
 
+_TURBULENT: Final = 4000.0
+_STEP: Final = 1.01
 _NIKURADSE_SLOPE = 0.4
 _UNDAMPED = 60.0
 """ks+ from which on the viscous layer is gone."""
@@ -37,8 +39,6 @@ _ROUGH_WALL = 8.5
 _PARTS: Final = 24
 """Of the way from the wall to the axis, each so many times as long as the one before, from y+ = 1 on."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-Friction = Callable[[FloatArray, FloatArray], FloatArray]
-
 _EVEN: Final = {"light": (1e5, 1e6), "heavy": (1e5, 1.5e5, 2e5, 3e5, 5e5, 7e5, 1e6)}
 _LOW: Final = (3e3, 1e4)
 _HIGH: Final = 1e5
@@ -51,6 +51,36 @@ _BETWEEN: Final = (3.0, 40.0)
 """ks+ between smooth and fully rough."""
 _SHOWN: Final = 126.0
 """R/ks of the figure."""
+
+
+def blend(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Exact where laminar, without a jump, one velocity a head."""
+
+    def friction_of(reynolds: FloatArray) -> FloatArray:
+        f = friction_factor(reynolds=reynolds, relative_roughness=0.0)
+        if defect == "sudden_switch":
+            f = np.where(reynolds < _TURBULENT, 0.316 * reynolds**-0.25, f)
+            return np.where(reynolds < 2040, 64 / reynolds, f)
+        return f / 4 if defect == "fanning_factor" else f
+
+    laminar = np.geomspace(1, 1000, 200)
+    sweep = np.exp(np.arange(np.log(100), np.log(1e5), np.log(_STEP)))
+    curve = friction_of(sweep)
+    shown = figure(
+        "friction factor of a smooth tube",
+        ("Reynolds number", "1", sweep),
+        Curve("blend", "1", curve),
+        Curve("64/Re", "1", 64 / sweep, style="reference"),
+        log=True,
+    )
+    return Evidence(
+        found=as_found(
+            laminar=np.max(np.abs(friction_of(laminar) * laminar / 64 - 1)),
+            jump=np.max(np.abs(np.diff(curve) / curve[:-1])),
+            head_slope=np.min(np.diff(np.log(curve * sweep**2)) / np.log(_STEP)),
+        ),
+        series=(shown,),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +105,8 @@ _CLOSURES: Final = MappingProxyType(
 )
 
 
-def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+def turbulent(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The friction formula beside a mixing-length solution, on smooth and on sand-rough walls."""
     closure = _CLOSURES[defect]
 
     def by_length(reynolds: FloatArray, roughness: FloatArray) -> FloatArray:
@@ -111,7 +142,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "rough": float(np.max(np.abs(wall[grain > _FULLY_ROUGH]))),
             "formula_rough": float(np.max(np.abs(formula[grain > _FULLY_ROUGH]))),
         },
-        series=(_figure(by_length),),
+        series=(_on_one_sand(by_length),),
     )
 
 
@@ -210,7 +241,7 @@ def _quadrature_gap(closure: MixingLength) -> float:
     return abs(flow.friction_factor / (8 / bulk**2) - 1)
 
 
-def _figure(by_length: Friction) -> Series:
+def _on_one_sand(by_length: Callable[[FloatArray, FloatArray], FloatArray]) -> Series:
     """One sand over Re, where formula and measurements part."""
     sand = friction(measurements("nikuradse_1933"))
     wall = np.isclose(sand.columns["relative_roughness"], 0.5 / _SHOWN)

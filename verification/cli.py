@@ -14,7 +14,6 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from ringbalance.identification.data.measurements import MeasurementsError
 from ringbalance.scene import AnyScene, liquid_ring_scene, load_scene
 from ringbalance.scene.platform.processes import checked_workers
 from ringbalance.scene.platform.terminal import Activity, activity, messages_console, results_console
@@ -160,11 +159,7 @@ def _run(
 
 
 def _judge_data(path: Path, *, json: bool) -> int:
-    try:
-        document = data_document(path)
-    except MeasurementsError as error:
-        _say(error)
-        return BAD_INPUT
+    document = data_document(path)
     if json:
         print(dumps(document, allow_nan=False))
         return DONE

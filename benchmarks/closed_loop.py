@@ -31,7 +31,7 @@ from closed_loop_plain import by_the_law, in_numbers
 from rich.console import Console
 from rich.table import Table
 
-from ringbalance.controller.ensemble.monte_carlo import simulate_ensemble
+from ringbalance.controller.ensemble import simulate_ensemble
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loader import bundled_scene, load_scene

@@ -20,7 +20,7 @@ from ringbalance.scene.models import Scene
 
 FIRST_CALL = """
 import time
-from ringbalance.controller.ensemble.monte_carlo import simulate_ensemble
+from ringbalance.controller.ensemble import simulate_ensemble
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loader import bundled_scene, load_scene
 scene = load_scene(bundled_scene("liquid_ring_paper"))

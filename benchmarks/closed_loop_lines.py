@@ -11,15 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from closed_loop_plain import Plain, plain_run
 
-from ringbalance.controller.ensemble.monte_carlo import (
+from ringbalance.controller.ensemble import (
+    EnsemblePlan,
     ensemble_dynamics,
     simulate_ensemble,
     simulate_members,
 )
-from ringbalance.controller.ensemble.run import EnsemblePlan
-from ringbalance.controller.ensemble.samples import Members
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.controller.members import Members
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 from ringbalance.verification.reference.transfers import Drive, closed_form
 

@@ -26,12 +26,16 @@ from closed_loop_plain import plain_run
 from moving_injection import FILL_ERROR, METHODS, TOLERANCES, WANTED, Rival, least, ours, piped_scene
 from rich.console import Console
 
-from ringbalance.controller.ensemble.monte_carlo import ensemble_dynamics, simulate_ensemble, simulate_members
-from ringbalance.controller.ensemble.run import RELATIVE_ERROR
+from ringbalance.controller.ensemble import (
+    RELATIVE_ERROR,
+    ensemble_dynamics,
+    simulate_ensemble,
+    simulate_members,
+)
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.models import Scene
 

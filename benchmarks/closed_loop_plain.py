@@ -11,8 +11,8 @@ from typing import Protocol
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.formulas import vector_shares
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.controller.algorithms.built_in import vector_shares
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.models import Scene
 

@@ -21,24 +21,23 @@ from dataclasses import replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.ensemble.run import RELATIVE_ERROR
+from ringbalance.controller.ensemble import RELATIVE_ERROR
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.physics.gas import flow_shape
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.injection.dynamics import Dynamics, Lift
+from ringbalance.reduced_model.injection.dynamics import WORKSPACE, Dynamics, Lift
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.march import advance
 from ringbalance.reduced_model.injection.pair import Motion, packed
-from ringbalance.reduced_model.injection.records import WORKSPACE
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 FILL_ERROR = 1e-6
 WANTED = 1000.0

@@ -40,12 +40,11 @@ from openfoam_waves import (
 from ringbalance.mesh.bent_tube import Segment
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.convergence import gci
-from ringbalance.physics.sloshing.modes import sloshing_modes
-from ringbalance.physics.sloshing.response import sloshing_response
+from ringbalance.physics.sloshing import sloshing_modes, sloshing_response
 from ringbalance.physics.tube.friction import rotation_reynolds_number
+from ringbalance.physics.tube.loss import model_parts
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.physics.tube.state import tube_state_at
-from ringbalance.physics.tube.uncertainty import model_parts
 from ringbalance.reports.saved import PACKAGED
 from ringbalance.scene import write_whole
 from ringbalance.scene.loader import bundled_scene, load_scene

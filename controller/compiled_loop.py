@@ -7,13 +7,12 @@ Python can look at a run, note its trace, or be its sensor and its algorithm.
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any
 
 import numpy.typing as npt
 
+from ringbalance.controller.algorithms.built_in import target_vector_step, trial_step
 from ringbalance.controller.algorithms.law_based import law_based_step
-from ringbalance.controller.algorithms.target_vector import target_vector_step
-from ringbalance.controller.algorithms.trial import trial_step
 from ringbalance.controller.compiled_stretch import (
     keep_injections,
     keep_instant,
@@ -23,35 +22,29 @@ from ringbalance.controller.compiled_stretch import (
     note_stretch,
     vibration,
 )
-from ringbalance.controller.formulas import (
-    NONE,
-    SAMPLES,
-    has_held,
-    has_risen,
-    has_turned,
-    stop_cause,
-)
 from ringbalance.controller.loop_records import (
+    AT_REST,
+    HELD,
+    IDLE,
     NO_PHASE,
+    NONE,
     OWN,
+    RISING,
+    SAMPLES,
     TAIL_POINTS,
     TARGET_VECTOR,
+    TIME,
     TOO_SHORT,
     TRIAL,
     UNUSABLE,
     USABLE,
     Record,
 )
+from ringbalance.reduced_model.injection.dynamics import P, X
 from ringbalance.reduced_model.injection.events import rests, would_start
 from ringbalance.reduced_model.injection.gas import gas_volume
-from ringbalance.reduced_model.injection.records import P, X
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place
-
-_has_held: Final = in_place(has_held)
-_has_risen: Final = in_place(has_risen)
-_has_turned: Final = in_place(has_turned)
-_stop_cause: Final = in_place(stop_cause)
+from ringbalance.scene.platform.compiled import in_place
 
 
 @in_place
@@ -178,35 +171,33 @@ def _watch(loop: Record, run: Record) -> None:
         if run.samples == 1:
             run.first_seen = run.seen_amplitude
         if run.operated > 0 and not math.isnan(run.last_seen):
-            higher = _has_risen(run.last_seen, run.seen_amplitude, loop.noise_floor)
+            higher = run.seen_amplitude - run.last_seen > loop.noise_floor
             run.rises = run.rises + 1 if higher else 0
             run.misadjustments += 1 if higher else 0
         run.last_seen, run.operated = run.seen_amplitude, 0
     if run.usable == USABLE:
         if run.seen_amplitude > loop.limit and not math.isnan(run.last_phase):
-            run.overshoots += 1 if _has_turned(run.last_phase, run.seen_phase) else 0
+            run.overshoots += 1 if math.cos(run.seen_phase - run.last_phase) < 0.0 else 0
         run.last_phase = run.seen_phase
 
 
 @in_place
 def _cause(loop: Record, plant: Record, run: Record, motions: Record) -> int:
     """Why the loop stops cycling, if it does."""
-    held = run.cut == 0 and _has_held(run.time, run.since, loop.hold_time) and run.drains == 0
+    held = run.time - run.since >= loop.hold_time * (1.0 - 1e-9) and run.cut == 0 and run.drains == 0
     if held and run.held_since == math.inf:
         run.held_since = run.since
+    if held and run.stays > 0 and loop.to_time_limit == 0:
+        return HELD
+    above_first = run.last_seen - run.first_seen > loop.noise_floor
+    if run.rises > loop.rises_tolerated or (run.rises == loop.rises_tolerated and above_first):
+        return RISING
+    if run.idle >= loop.idle_tolerated:
+        return IDLE
     ends = run.cut == 0 and loop.to_time_limit == 0 and run.resting > 0 and loop.exact > 0
-    return int(
-        _stop_cause(
-            held and run.stays > 0 and loop.to_time_limit == 0,
-            run.rises,
-            loop.rises_tolerated,
-            _has_risen(run.first_seen, run.last_seen, loop.noise_floor),
-            run.idle,
-            loop.idle_tolerated,
-            ends and _rests(loop, plant, run, motions),
-            loop.time_limit - run.time,
-        )
-    )
+    if ends and _rests(loop, plant, run, motions):
+        return AT_REST
+    return TIME if loop.time_limit <= run.time else NONE
 
 
 @in_place

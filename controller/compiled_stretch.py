@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 
-from ringbalance.controller.formulas import NOTICEABLE
-from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
-from ringbalance.controller.loop_records import GAS_POINTS, TAIL_POINTS, Record
-from ringbalance.controller.moment_table import pair_moment
+from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL
+from ringbalance.controller.loop_records import GAS_POINTS, NOTICEABLE, TAIL_POINTS, Record, pair_moment
+from ringbalance.reduced_model.injection.dynamics import WORK, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance, least_later, opening_within
-from ringbalance.reduced_model.injection.records import WORK, X
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 
 @in_place

@@ -1,22 +1,25 @@
-"""A finished run as the JSON document that scripts rely on, as a table of its histories, and for a person."""
+"""A finished run as the JSON document that scripts rely on, as a table of its histories, and for a person.
+
+Where a scene does not give its gas line, whole runs at both ends of the default range stand beside it.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.simulation import Injection, Sample, Simulation
-from ringbalance.reduced_model.gas_line import line_document, line_text, line_warning
-from ringbalance.reduced_model.injection.records import Event
-from ringbalance.reduced_model.terms import neglected_in_injections
-from ringbalance.results.findings import Finding
-from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity
-from ringbalance.results.table import Table, models_table
+from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text, line_warning
+from ringbalance.reduced_model.injection.dynamics import Event, gives_forces
+from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG, neglected_in_injections
+from ringbalance.results.numbers import given
+from ringbalance.results.result import Rows, Table, models_table
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray, finite
 
 
@@ -91,25 +94,24 @@ def simulation_history(simulation: Simulation) -> dict[str, Sequence[Any]]:
         gas = np.zeros(time.size, dtype=np.int64)
         for injection in simulation.injections:
             if injection.chamber == letter:
-                end = injection.time + injection.operation.duration
+                end = injection.time + injection.duration
                 gas[(time >= injection.time) & (time <= end)] = 1
         columns |= {f"fill_ratio_{letter}": fill.tolist(), f"valve_open_{letter}": gas.tolist()}
     return columns
 
 
 def _injection(injection: Injection) -> dict[str, Any]:
-    operation = injection.operation
     return {
         "time_s": injection.time,
         "chamber": injection.chamber,
-        "duration_s": operation.duration,
-        "regime": operation.regime_start.label,
-        "regime_end": operation.regime_end.label,
-        "event": operation.event.value,
-        "fill_before": operation.fill_before,
-        "fill_after": operation.fill_after,
-        "energy_J": operation.energy,
-        "run_dry_s": operation.run_dry,
+        "duration_s": injection.duration,
+        "regime": injection.regime_start.label,
+        "regime_end": injection.regime_end.label,
+        "event": injection.event.value,
+        "fill_before": injection.fill_before,
+        "fill_after": injection.fill_after,
+        "energy_J": injection.energy,
+        "run_dry_s": injection.run_dry,
     }
 
 
@@ -135,7 +137,7 @@ def simulation_rows(simulation: Simulation) -> Rows:
     gas = simulation.gas.finding
     scene, line = simulation.scene, line_warning(simulation.gas_line)
     model = simulation.model_status
-    closed = [i.time + i.operation.duration for i in simulation.injections]
+    closed = [i.time + i.duration for i in simulation.injections]
     # Until shortly after the last valve has closed.
     end = min(float(simulation.time[-1]), 1.2 * max(closed, default=math.inf))
     return Rows(
@@ -169,7 +171,7 @@ def _quantities(simulation: Simulation) -> tuple[Quantity, ...]:
         ("loop_factor", "loop factor", "1", loop.value),
         ("loop_factor_limit", "loop factor, at most", "1", loop.limit),
         ("stationary_deviation", "standard deviation that noise leaves", "m", finite(loop.deviation)),
-        ("valve_open_time", "valve-open time", "s", math.fsum(i.operation.duration for i in injections)),
+        ("valve_open_time", "valve-open time", "s", math.fsum(i.duration for i in injections)),
         ("injections", "injections", "1", len(injections)),
         ("energy", "work on the liquid", "J", simulation.energy),
         ("gas_volume", "gas, normal volume", "m^3", gas.normal_volume),
@@ -198,9 +200,9 @@ def _injection_table(injections: tuple[Injection, ...]) -> Table:
             (
                 f"{each.time:.3f}",
                 each.chamber,
-                f"{each.operation.duration:.4f}",
-                f"{each.operation.fill_before:.5f}",
-                f"{each.operation.fill_after:.5f}",
+                f"{each.duration:.4f}",
+                f"{each.fill_before:.5f}",
+                f"{each.fill_after:.5f}",
                 _regime(each),
             )
             for each in injections[:_MOST_INJECTIONS]
@@ -210,9 +212,8 @@ def _injection_table(injections: tuple[Injection, ...]) -> Table:
 
 
 def _regime(injection: Injection) -> str:
-    operation = injection.operation
-    names = dict.fromkeys((operation.regime_start.label, operation.regime_end.label))
-    event = "" if operation.event in {Event.NONE, Event.BLOCKED} else f" ({operation.event.value})"
+    names = dict.fromkeys((injection.regime_start.label, injection.regime_end.label))
+    event = "" if injection.event in {Event.NONE, Event.BLOCKED} else f" ({injection.event.value})"
     return " to ".join(names) + event
 
 
@@ -228,3 +229,83 @@ def _sparkline(values: FloatArray) -> str:
         return _BARS[0] * values.size
     depth = np.log10(np.maximum(values / top, 10.0**-_DECADES)) / _DECADES + 1
     return "".join(_BARS[round(share * (len(_BARS) - 1))] for share in depth)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineRun:
+    """One run with one end of the range."""
+
+    end: str
+    """ "slow" or "fast"."""
+    conductance: float
+    """m^3/(s Pa)."""
+    valve_lag: float
+    """s."""
+    run: Simulation
+
+
+def line_runs(nominal: Simulation) -> tuple[LineRun, ...]:
+    """Runs of the same scene and law with all terms of an injection modelled; none where the scene gives its
+    gas line, the law no forces, or algorithm or sensor are the caller's own."""
+    scene, flow = nominal.scene, nominal.model.flow
+    ends = line_ends(scene)
+    if len(ends) == 1 or not gives_forces(flow) or not nominal.as_scene:
+        return ()
+    found = []
+    for end in ends:
+        gas = replace(
+            scene.gas,
+            conductance=end.line.conductance,
+            critical_ratio=end.line.critical_ratio,
+            valve_lag=end.valve_lag,
+        )
+        # The paper's law has no mass in the tube and no crest.
+        own = () if isinstance(flow, PaperLaw) else (INERTIA, HELD)
+        terms = (*own, FILLING, LAG)
+        run = nominal.again(replace(scene, gas=gas), terms)
+        found.append(
+            LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)
+        )
+    return tuple(found)
+
+
+def command_document(run: Simulation) -> dict[str, Any]:
+    """What `ringbalance simulate --json` prints of a run."""
+    return simulation_document(run) | {"gas_line_runs": line_runs_document(line_runs(run))}
+
+
+def line_runs_table(runs: Sequence[LineRun]) -> Table:
+    """How the runs end."""
+    return Table(
+        caption="The scene gives no gas line; with both ends of its default range",
+        heads=("line", "run", "settling time", "amplitude at the end"),
+        rows=[
+            (
+                each.end,
+                each.run.verdict.value,
+                given(each.run.settling_time, "s", digits=3),
+                given(float(each.run.amplitude[-1]), "m", digits=3),
+            )
+            for each in runs
+        ],
+    )
+
+
+def line_runs_document(runs: Sequence[LineRun]) -> list[dict[str, Any]]:
+    """For JSON, in SI."""
+    return [
+        {
+            "end": found.end,
+            "conductance_m3_per_s_Pa": found.conductance,
+            "valve_lag_s": found.valve_lag,
+            "settled": found.run.settled,
+            "settling_time_s": found.run.settling_time,
+            "verdict": found.run.verdict.value,
+            "outcome": found.run.outcome.value,
+            "final_amplitude_m": float(found.run.amplitude[-1]),
+            "overshoots": found.run.overshoots,
+            "injections": len(found.run.injections),
+            "status": found.run.status,
+        }
+        for found in runs
+    ]

@@ -13,24 +13,19 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.built_in import BuiltIn, command_of, show
 from ringbalance.controller.algorithms.by_name import controller_of
-from ringbalance.controller.checks import check_fit, check_settings
-from ringbalance.controller.document import simulation_rows
-from ringbalance.controller.formulas import Cause
-from ringbalance.controller.line_runs import command_document
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing, Operation
+from ringbalance.controller.document import command_document, simulation_rows
+from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_plan import CHUNK, LoopPlan, RunsInHand, Trace, joined
-from ringbalance.controller.outcome import Facts
+from ringbalance.controller.loop_records import NONE
+from ringbalance.controller.outcome import Facts, run_findings
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
-from ringbalance.controller.run_findings import run_findings
 from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
-from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
+from ringbalance.controller.terms import check_fit, check_settings, dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import loop_factor
-from ringbalance.reduced_model.chamber.gravity import check_ring
-from ringbalance.reduced_model.injection.dynamics import RELATIVE_ERROR
-from ringbalance.reduced_model.injection.records import EVENTS
-from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.law.model import BalancerModel, CompleteLaw
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
+from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, Regime
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -104,8 +99,12 @@ def simulate(
     time, vibration, fills = _histories(scene, balancer, trace)
     facts = Facts(
         scene=scene,
-        plant=LiquidRing(model=balancer, chambers=scene.disc.chambers, dynamics=dynamics),
-        state=DiscState.initial(disc=scene.disc),
+        plant=LiquidRing(
+            model=balancer,
+            chambers=scene.disc.chambers,
+            dynamics=dynamics,
+            total=2 * scene.disc.initial_fill,
+        ),
         loop=loop,
         own_algorithm="" if own is None else type(own).__name__,
         run=runs[0],
@@ -136,7 +135,7 @@ def _carried(hand: RunsInHand, scene: Scene, outside: _Outside | None, progress:
     run, limit = hand.runs[0], scene.run.time_limit
     random = np.random.default_rng(scene.run.seed)
     parts = [hand.go_on(np.zeros((1, 0, 2)), traced=True)]
-    while run["cause"] == Cause.NONE:
+    while run["cause"] == NONE:
         if progress is not None:
             progress(float(run["time"]), limit)
         if outside is not None:
@@ -216,18 +215,15 @@ def _injections(trace: Trace, chambers: int) -> tuple[Injection, ...]:
         Injection(
             time=float(row["time"]),
             chamber=letters[row["chamber"]],
-            operation=Operation(
-                chamber=int(row["chamber"]),
-                duration=float(row["duration"]),
-                fill_before=float(row["fill_before"]),
-                fill_after=float(row["fill_after"]),
-                regime_start=Regime(int(row["regime_start"])),
-                regime_end=Regime(int(row["regime_end"])),
-                event=EVENTS[int(row["event"])],
-                energy=float(row["energy"]),
-                closing_pressure=float(row["closing_pressure"]),
-                run_dry=float(row["run_dry"]),
-            ),
+            duration=float(row["duration"]),
+            fill_before=float(row["fill_before"]),
+            fill_after=float(row["fill_after"]),
+            regime_start=Regime(int(row["regime_start"])),
+            regime_end=Regime(int(row["regime_end"])),
+            event=EVENTS[int(row["event"])],
+            energy=float(row["energy"]),
+            closing_pressure=float(row["closing_pressure"]),
+            run_dry=float(row["run_dry"]),
         )
         for row in trace.injections
     )
@@ -262,11 +258,11 @@ def _record(
         fill_ratio=dict(zip(chamber_letters(scene.disc.chambers), fills, strict=True)),
         injections=facts.injections,
         samples=facts.samples,
-        overshoots=facts.overshoots,
-        shortened=facts.shortened,
+        overshoots=int(facts.run["overshoots"]),
+        shortened=int(facts.run["shortened"]),
         misadjustments=int(facts.run["misadjustments"]),
         noise_floor=facts.noise_floor,
-        energy=math.fsum(injection.operation.energy for injection in facts.injections),
+        energy=math.fsum(injection.energy for injection in facts.injections),
         terms_modelled=terms_modelled(used),
         models_used=used,
         presentation=Presentation(document=command_document, rows=simulation_rows),

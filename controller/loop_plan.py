@@ -13,24 +13,23 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.law_based import LawBased
 from ringbalance.controller.compiled_loop import continue_runs
-from ringbalance.controller.formulas import NONE
 from ringbalance.controller.loop_records import (
     GAS_LINE,
     GAS_POINTS,
     INJECTION,
     LOOP,
+    NONE,
     NOTES,
     OWN,
     RUN,
     SAMPLE,
     TAIL_POINTS,
+    MomentTable,
 )
-from ringbalance.controller.moment_table import MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
-from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.records import MOTION, WORKSPACE
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE, Dynamics
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

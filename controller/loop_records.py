@@ -1,4 +1,4 @@
-"""What the closed loop works on: one record of what all runs share, one for each run, and rows of a trace.
+"""What the closed loop works on: a record of what all runs share, one for each run, rows of a trace, moments.
 
 Compiled functions take a record as a single pointer, where arrays and tuples of arrays are taken apart and
 counted at every call, which costs more than the work itself.
@@ -6,11 +6,14 @@ counted at every call, which costs more than the work itself.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from ringbalance.controller.rotor import MAX_CHAMBERS
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.platform.compiled import in_place
 
 GAS_POINTS: Final = 8
 """Instants recorded within one command's valve-open time, beside the closing of each valve."""
@@ -32,6 +35,18 @@ USABLE: Final = 2
 UNUSABLE: Final = 1
 TOO_SHORT: Final = 2
 """Why no valve opens though the algorithm is not content."""
+NOTICEABLE: Final = 1e-12
+"""Change of a fill ratio that counts as movement."""
+NONE, RISING, IDLE, AT_REST, TIME, SAMPLES, HELD = range(7)
+"""Why a loop stopped cycling; it goes on, or
+
+    the amplitude rose after more operations in a row than the algorithm can explain,
+    the longest injections of several commands in a row moved no liquid,
+    the controller rests, the sensor is exact and no liquid can move: nothing will change,
+    the time is up,
+    there are as many samples as a run may have,
+    the amplitude has been within its limit for the hold time and is expected to stay.
+"""
 
 _REAL: Final = (
     "total",  # x_A + x_C
@@ -193,3 +208,41 @@ SAMPLE: Final = np.dtype(
 """Rows of a trace; those of its instants are the time and every pair's fill."""
 NOTES: Final = 2, 1 + PAIRS, PAIRS + GAS_POINTS + TAIL_POINTS
 """Shape of the room for what is noted between two samples, with the gas on and off."""
+
+
+class MomentTable(NamedTuple):
+    """Moment of a pair over the fill of its positive chamber, cubic between equally spaced nodes."""
+
+    lowest: float
+    """Smallest x."""
+    step: float
+    """Distance of the nodes."""
+    nodes: ComplexArray
+    """Moment along the pair's axis and across it, kg m, and its slope, kg m per step, shape (n, 2)."""
+
+    @classmethod
+    def of(cls, *, model: BalancerModel, total: float) -> MomentTable:
+        """Tabulate a balancer's moment of a pair whose two fill ratios sum to `total`."""
+        largest = model.flow.max_fill_ratio
+        lowest, highest = max(0.0, total - largest), min(total, largest)
+        step = (highest - lowest) / (MOMENT_NODES - 1)
+
+        def of(x: FloatArray) -> ComplexArray:
+            held = np.clip(x, lowest, highest)
+            return model.moment.pair_vector(fill_ratio=held, opposite_fill_ratio=total - held)
+
+        x = np.linspace(lowest, highest, MOMENT_NODES)
+        before, after = np.maximum(x - step / 2, lowest), np.minimum(x + step / 2, highest)
+        slope = (of(after) - of(before)) / (after - before) * step
+        return cls(lowest=float(lowest), step=float(step), nodes=np.stack([of(x), slope], axis=1))
+
+
+@in_place
+def pair_moment(nodes: ComplexArray, lowest: float, step: float, fill: float) -> complex:
+    """Of one pair along its axis and across it, kg m."""
+    last = nodes.shape[0] - 1
+    place = min(max((fill - lowest) / step, 0.0), float(last))
+    cell = min(int(place), last - 1)
+    part, rise, d0, d1 = place - cell, nodes[cell + 1, 0] - nodes[cell, 0], nodes[cell, 1], nodes[cell + 1, 1]
+    change = part * (d0 + part * (3.0 * rise - 2.0 * d0 - d1 + part * (d0 + d1 - 2.0 * rise)))
+    return complex(nodes[cell, 0] + change)

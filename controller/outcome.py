@@ -1,28 +1,35 @@
-"""How a run ended, by its facts."""
+"""How a finished run ended, by its facts, and what it says: its numbers and what to do next, as findings."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from ringbalance.controller.algorithms.built_in import BELOW_MINIMUM, NO_SAMPLE
-from ringbalance.controller.formulas import NOTICEABLE, Cause, has_grown
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.rotor import chamber_letters
-from ringbalance.controller.simulation import (
-    NOISE_DEVIATIONS,
-    Injection,
-    Outcome,
-    Sample,
-    noise_floor,
+from ringbalance.controller.liquid_ring.plant import (
+    LEAST_PRESSURE,
+    NEARLY_EMPTY,
+    LiquidRing,
+    starting_pressure,
 )
-from ringbalance.controller.tuning.loop_factor import LoopFactor
-from ringbalance.reduced_model.injection.records import Event
+from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING, SAMPLES
+from ringbalance.controller.rotor import chamber_letters
+from ringbalance.controller.simulation import NOISE_DEVIATIONS, Injection, Outcome, Sample, noise_floor
+from ringbalance.controller.tuning.dead_time import standing_finding
+from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
+from ringbalance.controller.tuning.recommendation import recommended_gain
+from ringbalance.reduced_model.injection.dynamics import Event
+from ringbalance.reduced_model.residual_liquid import Holding
+from ringbalance.results.rows import Finding, Value, sentences
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
+
+MANY_OVERSHOOTS: Final = 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,7 +38,6 @@ class Facts:
 
     scene: Scene
     plant: LiquidRing
-    state: DiscState
     loop: LoopFactor
     own_algorithm: str
     """Name of the caller's; empty: that of the scene."""
@@ -43,45 +49,10 @@ class Facts:
     """True vibration, m zero-to-peak."""
 
     @property
-    def time(self) -> float:
-        """s."""
-        return float(self.run["time"])
-
-    @property
-    def since(self) -> float:
-        """s, from which on the true amplitude has not been above the limit; infinite while it is."""
-        return float(self.run["since"])
-
-    @property
-    def drift(self) -> float:
-        """Largest change of a fill ratio while the gas was off."""
-        return float(self.run["drift"])
-
-    @property
-    def shortened(self) -> int:
-        """Injections shortened or left out so that the driven chamber keeps its residual fill."""
-        return int(self.run["shortened"])
-
-    @property
     def refused(self) -> tuple[str, ...]:
         """Letters of the driven chambers of those in the last command."""
         letters = chamber_letters(self.scene.disc.chambers)
         return tuple(letters[i] for i in np.flatnonzero(self.run["refused"]))
-
-    @property
-    def cause(self) -> Cause:
-        """Why the loop stopped cycling."""
-        return Cause(int(self.run["cause"]))
-
-    @property
-    def initial_amplitude(self) -> float:
-        """m."""
-        return float(self.amplitude[0])
-
-    @property
-    def final_amplitude(self) -> float:
-        """m."""
-        return float(self.amplitude[-1])
 
     @property
     def noise_floor(self) -> float:
@@ -91,35 +62,43 @@ class Facts:
             initial_amplitude=self.scene.rotor.initial_amplitude,
         )
 
-    @property
-    def overshoots(self) -> int:
-        """Times that the residual turned between samples while above the limit."""
-        return int(self.run["overshoots"])
-
     @cached_property
     def unreachable_amplitude(self) -> float:
         """Vibration that remains with the liquid at its best, m."""
-        return self.plant.unreachable_vibration(state=self.state, rotor=self.scene.rotor)
+        return self.plant.unreachable_vibration(rotor=self.scene.rotor)
 
     @property
     def beyond_disc(self) -> float:
         """The same with gas that drives a chamber down to its residual fill, m."""
-        return self.plant.unreachable_vibration(
-            state=self.state, rotor=self.scene.rotor, least_fill=self.plant.residual_fill
-        )
+        return self.plant.unreachable_vibration(rotor=self.scene.rotor, least_fill=self.plant.residual_fill)
 
     @property
     def settling_time(self) -> float | None:
         """s, from which on the amplitude first held; None when it has not, or is not expected to stay."""
-        held_since = float(self.run["held_since"])
-        if self.loop.stays and held_since < math.inf:
-            return held_since
-        return self.since if self.cause is Cause.AT_REST and self.since < math.inf else None
+        first, last = float(self.run["held_since"]), float(self.run["since"])
+        if self.loop.stays and first < math.inf:
+            return first
+        return last if self.run["cause"] == AT_REST and last < math.inf else None
 
     @property
     def last_command(self) -> tuple[Injection, ...]:
         """The injections of the last command; empty when there was none."""
         return tuple(i for i in self.injections if i.time == self.injections[-1].time)
+
+    @property
+    def longest(self) -> Injection | None:
+        """The longest injection of the last command."""
+        return max(self.last_command, key=lambda injection: injection.duration, default=None)
+
+    @property
+    def moves(self) -> bool:
+        """Whether that has moved liquid, or there was none."""
+        return self.longest is None or self.longest.moved
+
+    @property
+    def unusable(self) -> int:
+        """Number of samples that every algorithm passed over."""
+        return sum(sample.command.reason == NO_SAMPLE for sample in self.samples)
 
     @cached_property
     def outcome(self) -> Outcome:
@@ -129,63 +108,47 @@ class Facts:
         to stay there, or a run in which nothing can change any more.  Both are known when they happen, so
         that a later time limit gives the same answer.
         """
-        limit = self.scene.controller.limit
+        limit, cause = self.scene.controller.limit, self.run["cause"]
         if self.settling_time is not None:
             return Outcome.SETTLED
         if self.beyond_disc > limit and not self.loop.unstable:
             return Outcome.CAPACITY_EXCEEDED
         if self.run["drains"]:
             return Outcome.DRIFTING
-        higher = self.final_amplitude > self.initial_amplitude + self.noise_floor
-        if has_grown(self.cause, higher):
-            return Outcome.DRIFTING if self.drift > NOTICEABLE else Outcome.DIVERGING
+        higher = self.amplitude[-1] > self.amplitude[0] + self.noise_floor
+        if cause == RISING or (cause == IDLE and higher):
+            return Outcome.DRIFTING if self.run["drift"] > NOTICEABLE else Outcome.DIVERGING
         if self.loop.unstable:
             return Outcome.UNSTABLE
         if self.unreachable_amplitude > limit:
             return Outcome.STALLED
-        if min(self.since, float(self.run["held_since"])) < math.inf:
+        if min(self.run["since"], self.run["held_since"]) < math.inf:
             return Outcome.HOLD_INCOMPLETE if self.loop.stays else Outcome.HOVERING
-        if self.refused and self.cause is Cause.IDLE:
+        if self.refused and cause == IDLE:
             return Outcome.CHAMBER_EMPTY
-        if self.last_command and not longest(self).operation.moved:
-            return _unmoved(self)
-        return Outcome.TOO_MANY_SAMPLES if self.cause is Cause.SAMPLES else _out_of_time(self)
+        if self.longest is not None and not self.longest.moved:
+            return _unmoved(self, self.longest)
+        return Outcome.TOO_MANY_SAMPLES if cause == SAMPLES else _out_of_time(self)
 
 
-def longest(facts: Facts) -> Injection:
-    """The longest injection of the last command; there must have been one."""
-    return max(facts.last_command, key=lambda injection: injection.operation.duration)
-
-
-def _unmoved(facts: Facts) -> Outcome:
-    """Why the last command moved nothing."""
-    if longest(facts).operation.event in {Event.EMPTY, Event.FULL}:
+def _unmoved(facts: Facts, last: Injection) -> Outcome:
+    """Why the last command moved nothing; gas that would drive it may lack the time to fill the chamber."""
+    plant = facts.plant
+    if last.event in {Event.EMPTY, Event.FULL}:
         return Outcome.CHAMBER_EMPTY
-    return Outcome.GAS_TIME_TOO_SHORT if _over_too_soon(facts) else Outcome.STALLED
-
-
-def _over_too_soon(facts: Facts) -> bool:
-    """Whether the gas would drive liquid, had it the time to fill the chamber."""
-    plant, done = facts.plant, longest(facts).operation
     if plant.dynamics.quasi_steady:
-        return False
-    flow, total = plant.model.flow, facts.state.pairs[0].total
-    other = min(max(total - done.fill_after, 0.0), flow.max_fill_ratio)
-    found = flow.evaluate(
-        fill_ratio=done.fill_after, opposite_fill_ratio=other, gas_pressure=plant.gas_pressure
+        return Outcome.STALLED
+    other = min(max(plant.total - last.fill_after, 0.0), plant.model.flow.max_fill_ratio)
+    flow = plant.model.flow.evaluate(
+        fill_ratio=last.fill_after, opposite_fill_ratio=other, gas_pressure=plant.gas_pressure
     )
-    return bool(found.velocity > 0)
-
-
-def unusable(facts: Facts) -> int:
-    """Number of samples that every algorithm passed over."""
-    return sum(sample.command.reason == NO_SAMPLE for sample in facts.samples)
+    return Outcome.GAS_TIME_TOO_SHORT if flow.velocity > 0 else Outcome.STALLED
 
 
 def _out_of_time(facts: Facts) -> Outcome:
-    if 2 * unusable(facts) > len(facts.samples):
+    if 2 * facts.unusable > len(facts.samples):
         return Outcome.NO_SAMPLES
-    if facts.drift > NOTICEABLE:
+    if facts.run["drift"] > NOTICEABLE:
         return Outcome.DRIFTING
     if NOISE_DEVIATIONS * facts.scene.sensor.amplitude_noise > facts.scene.controller.limit:
         return Outcome.NOISE
@@ -193,3 +156,167 @@ def _out_of_time(facts: Facts) -> Outcome:
     if not last.resting and not last.valves and last.reason == BELOW_MINIMUM:
         return Outcome.GAS_TIME_TOO_SHORT
     return Outcome.TIME_LIMIT
+
+
+def run_findings(facts: Facts) -> tuple[Finding, ...]:
+    """The first says how the run ended, the others what stands behind it and what to change."""
+    outcome = facts.outcome
+    code = outcome.value
+    if not facts.moves:
+        unmoved = {Outcome.STALLED: "stalled_at_start", Outcome.GAS_TIME_TOO_SHORT: "injection_too_short"}
+        code = unmoved.get(outcome, code)
+    numbers = _numbers(facts)
+    ended = Finding(code=code, values={name: numbers[name] for name in sentences()[code].values})
+    return (ended, *_causes(facts), *_shortened(facts))
+
+
+def _numbers(facts: Facts) -> dict[str, Value]:
+    """Of which a sentence takes what it names."""
+    settings, run = facts.scene.controller, facts.scene.run
+    numbers: dict[str, Value] = {
+        "initial_amplitude": float(facts.amplitude[0]),
+        "final_amplitude": float(facts.amplitude[-1]),
+        "limit": settings.limit,
+        "time": float(facts.run["time"]),
+        "time_limit": run.time_limit,
+        "hold_time": settings.hold_time,
+        "settling_time": facts.settling_time,
+        "since": float(facts.run["since"]),
+        "loop_factor": facts.loop.value,
+        "loop_factor_limit": facts.loop.limit,
+        "minimum_gas_time": settings.minimum_gas_time,
+        "noise": facts.scene.sensor.amplitude_noise,
+        "deviations": NOISE_DEVIATIONS,
+        "samples": len(facts.samples),
+        "unusable": facts.unusable,
+    }
+    if facts.longest is not None:
+        numbers |= {"duration": facts.longest.duration, "chamber": facts.longest.chamber}
+    if facts.outcome is Outcome.STALLED:
+        numbers |= _pressures(facts)
+    if facts.outcome is Outcome.CAPACITY_EXCEEDED:
+        numbers |= _moments(facts)
+    if facts.outcome is Outcome.CHAMBER_EMPTY and facts.refused:
+        numbers |= {"chamber": facts.refused[0]}
+    return numbers
+
+
+def _causes(facts: Facts) -> Iterator[Finding]:
+    outcome, turned = facts.outcome, int(facts.run["overshoots"])
+    if outcome is Outcome.HOVERING:
+        yield from _noise(facts)
+    if outcome in {Outcome.HOVERING, Outcome.UNSTABLE} or (
+        outcome in {Outcome.SETTLED, Outcome.TIME_LIMIT, Outcome.DIVERGING} and turned > _allowed(outcome)
+    ):
+        yield from _smaller_steps(facts)
+    elif outcome is Outcome.TIME_LIMIT:
+        yield from _dead_time(facts) or [_larger_gain(facts, "slow")]
+    if outcome is Outcome.DIVERGING:
+        yield Finding(code="check_direction")
+    if outcome is Outcome.STALLED and facts.unreachable_amplitude > facts.scene.controller.limit:
+        yield Finding(code="unbalance_beyond_gas", values=_moments(facts))
+    if outcome is Outcome.DRIFTING:
+        total = 2 * facts.scene.disc.initial_fill
+        fill = total - min(facts.plant.residual_fill, total / 2)
+        yield Holding.of(facts.scene, fill_ratio=fill).finding or Finding(code="tube_runs_back")
+    if outcome is Outcome.GAS_TIME_TOO_SHORT:
+        larger = [_larger_gain(facts, "valve_minimum")]
+        yield from larger if facts.moves else _dead_time(facts) or [_pushed(facts)]
+
+
+def _allowed(outcome: Outcome) -> int:
+    """Overshoots that need no remedy."""
+    return 1 if outcome is Outcome.DIVERGING else MANY_OVERSHOOTS
+
+
+def _noise(facts: Facts) -> Iterator[Finding]:
+    sigma, deviation = facts.scene.sensor.amplitude_noise, facts.loop.deviation
+    if NOISE_DEVIATIONS * sigma > facts.scene.controller.limit:
+        yield Finding(code="sensor_noise_too_high", values={"noise": sigma})
+    elif deviation is not None and math.isfinite(deviation):
+        yield Finding(
+            code="noise_sustained", values={"deviation": deviation, "deviations": STAYING_DEVIATIONS}
+        )
+
+
+def _smaller_steps(facts: Facts) -> Iterator[Finding]:
+    """What to change in a loop that overshoots; the law-based algorithm has no gain to lower."""
+    settings = facts.scene.controller
+    turns: dict[str, Value] = {"overshoots": int(facts.run["overshoots"])}
+    if facts.own_algorithm:
+        yield Finding(code="own_gain_too_high", values={**turns, "algorithm": facts.own_algorithm})
+    elif settings.kind == "law_based":
+        yield from _dead_time(facts) or [Finding(code="assumed_influence_wrong", values=turns)]
+    elif settings.kind == "trial":
+        yield Finding(code="trial_steps_too_long", values=turns)
+    else:
+        gain = recommended_gain(facts.scene, facts.plant.model, loop=facts.loop)
+        if facts.loop.value is None or not 0 < gain < settings.proportional:
+            yield Finding(code="gain_too_high", values=turns)
+        else:
+            change = {"controller.proportional": gain}
+            yield Finding(code="gain_too_high_by", values={**turns, "gain": gain}, change=change)
+
+
+def _larger_gain(facts: Facts, code: str) -> Finding:
+    """Args: `code`: "slow" or "valve_minimum"."""
+    numbers: dict[str, Value] = {"minimum_gas_time": facts.scene.controller.minimum_gas_time}
+    if facts.own_algorithm:
+        return Finding(code=f"own_{code}", values={**numbers, "algorithm": facts.own_algorithm})
+    return Finding(code=code, values=numbers)
+
+
+def _dead_time(facts: Facts) -> list[Finding]:
+    found = None if facts.own_algorithm else standing_finding(facts.scene, facts.plant.model)
+    return [] if found is None else [found]
+
+
+def _pushed(facts: Facts) -> Finding:
+    """What moves liquid where an amplitude stands still."""
+    settings = facts.scene.controller
+    from_scene = settings.kind == "target_vector" and not facts.own_algorithm
+    return Finding(
+        code="integral_missing" if from_scene and settings.integral_time is None else "valve_too_slow"
+    )
+
+
+def _shortened(facts: Facts) -> Iterator[Finding]:
+    if count := int(facts.run["shortened"]):
+        numbers: dict[str, Value] = {"count": count, "residual_fill": facts.plant.residual_fill}
+        yield Finding(code="injections_shortened", values=numbers)
+
+
+def _moments(facts: Facts) -> dict[str, Value]:
+    """The unbalance, the usable moment of a pair under the scene's gas, and what is left at best."""
+    return {
+        "unbalance": abs(facts.scene.rotor.initial_unbalance),
+        "pair_moment": abs(facts.plant.largest_pair_moment()),
+        "unreachable": facts.plant.unreachable_vibration(rotor=facts.scene.rotor),
+    }
+
+
+def _pressures(facts: Facts) -> dict[str, Value]:
+    """Where the gas drives no liquid, and the pressures that would; None: its liquid has left the port."""
+    plant, still = facts.plant, None if facts.moves else facts.longest
+    lowest = max(0.0, plant.total - plant.model.flow.max_fill_ratio)
+    numbers: dict[str, Value] = {
+        "gas_pressure": plant.gas_pressure,
+        "fill": plant.least_fill,
+        "pressure_to_empty": _needed(plant, lowest + NEARLY_EMPTY),
+    }
+    if still is not None:
+        fill = still.fill_after
+        numbers |= {"fill": fill, "chamber": still.chamber, "pressure_to_start": _needed(plant, fill)}
+    return numbers
+
+
+def _needed(plant: LiquidRing, fill: float) -> float | None:
+    """The pressure, Pa, from which an injection begins at a fill, over an empty crest: short ones all do."""
+    law = plant.model.flow
+    return starting_pressure(
+        law=law,
+        fill=fill,
+        opposite_fill=min(plant.total - fill, law.max_fill_ratio),
+        primed=False,
+        above=max(plant.gas_pressure, LEAST_PRESSURE),
+    )

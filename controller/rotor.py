@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.algorithms.algorithm import Measurement
-from ringbalance.reduced_model.law.model import MomentCurve
+from ringbalance.reduced_model.law.flow_law import MomentCurve
 from ringbalance.scene import loop_models
 from ringbalance.scene.arrays import ComplexArray
 

@@ -10,22 +10,53 @@ from functools import cached_property
 from typing import Final
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.liquid_ring.plant import Operation
-from ringbalance.controller.liquid_ring.reach import NEAR_RESIDUAL
+from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL
+from ringbalance.controller.loop_records import NOTICEABLE
 from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.results import Status
-from ringbalance.reduced_model.chamber.range import chamber_status
+from ringbalance.reduced_model.chamber.contributions import chamber_status
 from ringbalance.reduced_model.gas_line import LineAnswer, line_answers
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.injection.dynamics import Event
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.reduced_model.terms import ModelUsed
-from ringbalance.results.findings import Finding
 from ringbalance.results.result import PresentedResult
+from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 _LITRE = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Injection:
+    """One opening of one valve, and what it did by the next sample."""
+
+    time: float
+    """s, at which the valve opens."""
+    chamber: str
+    """Letter of the driven chamber."""
+    duration: float
+    """Commanded, s."""
+    fill_before: float
+    """x of the driven chamber at the command."""
+    fill_after: float
+    """x of the driven chamber at the next sample."""
+    regime_start: Regime
+    regime_end: Regime
+    event: Event
+    energy: float
+    """Work of the driven chamber's gas against the surroundings, integral of (p - ambient) dV, J."""
+    closing_pressure: float
+    """Gauge, of the driven chamber's gas when its valve closed, Pa."""
+    run_dry: float
+    """Time for which the valve stayed open to an empty chamber, s."""
+
+    @property
+    def moved(self) -> bool:
+        """Whether any liquid passed."""
+        return abs(self.fill_after - self.fill_before) > NOTICEABLE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +93,8 @@ class GasUse:
         return Finding(code="gas_passed_through" if self.run_dry else "gas_entered_port", values=numbers)
 
     @classmethod
-    def of(cls, *, scene: Scene, model: BalancerModel, operations: Sequence[Operation]) -> GasUse:
-        """Gas consumption of the operations of a run.
+    def of(cls, *, scene: Scene, model: BalancerModel, injections: Sequence[Injection]) -> GasUse:
+        """Gas consumption of the injections of a run.
 
         Gas through a chamber that has run dry is bounded by a choked nozzle of the tube's section and by the
         line.
@@ -76,25 +107,25 @@ class GasUse:
         if line is not None:
             # Filled volume over the time constant is the most that the line passes.
             through = min(through, supply / line.time_constant(volume=1.0))
-        passed = through * math.fsum(operation.run_dry for operation in operations)
+        passed = through * math.fsum(done.run_dry for done in injections)
         dead = gas.dead_volume or 0.0
         content = math.fsum(
             # A vented chamber is full of ambient gas, which no supply has to deliver.
             done.closing_pressure * ((1 - done.fill_after) * model.chamber_volume + dead)
-            for done in operations
+            for done in injections
         )
         total = content + passed
         residual = residual_fill_ratio(scene, law=model.flow)
         return cls(
-            fillings=len(operations),
+            fillings=len(injections),
             normal_volume=normal_volume(pressure_volume=total, temperature=gas.temperature),
             energy=compression_work(
                 pressure_volume=total, pressure=supply, ambient_pressure=gas.ambient_pressure
             ),
-            run_dry=sum(operation.run_dry > 0 for operation in operations),
+            run_dry=sum(done.run_dry > 0 for done in injections),
             residual_fill_ratio=residual,
             below_residual=sum(
-                done.run_dry > 0 or done.fill_after < residual - NEAR_RESIDUAL for done in operations
+                done.run_dry > 0 or done.fill_after < residual - NEAR_RESIDUAL for done in injections
             ),
             passed_through=normal_volume(pressure_volume=passed, temperature=gas.temperature),
         )
@@ -149,17 +180,6 @@ class Sample:
     measurement: Measurement | None
     """What the sensor gave; None for a dropped sample."""
     command: Command
-
-
-@dataclass(frozen=True, kw_only=True)
-class Injection:
-    """One opening of one valve."""
-
-    time: float
-    """s, at which the valve opens."""
-    chamber: str
-    """Letter of the driven chamber."""
-    operation: Operation
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -241,8 +261,7 @@ class Simulation(PresentedResult):
     @cached_property
     def gas(self) -> GasUse:
         """Gas consumption of all injections."""
-        done = [injection.operation for injection in self.injections]
-        return GasUse.of(scene=self.scene, model=self.model, operations=done)
+        return GasUse.of(scene=self.scene, model=self.model, injections=self.injections)
 
     @cached_property
     def gas_line(self) -> tuple[LineAnswer, ...]:

@@ -1,23 +1,26 @@
-"""What a run models beyond its flow law: the registry's list, and the plant's terms made from it."""
+"""What a run is made of: the terms that it models, and whether scene and balancer can be run at all."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Collection, Iterator, Sequence
+from operator import attrgetter
+from typing import Final
 
+from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.gas import GasLine
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.injection.dynamics import Dynamics, gives_forces
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.terms import (
-    FILLING,
-    HELD,
-    IN_INJECTIONS,
-    INERTIA,
-    LAG,
-    ModelUsed,
-    models_used,
-)
+from ringbalance.reduced_model.terms import FILLING, HELD, IN_INJECTIONS, INERTIA, LAG, ModelUsed, models_used
+from ringbalance.scene.describe import scene_fault
+from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.models import Scene
+from ringbalance.scene.rules.working import period_covers_lag
+
+VOLUME_TOLERANCE: Final = 0.05
+"""Relative: a flat-strip volume or an input's spread passes, another disc does not."""
 
 
 def run_models(
@@ -86,3 +89,79 @@ def _obstacles(model: BalancerModel) -> dict[str, str]:
             HELD: "the paper's law has no crest",
         }
     return {}
+
+
+def check_fit(scene: Scene, model: BalancerModel) -> None:
+    """Refuse a model that was made for another disc.
+
+    Raises: SceneError: largest fill or chamber volume of the scene and of the model do not agree.
+    """
+    faults = [*_fill_faults(scene, model), *_volume_faults(scene, model)]
+    if faults:
+        raise SceneError(faults)
+
+
+def check_settings(scene: Scene) -> None:
+    """Refuse settings that a loaded scene cannot have, but one changed in Python can.
+
+    Raises: SceneError: a number outside its range, or a period shorter than the valve's lag.
+    """
+    faults = [*_number_faults(scene)]
+    lag = scene.gas.valve_lag
+    found = None if lag is None else period_covers_lag(scene.controller.period, lag)
+    if found is not None:
+        faults.append(scene_fault(scene, "controller.period", problem=found.problem, allowed=found.allowed))
+    if faults:
+        raise SceneError(faults)
+
+
+_POSITIVE: Final = {
+    "rotor.influence_coefficient",
+    "controller.assumed_influence_coefficient",
+    "controller.limit",
+    "controller.period",
+    "controller.proportional",
+    "controller.integral_time",
+    "controller.maximum_gas_time",
+    "run.time_limit",
+}
+_NOT_NEGATIVE: Final = {
+    "rotor.initial_amplitude",
+    "sensor.amplitude_noise",
+    "sensor.phase_noise",
+    "controller.derivative_time",
+    "controller.minimum_gas_time",
+    "gas.pressure",
+    "gas.valve_lag",
+}
+
+
+def _number_faults(scene: Scene) -> Iterator[Fault]:
+    for path in sorted(_POSITIVE | _NOT_NEGATIVE):
+        value: float | None = attrgetter(path)(scene)
+        positive = path in _POSITIVE
+        if value is None or (math.isfinite(value) and (value > 0 or (value == 0 and not positive))):
+            continue
+        bound = "above 0" if positive else "at least 0"
+        allowed = "a number above 0" if positive else "a number of at least 0"
+        yield scene_fault(scene, path, problem=f"it must be {bound}", allowed=allowed)
+
+
+def _fill_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:
+    largest = model.flow.max_fill_ratio
+    if abs(scene.disc.max_fill_ratio - largest) > 1e-9:
+        problem = f"the {model.name} law was made for another fill"
+        yield scene_fault(scene, "disc.max_fill_ratio", problem=problem, allowed=f"{largest:.6g}")
+
+
+def _volume_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:
+    # Eq. 4 knows no rib, fillet or gas tube of an imported chamber, which can be much of it.
+    by_paper = isinstance(model.flow, PaperLaw) and scene.disc.geometry is not None
+    volume = (paper.chamber_volume_paper if by_paper else chamber_volume)(disc=scene.disc)
+    if abs(model.chamber_volume / volume - 1) > VOLUME_TOLERANCE:
+        problem = (
+            f"a chamber holds {volume * 1e6:.4g} ml here, {model.chamber_volume * 1e6:.4g} ml for the "
+            f"{model.name} law: that was made for another disc"
+        )
+        allowed = "that disc, or a law made for this one"
+        yield scene_fault(scene, "disc.axial_width", problem=problem, allowed=allowed)

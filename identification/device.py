@@ -18,17 +18,16 @@ import numpy.typing as npt
 
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.kinds.kind import Observations
+from ringbalance.reduced_model.injection.dynamics import WORKSPACE, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.march import advance
 from ringbalance.reduced_model.injection.pair import Motion, packed
-from ringbalance.reduced_model.injection.records import WORKSPACE, X
-from ringbalance.reduced_model.law.building import nominal_law
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import Holding
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, nominal_law
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.model_errors import START_ERROR
+from ringbalance.scene.fitted import START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
 

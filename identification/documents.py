@@ -18,11 +18,9 @@ from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
-from ringbalance.results.findings import Finding, Value
 from ringbalance.results.numbers import rounded
-from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity
-from ringbalance.results.table import Table
+from ringbalance.results.result import Rows, Table
+from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import in_usual_unit, si_unit, usual_unit
 

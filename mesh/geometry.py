@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.cut.table import ChamberTable, chamber_table
+from ringbalance.mesh.chamber_table import ChamberTable, chamber_table
 from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.keys.derivations import swept_area
 from ringbalance.scene.models import Disc

@@ -1,28 +1,222 @@
-"""What `calibrate` finds out about a balancer, as one record."""
+"""What `calibrate` finds out about a balancer, and one uncertainty budget for every main quantity of it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from ringbalance.physics.tube.loss import TubeLoss
-from ringbalance.reduced_model.budget import Budget, budgets
-from ringbalance.reduced_model.chamber.calibration import ChamberCalibration
+from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
+from ringbalance.reduced_model.chamber.values import drawing_shares
+from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.gas_line import LineAnswer
 from ringbalance.reduced_model.instability import AsynchronousInstability
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, DirectedState
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.operating.point import OperatingPoint
-from ringbalance.reduced_model.operating.residual import Holding, ResidualLiquid
-from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
+from ringbalance.reduced_model.operating_point import OperatingPoint, TubeLiquid
+from ringbalance.reduced_model.residual_liquid import Holding, ResidualLiquid
 from ringbalance.reduced_model.terms import ModelUsed
+from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+
+UNITS: Final = {
+    "chamber_volume": "m^3",
+    "wall_pressure": "Pa",
+    "moment": "kg m",
+    "least_fill_ratio": "1",
+    "usable_moment": "kg m",
+    "lambda": "m",
+    "velocity": "m/s",
+    "drag_coefficient": "1",
+    "crest_pressure": "Pa",
+    "cavitation_margin": "Pa",
+    "priming_pressure_vented": "Pa",
+    "priming_pressure_trapped": "Pa",
+    "stall_pressure": "Pa",
+}
+_ANSWERS: Final = {"lambda": "moment_per_mass"}
+"""Names in `Answers` that differ."""
+UNSTATED: Final = (
+    "The scene states no uncertainty of its inputs, so no ± here holds what they would add; a value without "
+    "± is known no better than the inputs."
+)
+_NEGLIGIBLE: Final = 1e-12
+"""Relative change of a quantity that counts as rounding, not as an effect of an input."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Budget:
+    """A quantity with its expanded uncertainties (95 %) by cause, all in the quantity's SI unit."""
+
+    quantity: str
+    unit: str
+    value: float
+    numerical: float
+    """Rounding, quadrature, interpolation, and what finite elements contradict."""
+    model: float
+    """Correlations, terms that are left out or have no model, and what over the crest cannot be told."""
+    inputs: Mapping[str, float]
+    """By path in the scene file, such as "tube.bore", "fitted" for all that were fitted together; those
+    without any effect are not listed."""
+
+    @property
+    def input(self) -> float:
+        """Of all inputs, which are independent."""
+        return math.hypot(*self.inputs.values())
+
+    @property
+    def total(self) -> float:
+        """Root of the sum of the squares of the three parts (ASME V&V 20-2009)."""
+        return math.hypot(self.numerical, self.input, self.model)
+
+
+def _budgets(calibration: Calibration) -> Mapping[str, Budget]:
+    """Budget of each of `UNITS`; wall pressure and moment at the largest fill, flow at the operating point.
+
+    Inputs count by `input_effects`, k's with what its velocity does when an input moves it. An operating
+    point without any velocity has no drag coefficient, and one without a flow over a crest neither crest
+    pressure nor margin.
+    """
+    scene = calibration.scene
+    parts = _chamber_parts(scene, calibration.chamber) | _flow_parts(scene, calibration)
+    effects = _input_effects(scene)
+    return {
+        name: Budget(
+            quantity=name,
+            unit=UNITS[name],
+            value=value,
+            numerical=numerical,
+            model=model,
+            inputs={
+                path: change
+                for path, each in effects.items()
+                if (change := each[name]) > _NEGLIGIBLE * abs(value)
+            },
+        )
+        for name, (value, numerical, model) in parts.items()
+    }
+
+
+_Parts = tuple[float, float, float]
+
+
+def _chamber_parts(scene: Scene, chamber: ChamberCalibration) -> dict[str, _Parts]:
+    """Value, numerical and model part of the quantities of the chamber."""
+    at = chamber.reported[-1]
+    central, numerical = chamber.moment_per_mass, chamber.moment_per_mass_numerical
+    drawn = drawing_shares(scene.disc, np.empty(0)).volume
+    model = math.sqrt(max(float(central.uncertainty) ** 2 - numerical**2, 0.0))
+    return {
+        "chamber_volume": (chamber.volume, _NEGLIGIBLE * chamber.volume, drawn * chamber.volume),
+        "wall_pressure": _curve_parts(chamber.wall_pressure, at),
+        "moment": _curve_parts(chamber.moment, at),
+        "lambda": (float(central.value), numerical, model),
+    }
+
+
+def _curve_parts(curve: Curve, at: int) -> _Parts:
+    model = float(curve.unmodelled[at])
+    return float(curve.value[at]), float(curve.numerical[at]), model
+
+
+def _flow_parts(scene: Scene, calibration: Calibration) -> dict[str, _Parts]:
+    """Value, numerical and model part of the quantities of the flow at the operating point."""
+    point, rest = calibration.operating_point, calibration.residual
+    law = _law_without_inputs(scene, calibration)
+    fills = (point.fill_ratio, point.fill_ratio)
+    flow = law.evaluate(fill_ratio=fills[0], opposite_fill_ratio=fills[1], gas_pressure=point.gas_pressure)
+    error = calibration.flow_law.heads.interpolation_error
+    levels = _level_parts(calibration)
+    _, numerical, model = levels["stall_pressure"]
+    fill_width, moment_width = rest.model_uncertainty(scene, law=law, head=math.hypot(numerical, model))
+    found = levels | {
+        "least_fill_ratio": (rest.least_fill_ratio, 0.0, fill_width),
+        "usable_moment": (
+            rest.usable_pair_moment,
+            float(np.max(calibration.chamber.moment.interpolation)),
+            moment_width,
+        ),
+        "velocity": (point.velocity, error * abs(point.velocity), float(flow.uncertainty)),
+    }
+    if point.k is not None and point.k_model_uncertainty is not None:
+        found["drag_coefficient"] = (point.k, error * (point.k + 1), point.k_model_uncertainty)
+    if point.cavitation_margin is None or point.hump_pressure is None or point.velocity == 0:
+        return found
+    state = DirectedState.of(
+        law=law, fills=fills, gas_pressure=point.gas_pressure, reverse=point.velocity < 0
+    )
+    margin = state.margin(law=law)[1] or 0.0
+    rounding = error * abs(point.gas_pressure)
+    return found | {
+        "crest_pressure": (point.hump_pressure, rounding, _crest_part(law, point, state, margin)),
+        "cavitation_margin": (point.cavitation_margin, rounding, margin),
+    }
+
+
+def _level_parts(calibration: Calibration) -> dict[str, _Parts]:
+    """The same of the gas pressures that hydrostatics alone give, for which two chambers count."""
+    point, chamber = calibration.operating_point, calibration.chamber
+    level = chamber.hydrostatic_pressure
+    _, numerical, model = _curve_parts(level, chamber.reported[-1])
+    values = {
+        "stall_pressure": point.stall,
+        "priming_pressure_vented": point.priming_vented,
+        "priming_pressure_trapped": point.priming_trapped,
+    }
+    width = math.sqrt(2) * math.hypot(numerical, float(level.interpolation[-1]))
+    return {name: (value, width, math.sqrt(2) * model) for name, value in values.items() if value is not None}
+
+
+def _crest_part(law: CalibratedLaw, point: OperatingPoint, state: DirectedState, margin: float) -> float:
+    """Model part of the crest's pressure, the larger of a cavity's, which has bounds, and a full siphon's."""
+    crest = law.path.crest
+    if crest is None or point.cavitation_margin is None or point.cavity_pressure is None:
+        return 0.0
+    low, high = (float(bound) for bound in crest.possible_cavity(state.ends))
+    gas = max(float(crest.gas_pressure(state.ends)), high)
+    pressure = point.hump_pressure or 0.0
+    full = point.cavity_pressure + point.cavitation_margin
+    highest = max(gas if pressure > high else high, full + margin)
+    return max(highest - pressure, pressure - max(low, full - margin), 0.0)
+
+
+def _law_without_inputs(scene: Scene, calibration: Calibration) -> CalibratedLaw:
+    """The law with the uncertainties of numerics and models alone."""
+    chamber, law, point = calibration.chamber, calibration.flow_law, calibration.operating_point
+    return replace(
+        law,
+        heads=law.heads.without_inputs(scene=scene, velocity=point.loss_velocity or 1.0),
+        inputs=DriveUncertainty(),
+        variants=(),
+        hydrostatic_pressure_uncertainty=chamber.hydrostatic_pressure.uncertainty_table(
+            inputs=np.zeros_like(chamber.fill_ratio)
+        ),
+    )
+
+
+def _input_effects(scene: Scene) -> dict[str, dict[str, float]]:
+    """Effects on all of `UNITS`, by the input's path in the scene, or "fitted"."""
+    found = {}
+    for name, effects in input_effects(scene, _quantities)[1].items():
+        table = UNCERTAIN_QUANTITIES.get(name)
+        path = name if table is None else f"{table}.{name}"
+        found[path] = dict(zip(UNITS, effects.tolist(), strict=True))
+    return found
+
+
+def _quantities(designs: Designs) -> FloatArray:
+    answers = Answers.of(designs)
+    return np.array([getattr(answers, _ANSWERS.get(name, name)) for name in UNITS])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -56,7 +250,7 @@ class Calibration(PresentedResult):
     @cached_property
     def budgets(self) -> Mapping[str, Budget]:
         """Uncertainty budget of every main quantity, made when it is first asked for."""
-        return budgets(scene=self.scene, calibration=self)
+        return _budgets(self)
 
     @property
     def holding(self) -> Holding:

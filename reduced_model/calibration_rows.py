@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.budget import Budget
-from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.chamber.mesh_findings import mesh_findings
+from ringbalance.mesh.faceting import SMOOTH, axis_beside_shaft, faceting, inward_share
+from ringbalance.reduced_model.calibration_record import Budget, Calibration
+from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.documents import (
     PRESSURE_FACTORS,
     RowStatus,
@@ -20,11 +20,10 @@ from ringbalance.reduced_model.documents import (
 )
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.results.findings import Finding, sentences
 from ringbalance.results.numbers import believed, given, rounded
-from ringbalance.results.result import Rows
-from ringbalance.results.rows import Parts, Quantity, around
-from ringbalance.results.table import Table, models_table
+from ringbalance.results.result import Rows, Table, models_table
+from ringbalance.results.rows import Finding, Parts, Quantity, around, sentences
+from ringbalance.scene.models import Scene
 
 _NAMES: Final = MappingProxyType(
     {
@@ -46,6 +45,8 @@ _NAMES: Final = MappingProxyType(
 """Of the budgets' quantities: name and symbol, in the order in which they are shown."""
 _ASIDE: Final = 0.01
 """Angle below which a chamber counts as symmetric, deg."""
+_NEXT_TO_NOTHING: Final = 1e-3
+"""Of the outer wall's area."""
 _MARKS: Final = MappingProxyType(
     {Regime.SIPHON: "", Regime.SEPARATED: "*", Regime.REVERSE: "r", Regime.UNDECIDED: "?"}
 )
@@ -120,7 +121,7 @@ def _findings(calibration: Calibration) -> Iterator[Finding]:
     scene, status, line = calibration.scene, calibration.chamber.status, line_warning(calibration.gas_line)
     if not status.ok:
         yield Finding(code="out_of_range", values={"text": status.text})
-    yield from mesh_findings(scene)
+    yield from _mesh_findings(scene)
     yield from _flow_findings(calibration)
     if calibration.holding.finding is not None:
         yield calibration.holding.finding
@@ -132,6 +133,20 @@ def _findings(calibration: Calibration) -> Iterator[Finding]:
     if not scene.uncertainty:
         yield Finding(code="uncertainty_unstated")
     yield Finding(code="identifiability")
+
+
+def _mesh_findings(scene: Scene) -> Iterator[Finding]:
+    """What a user may not have meant in a chamber's mesh; its numbers are those of the mesh all the same."""
+    geometry = scene.disc.geometry
+    if geometry is None:
+        return
+    if (axis := axis_beside_shaft(geometry)) is not None:
+        yield Finding(code="off_axis", values={"distance_m": float(np.hypot(*axis))})
+    if (inward := inward_share(geometry)) > _NEXT_TO_NOTHING:
+        yield Finding(code="outer_wall_faces_inward", values={"area_share": inward})
+    bend, volume = faceting(geometry).steepest, drawing_shares(scene.disc, np.empty(0)).volume
+    if bend > SMOOTH or volume > scene.tolerance:
+        yield Finding(code="coarse_curves", values={"angle_rad": bend, "volume_share": volume})
 
 
 def _flow_findings(calibration: Calibration) -> Iterator[Finding]:

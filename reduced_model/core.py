@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ringbalance.mesh.geometry import chamber_volume, liquid_area
 from ringbalance.physics.tube.draw_down import port_depth
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure, measured_closed_forms
+from ringbalance.reduced_model.chamber.values import chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.reduced_model.tube.regime import ColumnFlow, TubeEnds, can_flow

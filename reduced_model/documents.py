@@ -12,19 +12,18 @@ import numpy.typing as npt
 
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.budget import Budget
-from ringbalance.reduced_model.calibration_record import Calibration
+from ringbalance.reduced_model.calibration_record import Budget, Calibration
 from ringbalance.reduced_model.chamber.calibration import Curve
+from ringbalance.reduced_model.chamber.contributions import compression
 from ringbalance.reduced_model.chamber.element_check import CHECKED, ElementCheck
-from ringbalance.reduced_model.chamber.gravity import closed_ring
-from ringbalance.reduced_model.chamber.range import compression
+from ringbalance.reduced_model.chamber.tilted_ring import closed_ring
 from ringbalance.reduced_model.chamber.values import paper_closed_forms, share_across
 from ringbalance.reduced_model.gas_line import line_document
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.results.findings import Finding
+from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.rules.validity import LARGEST_COMPRESSION
+from ringbalance.scene.rules.working import LARGEST_COMPRESSION
 
 PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 """Gas pressures of the law's table, over the scene's own."""

@@ -3,47 +3,48 @@
 Every estimate is relative to the quantity that the term changes, holds at the worst fill of the range, and
 rests on a dimensionless group that `terms` names.  What belongs to an injection is judged for the one that
 matters most, the shortest (`injection_time`).
+
+**Inertia.**  A full column of length L under the driving pressure p obeys
+    du/dt = (p/(rho L)) (1 - (u/u0)^2),    p = (k + 1) rho u0^2/2,
+so u = u0 tanh(t/tau) with tau = rho L u0/p = 2 L/((k + 1) u0).  It has moved u0 tau ln cosh(t/tau), which
+tends to u0 (t - tau ln 2): of an injection of duration T the start costs the fraction
+1 - (tau/T) ln cosh(T/tau), at most 1, and tau ln 2 of a long one.  Where the loss is laminar, in proportion
+to u, the same tau gives u = u0 (1 - exp(-t/tau)), and the fraction (tau/T) (1 - exp(-T/tau)), tau of a long
+injection.  What the column coasts after the gas is shut is not subtracted: the fraction is an upper bound.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.state import TubeState, tube_state, tube_state_at
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
-from ringbalance.reduced_model.chamber.range import (
-    chamber_fills,
-    mean_gravity,
-    range_contributions,
-    range_fills,
-)
-from ringbalance.reduced_model.chamber.terms import (
+from ringbalance.reduced_model.chamber.contributions import (
     PLATES,
     RIPPLE,
     SLOSHING,
+    Contribution,
     amplification,
     capillary_share,
+    chamber_fills,
+    mean_gravity,
+    percent,
+    range_contributions,
+    range_fills,
     wall_layers,
 )
-from ringbalance.reduced_model.chamber.values import by_closed_form
-from ringbalance.reduced_model.contribution import Contribution, percent
+from ringbalance.reduced_model.chamber.values import by_closed_form, chamber_pressure
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
-from ringbalance.reduced_model.time_scales import (
-    deciding_gas_time,
-    long_start_up_loss,
-    start_up_loss,
-    start_up_time,
-)
 from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads, crest_head, velocity_of
 from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
@@ -51,6 +52,67 @@ from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flo
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.loop_models import Sensor
 from ringbalance.scene.models import Scene
+
+Number = TypeVar("Number", float, FloatArray)
+
+
+def first_gas_time(scene: Scene) -> float:
+    """Valve-open time of the first injection, s: Kc times the initial amplitude, or the first trial.
+
+    The controller's limits hold; without a vibration it is the longest valve-open time.
+    Source: section 4 of the liquid-ring paper.
+    """
+    control = scene.controller
+    commanded = control.proportional * scene.rotor.initial_amplitude
+    if control.kind == "trial":
+        commanded = control.first_trial
+    return _within_limits(scene, commanded) or control.maximum_gas_time
+
+
+def deciding_gas_time(scene: Scene, *, rate: float) -> float:
+    """Valve-open time of the shortest injection that matters, s: the one commanded at the limit of the
+    vibration.
+
+    Target vector: Kc times the limit; trial: the short step, where the limit lies below `fine_below`;
+    law-based: the limit over the rate.  Every time scale is compared with this one, because the last
+    injections decide whether a run settles.
+    The controller's limits hold.  `rate` is the change of the vibration per second of gas, m/s; zero where
+    nothing flows.
+    Source: section 4 of the liquid-ring paper.
+    """
+    control = scene.controller
+    commanded = control.proportional * control.limit
+    if control.kind == "trial":
+        fine = control.limit < control.fine_below
+        commanded = min(control.first_trial, control.short_step if fine else control.long_step)
+    elif control.kind == "law_based":
+        commanded = control.limit / rate if rate > 0 else control.maximum_gas_time
+    return _within_limits(scene, commanded) or control.maximum_gas_time
+
+
+def _within_limits(scene: Scene, commanded: float) -> float:
+    return min(max(commanded, scene.controller.minimum_gas_time), scene.controller.maximum_gas_time)
+
+
+def start_up_time(*, density: float, length: float, velocity: Number, driving_pressure: Number) -> Number:
+    """Time scale tau on which the column in the tube starts, s: rho L u0/p = 2 L/((k + 1) u0)."""
+    return density * length * velocity / driving_pressure
+
+
+def long_start_up_loss(start_up: float, *, laminar: float = 0.0) -> float:
+    """Valve-open time that a start costs of a long injection, s: tau ln 2 turbulent, tau laminar."""
+    return start_up * (laminar + (1 - laminar) * math.log(2))
+
+
+def start_up_loss(*, start_up: float, gas_time: float, laminar: float = 0.0) -> float:
+    """Fraction of an injection's steady volume that the column's start costs, from 0 to 1.
+
+    1 - (tau/T) ln cosh(T/tau), or (tau/T) (1 - exp(-T/tau)) laminar.
+    """
+    t = gas_time / start_up
+    log_cosh = t + math.log1p(math.exp(-2 * t)) - math.log(2)
+    return laminar * -math.expm1(-t) / t + (1 - laminar) * (1 - log_cosh / t)
+
 
 SHARES: Final = (0.15, 0.3, 0.5, 0.7, 0.85)
 """Fills of the driven chamber at which the flow is judged, as shares of max_fill_ratio."""

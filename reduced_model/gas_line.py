@@ -17,9 +17,9 @@ from typing import Any, Final
 
 from ringbalance.physics.gas import GasLine
 from ringbalance.reduced_model.injection.dynamics import Dynamics, gives_forces
-from ringbalance.reduced_model.injection.injections import Injections
+from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Gas, Scene

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.results.findings import Finding
+from ringbalance.results.rows import Finding
 from ringbalance.scene.models import Disc, Scene
 
 DAMPING: Final = 0.01

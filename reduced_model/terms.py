@@ -17,8 +17,8 @@ from typing import Final, Literal
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.gas import HEAT_CAPACITY_RATIO
 from ringbalance.reduced_model import estimates, paper
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
-from ringbalance.reduced_model.contribution import Contribution, percent
+from ringbalance.reduced_model.chamber.contributions import Contribution, percent
+from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.scene.models import Scene
 
 INERTIA: Final = "tube inertia"

@@ -19,7 +19,6 @@ from ringbalance.verification.evidence import Level
 DONE: Final = 0
 NOT_SOUND: Final = 1
 MOST_WORKERS: Final = 2
-WITH_LIQUID: Final = ("liquid_ring",)
 
 
 def report(

@@ -15,7 +15,7 @@ from typing import Final
 
 from PIL import Image
 
-from ringbalance.reduced_model.budget import UNSTATED
+from ringbalance.reduced_model.calibration_record import UNSTATED
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
 from ringbalance.reports.figures.calibration import chamber_figures, tube_figures

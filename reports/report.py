@@ -9,13 +9,17 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+import numpy as np
+
 from ringbalance.reports.eccentric_evidence import collect_eccentric
 from ringbalance.reports.evidence import Progress, collect_evidence
 from ringbalance.reports.page import DOCUMENTS, case_views, page_content
+from ringbalance.reports.pages.cases import TABLES, is_long, table_file
 from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
@@ -26,11 +30,11 @@ from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Record
 from ringbalance.reports.sections import section_view, sections_of
 from ringbalance.reports.summary import lead_sentence
-from ringbalance.reports.tables import FOLDER as TABLES
-from ringbalance.reports.tables import csv_tables
+from ringbalance.results.result import csv_text
 from ringbalance.scene import AnyScene, Scene, liquid_ring_scene
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.processes import Workers, beside, seldom_collected
+from ringbalance.scene.platform.garbage import seldom_collected
+from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.runner import paper_scene
 
@@ -192,3 +196,48 @@ def _write_page(evidence: Record, stage: Path, views: _Views) -> Record:
     for name, page in render_pages(content).items():
         (stage / name).write_text(page, encoding="utf-8")
     return kept
+
+
+def csv_tables(evidence: Record) -> dict[str, str]:
+    """Contents of the files by name: tables of cases, the map of k, the operating map, the sampled loops.
+
+    SI units, which stand in the heads. The same evidence gives the same bytes.
+    """
+    tables: dict[str, Record] = {
+        table_file(case, table): {
+            f"{name} [{table['units'].get(name, '1')}]": values for name, values in table["columns"].items()
+        }
+        for case in evidence["verification"]
+        for table in case.get("tables") or []
+        if is_long(table)
+    }
+    if drag := (evidence.get("fifty") or {}).get("map"):
+        tables["map_of_k.csv"] = _drag_map(drag)
+    if operation := evidence.get("operation"):
+        tables["operating_map.csv"] = _operating_map(operation)
+    for law, run in evidence["closed_loop"].items():
+        tables[f"loop_{law}.csv"] = {
+            "time [s]": run["time_s"],
+            "amplitude [m]": run["amplitude_m"],
+            "phase [rad]": run.get("phase_rad") or [None] * len(run["time_s"]),
+        }
+    return {name: csv_text(columns) for name, columns in tables.items()}
+
+
+def _drag_map(drag: Record) -> Record:
+    bores, viscosities = drag["bore_m"], drag["kinematic_viscosity_m2_s"]
+    return {
+        "bore [m]": np.repeat(bores, len(viscosities)).tolist(),
+        "kinematic viscosity [m^2/s]": np.tile(viscosities, len(bores)).tolist(),
+        "k [1]": np.ravel(drag["k"]).tolist(),
+        "expanded uncertainty of k [1]": np.ravel(drag["k_uncertainty"]).tolist(),
+    }
+
+
+def _operating_map(operation: Record) -> Record:
+    places = list(product(operation["gas_pressure_Pa"], operation["fill_ratio"]))
+    return {
+        "gas pressure [Pa]": [pressure for pressure, _ in places],
+        "fill ratio [1]": [fill for _, fill in places],
+        "regime": [operation["regimes"][int(sign)] for row in operation["regime"] for sign in row],
+    }

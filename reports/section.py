@@ -2,56 +2,22 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final, Literal
 
-from markupsafe import Markup
-
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reports.prose import untraced
-from ringbalance.results.numbers import MISSING
 from ringbalance.scene import Scene
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
-Cells = Sequence[str]
 _TUNING_RUNS: Final = 500
 _TERM_RUNS: Final = 10
 Place = Literal["report", "annex"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """Texts or markup in rows and columns; a column is set as numbers when most cells begin like one."""
-
-    caption: str = ""
-    heads: Cells
-    """A line break divides a head."""
-    rows: Sequence[Cells]
-    style: str = "narrow"
-    """Class of the page's style sheet: "narrow", "dense" or none."""
-
-    @property
-    def numeric(self) -> list[bool]:
-        """By column."""
-        columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.heads)
-        plain = ([striptags(untraced(cell)) for cell in column] for column in columns)
-        return [_numeric([cell for cell in column if cell.strip(MISSING)]) for column in plain]
-
-
-def striptags(text: str) -> str:
-    """What a reader sees of markup; other text as it is."""
-    return text.striptags() if isinstance(text, Markup) else text
-
-
-def _numeric(cells: Cells) -> bool:
-    return 2 * sum(bool(re.match(r"[(+−]?\d", cell)) for cell in cells) > len(cells)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json as json_format
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from ringbalance.controller.balancer import AS_GIVEN, Run, balancer_under
+from ringbalance.results.result import csv_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import AnyScene, Models, with_tolerance
@@ -56,11 +57,11 @@ def simulate(
     balancer = balancer_under(law, told)
     # The first run on a machine compiles for about half a minute; later ones take the code that is kept.
     with activity("simulate", "closed loop (the first run compiles) ...") as shown:
-        run = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown)).runs[0][0]
+        run = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown)).traced[0].run
         document = run.to_dict() if json else {}
         drawing = None if plot is None else _sheet(told, run)
     if csv is not None:
-        write_whole(csv, _csv_text(balancer.history(run)))
+        write_whole(csv, csv_text(balancer.history(run)))
     if plot is not None and drawing is not None:
         write_whole(plot, drawing)
     if json:
@@ -103,9 +104,3 @@ def _sheet(scene: AnyScene, run: Run) -> str:
 def _clock(shown: Activity) -> Callable[[float, float], None]:
     """Shows the simulated time, s, of the time limit, s."""
     return lambda time, limit: shown.show(f"{time:.1f} s of {limit:g} s simulated", done=time, total=limit)
-
-
-def _csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
-    """Columns of one length as a table with its names in the first line; None is an empty cell."""
-    texts = [["" if value is None else str(value) for value in values] for values in columns.values()]
-    return "\n".join([",".join(columns), *map(",".join, zip(*texts, strict=True))]) + "\n"

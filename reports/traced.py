@@ -15,9 +15,9 @@ from typing import Any, Final, Literal, overload
 from markupsafe import Markup, escape
 
 from ringbalance.reports.prose import marked_up
-from ringbalance.reports.section import Table
 from ringbalance.results import numbers
 from ringbalance.results.numbers import believed
+from ringbalance.results.result import Table
 
 Form = Literal["measured", "given", "percent", "change", "fixed"]
 

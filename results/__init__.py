@@ -1,9 +1,10 @@
 """What every command answers with, and how it is written.
 
-`rows`: a quantity with its interval.  `findings`: something to say, with a code, a
-severity, its numbers and the change of the scene that would mend it; the sentences are in `sentences.toml`.
-`numbers`: values with their uncertainties as text.  `table`: texts in rows and columns.
-`render`: rows and tables for a terminal, HTML, CSV and JSON.  `result`: the base of all results.
+`rows`: a quantity with its interval, and a finding: something to say, with a code, a severity, its
+numbers and the change of the scene that would mend it; the sentences are in `sentences.toml`.
+`numbers`: values with their uncertainties as text.
+`result`: the base of all results, texts in rows and columns, and how both are written in a terminal, a
+notebook, a CSV file and JSON.
 A new quantity is one `Quantity` where it is computed; a new finding one code, with one sentence.
 """
 

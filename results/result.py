@@ -1,35 +1,164 @@
-"""What every answer is: rows, and the document that its command prints as JSON."""
+"""What every answer is: rows, written for a terminal, a notebook, a CSV file and JSON."""
 
 from __future__ import annotations
 
+import csv
+import re
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from io import StringIO
 from itertools import islice
-from typing import Any, Final
+from typing import Any, Final, Literal, Protocol
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Group, RenderableType
+from rich.table import Table as RichTable
 from rich.text import Text
 
-from ringbalance.results.findings import Finding
-from ringbalance.results.numbers import plain
-from ringbalance.results.render import (
-    Facts,
-    findings_text,
-    html_table,
-    quantity_rows,
-    terminal_table,
-    two_columns,
-)
-from ringbalance.results.rows import Quantity
-from ringbalance.results.table import Table
+from ringbalance.results.numbers import MISSING, percent, plain
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.origins import summary_text
 
+Cells = Sequence[str]
+Facts = Sequence[tuple[str, str]]
+"""Names and texts."""
+
+_STYLES: Final = {"info": "green", "warning": "yellow", "error": "red"}
+_NAME: Final = 28
+"""Characters of names that stand in one line."""
 _MAIN: Final = 3
 """Quantities in a short text."""
 _MOST: Final = 10
 """In a notebook."""
+_NUMBER: Final = re.compile("(?:<[^>]*>|\ue000[^\ue001]*\ue001)*[(+−-]?\\d")
+"""A text that begins like a number, behind tags and the marks of a trace."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Texts in rows and columns, whatever they are written to."""
+
+    caption: str = ""
+    heads: Cells
+    """A line break divides a head."""
+    rows: Sequence[Cells]
+    note: str = ""
+    """Below the table."""
+    style: str = "narrow"
+    """Class of the report's style sheet: "narrow", "dense", "words", "whole" or none."""
+
+    @property
+    def numeric(self) -> list[bool]:
+        """By column: whether it is set as numbers, as most of its cells begin like one."""
+        columns = zip(*self.rows, strict=True) if self.rows else [()] * len(self.heads)
+        filled = ([cell for cell in column if cell.strip(MISSING)] for column in columns)
+        return [2 * sum(bool(_NUMBER.match(cell)) for cell in cells) > len(cells) for cells in filled]
+
+
+class _ModelUsed(Protocol):
+    """A physical term as an answer lists it."""
+
+    @property
+    def term(self) -> str:
+        """Its name."""
+
+    @property
+    def model(self) -> str:
+        """What stands for it."""
+
+    @property
+    def why(self) -> str:
+        """How the contribution was estimated."""
+
+    @property
+    def estimated_contribution(self) -> float | None:
+        """Relative to the result; None: unknown."""
+
+
+def models_table(models_used: Iterable[_ModelUsed]) -> Table:
+    """The physical terms of an answer with their models."""
+    rows = [
+        (each.term, each.model, percent(each.estimated_contribution, digits=3), each.why)
+        for each in models_used
+    ]
+    return Table(caption="Models used", heads=("term", "model", "contribution", "why"), rows=rows)
+
+
+def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
+    """Columns of one length as comma-separated values below a line of their names; None is an empty cell."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return text.getvalue()
+
+
+def _findings_text(findings: Iterable[Finding], *, headline: bool) -> Group:
+    """One sentence a finding; the first may be a headline."""
+    texts = []
+    for place, each in enumerate(findings):
+        first = headline and place == 0
+        colour = "" if each.severity == "info" and not first else _STYLES[each.severity]
+        texts.append(Text(each.text, style=f"{'bold ' if first else ''}{colour}"))
+    return Group(*texts)
+
+
+def _quantity_facts(quantities: Iterable[Quantity]) -> Iterator[tuple[str, str]]:
+    """Name and text of each, with its status where it is limited."""
+    for each in quantities:
+        limited = "" if each.status == "ok" else f" ({each.status.replace('_', ' ')})"
+        yield each.name, plain(each.text) + limited
+
+
+def _two_columns(rows: Iterable[tuple[str, str]]) -> RichTable:
+    """Names and texts, without head or frame."""
+    table = RichTable(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_column(style="dim")
+    table.add_column()
+    for name, text in rows:
+        table.add_row(Text(name), Text(text))
+    return table
+
+
+def _terminal_table(table: Table) -> RichTable:
+    """A table for a rich console, in the signs of a typewriter."""
+    shown = RichTable(
+        title=table.caption or None,
+        caption=table.note or None,
+        title_justify="left",
+        caption_justify="left",
+        title_style="bold",
+        header_style="bold",
+        box=SIMPLE_HEAD,
+        padding=0,
+        pad_edge=False,
+    )
+    for place, (head, numeric) in enumerate(zip(table.heads, table.numeric, strict=True)):
+        # A name that is cut short is no use; anything else is broken into lines.
+        name = place == 0 and max((len(row[0]) for row in table.rows), default=0) <= _NAME
+        side: Literal["right", "left"] = "right" if numeric else "left"
+        shown.add_column(Text(plain(head)), justify=side, no_wrap=name, overflow="fold")
+    for row in table.rows:
+        shown.add_row(*(Text(plain(cell)) for cell in row))
+    return shown
+
+
+def _html_table(table: Table) -> str:
+    """A table for a notebook."""
+    sides = ["right" if numeric else "left" for numeric in table.numeric]
+    heads = "".join(f"<th>{escape(head)}</th>" for head in table.heads)
+    rows = "".join(
+        "<tr>"
+        + "".join(
+            f'<td style="text-align:{side}">{escape(cell)}</td>'
+            for side, cell in zip(sides, row, strict=True)
+        )
+        + "</tr>"
+        for row in table.rows
+    )
+    return f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,13 +190,13 @@ class Rows:
 
         Args: `headline`: whether the first finding is one; otherwise the title is, and findings come later.
         """
-        numbers = two_columns([*self.facts, *quantity_rows(self.quantities[: self.listed])])
-        tables = iter([terminal_table(table) for table in self.tables if table.rows])
+        numbers = _two_columns([*self.facts, *_quantity_facts(self.quantities[: self.listed])])
+        tables = iter([_terminal_table(table) for table in self.tables if table.rows])
         if headline:
-            return Group(findings_text(self.findings), numbers, *more, *tables)
+            return Group(_findings_text(self.findings, headline=True), numbers, *more, *tables)
         # Where nothing is listed, the first table has the quantities.
-        first = [*islice(tables, 1), two_columns(self.facts)] if self.listed == 0 else [numbers]
-        sentences = findings_text(self.findings, headline=False)
+        first = [*islice(tables, 1), _two_columns(self.facts)] if self.listed == 0 else [numbers]
+        sentences = _findings_text(self.findings, headline=False)
         return Group(Text(self.title, style="bold"), *first, *more, sentences, *tables)
 
     def lines(self) -> Iterator[str]:
@@ -83,7 +212,7 @@ class Rows:
         sentences = "".join(f"<p>{escape(each.sentence())}</p>" for each in self.findings)
         rows = [(each.name, each.symbol, each.text) for each in self.quantities[:_MOST]]
         table = Table(heads=("quantity", "symbol", "value (95 %)"), rows=rows)
-        return f"<div><strong>{escape(self.title)}</strong>{sentences}{html_table(table)}</div>"
+        return f"<div><strong>{escape(self.title)}</strong>{sentences}{_html_table(table)}</div>"
 
 
 class Result:
@@ -127,19 +256,3 @@ class PresentedResult(Result):
     def rows(self) -> Rows:
         """Quantities, findings and tables."""
         return self.presentation.rows(self)
-
-
-class CommandResult:
-    """Base of results that have no rows yet."""
-
-    @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """The document that the command of the result prints with `--json`."""
-
-    @abstractmethod
-    def lines(self) -> Iterable[str]:
-        """About five lines."""
-
-    def __repr__(self) -> str:
-        """The same as one text."""
-        return summary_text(self.lines())

@@ -1,12 +1,22 @@
-"""A quantity as one record: what every output is made of."""
+"""A quantity and a finding, each as one record: what every output is made of.
+
+A finding is a code with its severity, numbers, sentence, and the change of the scene that mends it.  A
+sentence stands in `sentences.toml` under its code, with its numbers in braces: {limit:m} is the value "limit"
+in the unit that suits so many metres, {share:%} a fraction as a percentage, {chamber} a text or a number.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from importlib.resources import files
+from string import Formatter
+from typing import Any, Literal
 
-from ringbalance.results.numbers import Width, given, shown
+from ringbalance.results.numbers import MISSING, Width, given, percent, plain, shown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,3 +83,106 @@ class Quantity:
 def around(value: float, total: float) -> tuple[float | None, float | None]:
     """Ends of an interval as wide on both sides; none without an uncertainty."""
     return (value - total, value + total) if total else (None, None)
+
+
+Severity = Literal["info", "warning", "error"]
+Value = float | str | Quantity | Sequence[str] | None
+Mark = Callable[[str, str], str]
+"""Name and text of a value to the text that goes into a sentence, such as one with its trace."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """Its code is stable and documented, its sentence is not."""
+
+    code: str
+    values: Mapping[str, Value] = field(default_factory=dict)
+    """SI, by the names in the sentence."""
+    change: Mapping[str, float | str] = field(default_factory=dict)
+    """By path of a key of the scene: its new value, SI, in place of what the code says in general."""
+
+    @property
+    def severity(self) -> Severity:
+        """Of the code."""
+        return sentences()[self.code].severity
+
+    @property
+    def changes(self) -> dict[str, float | str]:
+        """By path of a key in the scene: "raise", "lower", "set", or the value, SI."""
+        return {**sentences()[self.code].change, **self.change}
+
+    @property
+    def text(self) -> str:
+        """The sentence, for a terminal."""
+        return plain(self.sentence())
+
+    def sentence(self, mark: Mark = lambda _name, text: text) -> str:
+        """The sentence with typographic signs; each number goes through `mark`."""
+        values = {name: _Filled(name, value, mark) for name, value in self.values.items()}
+        return Formatter().vformat(sentences()[self.code].text, (), values)
+
+    def document(self) -> dict[str, Any]:
+        """For JSON; a quantity stands in it by its value."""
+        values = {name: v.value if isinstance(v, Quantity) else v for name, v in self.values.items()}
+        return {
+            "code": self.code,
+            "severity": self.severity,
+            "values": values,
+            "change": self.changes,
+            "text": self.text,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sentence:
+    """What stands in `sentences.toml` under a code."""
+
+    severity: Severity
+    text: str
+    change: Mapping[str, float | str] = field(default_factory=dict)
+
+    @property
+    def values(self) -> tuple[str, ...]:
+        """Names of the values in the text."""
+        return tuple(dict.fromkeys(name for _, name, _, _ in Formatter().parse(self.text) if name))
+
+
+@cache
+def sentences() -> Mapping[str, Sentence]:
+    """All codes with their sentences, in the order of the file."""
+    content = (files("ringbalance.results") / "sentences.toml").read_text(encoding="utf-8")
+    return {code: Sentence(**entry) for code, entry in tomllib.loads(content).items()}
+
+
+def _value_text(value: Value, unit: str = "", *, digits: int = 4) -> str:
+    """The one filter for numbers in sentences and templates.
+
+    A quantity has its own unit and as many digits as its uncertainty leaves; another number is as short as
+    `digits` significant digits allow, in the unit that suits it; names become "a, b and c".
+    Args: `unit`: SI; "%" for a fraction; empty for a text or a number without one.
+    """
+    if value is None:
+        return MISSING
+    if isinstance(value, Quantity):
+        return value.text
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Sequence):
+        return f"{', '.join(value[:-1])} and {value[-1]}" if len(value) > 1 else "".join(value)
+    if unit == "%":
+        return percent(value, digits=digits)
+    exact = len(str(value)) if isinstance(value, int) else digits
+    return given(value, unit or "1", digits=max(digits, exact))
+
+
+@dataclass(frozen=True)
+class _Filled:
+    """A value in a sentence; the format after its name is a unit, perhaps with digits: {gain:s/m;3}."""
+
+    name: str
+    value: Value
+    mark: Mark
+
+    def __format__(self, spec: str) -> str:
+        unit, _, digits = spec.partition(";")
+        return self.mark(self.name, _value_text(self.value, unit, digits=int(digits or 4)))

@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
     from ringbalance.reduced_model.calibration_record import Calibration as Calibration
+    from ringbalance.reduced_model.law.files import load_law as load_law
+    from ringbalance.reduced_model.law.flow_law import CompleteLaw as CompleteLaw
     from ringbalance.reduced_model.law.flow_law import Flow as Flow
     from ringbalance.reduced_model.law.flow_law import FlowLaw as FlowLaw
+    from ringbalance.reduced_model.law.flow_law import MomentCurve as MomentCurve
     from ringbalance.reduced_model.law.flow_law import Regime as Regime
-    from ringbalance.reduced_model.law.loading import load_law as load_law
-    from ringbalance.reduced_model.law.model import CompleteLaw as CompleteLaw
-    from ringbalance.reduced_model.law.model import MomentCurve as MomentCurve
     from ringbalance.scene import Scene as Scene
     from ringbalance.scene import SceneError as SceneError
     from ringbalance.scene import bundled_scene as bundled_scene
@@ -54,12 +54,12 @@ __version__ = "0.1.0"
 # The balancers, each one line; a third is one more.
 register(
     "liquid_ring",
-    scene="ringbalance.scene.liquid_ring:KIND",
+    scene="ringbalance.scene.rules.liquid_ring:KIND",
     balancer="ringbalance.controller.liquid_ring.balancer:LiquidRingBalancer",
 )
 register(
     "eccentric_mass",
-    scene="ringbalance.controller.eccentric_mass.scene_rules:KIND",
+    scene="ringbalance.controller.eccentric_mass.scene_records:KIND",
     balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
 )
 register_function("with_values", place="ringbalance.scene.changes:with_values")
@@ -69,7 +69,7 @@ _HOME = {
     "Calibration": "ringbalance.reduced_model.calibration_record",
     "Command": "ringbalance.controller.algorithms.algorithm",
     "Comparison": "ringbalance.controller.compare",
-    "CompleteLaw": "ringbalance.reduced_model.law.model",
+    "CompleteLaw": "ringbalance.reduced_model.law.flow_law",
     "Controller": "ringbalance.controller.algorithms.algorithm",
     "EccentricRun": "ringbalance.controller.eccentric_mass.run_record",
     "EccentricScene": "ringbalance.controller.eccentric_mass.scene_records",
@@ -79,7 +79,7 @@ _HOME = {
     "Flow": "ringbalance.reduced_model.law.flow_law",
     "FlowLaw": "ringbalance.reduced_model.law.flow_law",
     "Measurement": "ringbalance.controller.algorithms.algorithm",
-    "MomentCurve": "ringbalance.reduced_model.law.model",
+    "MomentCurve": "ringbalance.reduced_model.law.flow_law",
     "Regime": "ringbalance.reduced_model.law.flow_law",
     "Scene": "ringbalance.scene",
     "SceneError": "ringbalance.scene",
@@ -93,7 +93,7 @@ _HOME = {
     "compare": "ringbalance.face",
     "extremes": "ringbalance.studies",
     "fit": "ringbalance.studies",
-    "load_law": "ringbalance.reduced_model.law.loading",
+    "load_law": "ringbalance.reduced_model.law.files",
     "load_scene": "ringbalance.scene",
     "paper_law": "ringbalance.calibration",
     "plot": "ringbalance.studies",

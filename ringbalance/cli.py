@@ -20,7 +20,7 @@ from typing import Any, get_args
 from cyclopts import App, CycloptsError, MissingArgumentError, Parameter, Token, UnknownCommandError, convert
 
 import ringbalance
-from ringbalance.scene.platform.processes import seldom_collected
+from ringbalance.scene.platform.garbage import seldom_collected
 from ringbalance.signals import interrupts
 from ringbalance.streams import discard_unwritten, drop_unusable_size, interpreter_error, prepare_streams
 
@@ -57,7 +57,7 @@ COMMANDS = {
         "Speed against accuracy: designs a second and error of every model.",
     ),
     "extremes": (
-        "ringbalance.reports.extremes_cli:extremes",
+        "ringbalance.verification.extremes.cli:extremes",
         "Limits of validity: where results stop, what is reported beyond, and whether the invariants hold "
         "inside.",
     ),

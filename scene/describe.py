@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from ringbalance.scene.faults import Fault, toml_text
+from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import Shown, descriptions_of, keys_of
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import LIQUID_RING
@@ -15,6 +15,7 @@ from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.models import Bend, Scene
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.registry import balancers
+from ringbalance.scene.toml import toml_text
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 from ringbalance.scene.units import DIMENSIONS, format_quantity
 

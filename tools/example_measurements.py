@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene, eccentric_with
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.identification.balancers import models_for
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS
@@ -23,6 +23,7 @@ from ringbalance.scene import AnyScene, bundled_scene, load_scene, write_whole
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.describe import in_usual_unit, usual_name, usual_unit
 from ringbalance.scene.models import Scene
+from ringbalance.scene.paths import with_values_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, with_value
 from ringbalance.scene.units import format_quantity
 
@@ -64,7 +65,7 @@ def truth(kind: str) -> AnyScene:
         if isinstance(scene, Scene):
             scene = with_value(scene=scene, quantity=name, value=value)
         else:
-            scene = eccentric_with(eccentric_scene(scene), value, name=name)
+            scene = with_values_at(eccentric_scene(scene), {name: value})
     return scene
 
 

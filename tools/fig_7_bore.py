@@ -13,7 +13,7 @@ from collections.abc import Callable
 from scipy.optimize import brentq
 
 import ringbalance as rb
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene import Scene, bundled_scene, liquid_ring_scene, load_scene
 
 RATE = 7.2e-6

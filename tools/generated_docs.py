@@ -25,7 +25,7 @@ from ringbalance.identification.kinds.kind import Kind
 from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.reports.equations import equations as report_equations
 from ringbalance.reports.saved import saved_cases
-from ringbalance.results.findings import sentences
+from ringbalance.results.rows import sentences
 from ringbalance.scene import write_whole
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.document import case_document, definition_document

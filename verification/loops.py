@@ -16,7 +16,7 @@ from ringbalance.reduced_model.calibration import calibrate, chamber_and_law
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.estimates import steady
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene

@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from ringbalance.controller.formulas import valve_time
-
 StateT = TypeVar("StateT")
 
 
@@ -69,20 +67,3 @@ class Controller(Protocol[StateT]):
     def step(self, state: StateT, measurement: Measurement | None) -> tuple[StateT, Command]:
         """Next state and command after one sample (None: dropped); a pure function."""
         ...
-
-
-def opening(
-    times: tuple[tuple[int, float], ...],
-    *,
-    minimum_gas_time: float,
-    maximum_gas_time: float,
-    offsets: tuple[float, ...] = (),
-) -> Command:
-    """Valves that open for (chamber, time) and the chamber's offset: a shorter time is not executed, a longer
-    one is cut, s."""
-    durations = (
-        (chamber, valve_time(share, offsets[chamber] if offsets else 0.0, minimum_gas_time, maximum_gas_time))
-        for chamber, share in times
-    )
-    valves = tuple(ValveCommand(chamber=chamber, duration=time) for chamber, time in durations if time > 0)
-    return Command(valves=valves, reason="" if valves else "the valve-open time is below the minimum")

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from ringbalance.controller.algorithms.built_in import BuiltIn
+from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector, Trial
 from ringbalance.controller.algorithms.law_based import LawBased
-from ringbalance.controller.algorithms.target_vector import TargetVector
-from ringbalance.controller.algorithms.trial import Trial
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
+from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
@@ -79,6 +77,7 @@ def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
         ring=LiquidRing(
             model=model,
             chambers=scene.disc.chambers,
+            total=2 * scene.disc.initial_fill,
             dynamics=dynamics_of(
                 scene=scene,
                 model=model,
@@ -86,7 +85,6 @@ def law_based_of(scene: Scene, model: BalancerModel) -> LawBased:
                 residual_fill=residual_fill_ratio(scene, law=model.flow),
             ),
         ),
-        initial=DiscState.initial(disc=scene.disc),
         influence=settings.assumed_influence,
         limit=settings.limit,
         amplitude_noise=scene.sensor.amplitude_noise,

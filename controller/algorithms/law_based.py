@@ -1,8 +1,4 @@
-"""The law-based algorithm: valve-open times straight from the flow law, and it learns the influence
-coefficient.
-
-From a wanted balancing moment to the fills of the pairs it goes by `wanted_moment`.
-"""
+"""The law-based algorithm: valve-open times straight from the flow law, and an influence that it learns."""
 
 from __future__ import annotations
 
@@ -14,19 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
-from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.loop_records import LAW_BASED, Record
-from ringbalance.controller.moment_table import MomentTable, pair_moment
+from ringbalance.controller.liquid_ring.plant import LiquidRing
+from ringbalance.controller.loop_records import LAW_BASED, MomentTable, Record, pair_moment
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.injection.column import steady
+from ringbalance.reduced_model.injection.dynamics import EVENTS, WORKSPACE, Event, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance
 from ringbalance.reduced_model.injection.pair import Motion, packed
-from ringbalance.reduced_model.injection.records import EVENTS, WORKSPACE, Event, X
-from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.platform.compiled import in_place
 
 PRIOR_STANDARD_DEVIATION: Final = 0.5
 """Standard deviation, relative, of the assumed influence coefficient before the first operation."""
@@ -37,6 +31,8 @@ MAGNITUDE_RANGE: Final = 10.0
 FILL_ERROR: Final = 1e-12
 """Error in fill ratio at which a valve-open time is good enough."""
 _HALVINGS: Final = 60
+END_STEP: Final = 1e-3
+"""Share of the range of x over which a slope at its end is taken."""
 _BLOCKED: Final = EVENTS.index(Event.BLOCKED)
 _EMPTY: Final = EVENTS.index(Event.EMPTY)
 _FULL: Final = EVENTS.index(Event.FULL)
@@ -62,8 +58,6 @@ class LawBased(BuiltIn):
 
     ring: LiquidRing
     """The disc as the algorithm assumes it."""
-    initial: DiscState
-    """Its liquid at the start."""
     influence: complex
     """K before the first operation, m/(kg m)."""
     limit: float
@@ -89,14 +83,14 @@ class LawBased(BuiltIn):
     @property
     def plant(self) -> npt.NDArray[np.void]:
         """The assumed disc, type `PLANT`, shape (1,)."""
-        return self.ring.dynamics.kept_plant(total=self.initial.pairs[0].total)
+        return self.ring.dynamics.kept_plant(total=self.ring.total)
 
     @property
     def law_standard_deviation(self) -> float:
         """Standard deviation of the law's velocity at the start, relative."""
-        pair, flow = self.initial.pairs[0], self.ring.model.flow
+        level, flow = self.ring.total / 2, self.ring.model.flow
         found = flow.evaluate(
-            fill_ratio=pair.fill, opposite_fill_ratio=pair.opposite_fill, gas_pressure=self.ring.gas_pressure
+            fill_ratio=level, opposite_fill_ratio=level, gas_pressure=self.ring.gas_pressure
         )
         velocity = abs(float(found.velocity))
         own = float(found.uncertainty) / (2 * velocity) if velocity > 0 else 0.0
@@ -104,7 +98,7 @@ class LawBased(BuiltIn):
 
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
-        chambers, total = self.ring.chambers, self.initial.pairs[0].total
+        chambers, total = self.ring.chambers, self.ring.total
         loop["algorithm"], loop["chambers"], loop["rest_limit"] = LAW_BASED, chambers, self.limit
         loop["assumed_amplitude_noise"], loop["assumed_phase_noise"] = self.amplitude_noise, self.phase_noise
         loop["probe"], loop["influence"], loop["total"] = self.probe, self.influence, total
@@ -121,10 +115,8 @@ class LawBased(BuiltIn):
 
     def liquid(self) -> npt.NDArray[np.void]:
         """As `BuiltIn.liquid`."""
-        pairs = [
-            packed(self.plant, fill=pair.fill, primed=False, motion=Motion()) for pair in self.initial.pairs
-        ]
-        return np.concatenate([*pairs, pairs[0]])
+        level = packed(self.plant, fill=self.ring.total / 2, primed=False, motion=Motion())
+        return np.repeat(level, self.ring.chambers // 2 + 1)
 
     def react(self, loop: Record, memory: Memory) -> None:
         """As `BuiltIn.react`."""
@@ -346,3 +338,95 @@ def _time_to(
         else:
             high, below, above, stays = time, found, above * (0.5 if stays < 0 else 1.0), -1
     return time
+
+
+@in_place
+def fill_for_moment(
+    nodes: ComplexArray,
+    first: float,
+    step: float,
+    wanted: float,
+    lowest: float,
+    highest: float,
+) -> float:
+    """Fill ratio of the positive chamber at which a pair has a moment, kg m, growing with that fill.
+
+    Beyond the ends it continues straight, so that it may lie outside [lowest, highest].
+    """
+    if highest <= lowest:
+        return lowest
+    short = END_STEP * (highest - lowest)
+    low, high = pair_moment(nodes, first, step, lowest).real, pair_moment(nodes, first, step, highest).real
+    if wanted <= low:
+        rise = pair_moment(nodes, first, step, lowest + short).real - low
+        return lowest + (wanted - low) / rise * short
+    if wanted >= high:
+        rise = high - pair_moment(nodes, first, step, highest - short).real
+        return highest + (wanted - high) / rise * short
+    for _ in range(_HALVINGS):
+        middle = (lowest + highest) / 2.0
+        if pair_moment(nodes, first, step, middle).real >= wanted:
+            highest = middle
+        else:
+            lowest = middle
+    return highest
+
+
+@in_place
+def split_change(wanted: complex, run: Record, axis: ComplexArray, half: int) -> None:
+    """Split a change of the disc's moment over its pairs, kg m, each within its bounds `least` and `most`.
+
+    The change goes to the two directions on either side of it; what a pair cannot give goes to the pairs that
+    are left; what no pair can give is asked, by its component, of those already at their ends, for the fills
+    are only assumed.  The result is in `change`.
+    Source: section 4.2 of the liquid-ring paper, by oblique components for other numbers of chambers.
+    """
+    for i in range(half):
+        run.fixed[i], run.change[i] = 0, 0.0
+    for _ in range(half):
+        left = wanted
+        for i in range(half):
+            left -= run.change[i] * axis[i] if run.fixed[i] != 0 else 0.0
+        _share(left, run, axis, half)
+        over = False
+        for i in range(half):
+            held = min(max(run.change[i], run.least[i]), run.most[i])
+            if run.fixed[i] == 0 and held != run.change[i]:
+                run.fixed[i], run.change[i], over = 1 if run.change[i] > held else -1, held, True
+        if not over:
+            break
+    missing = wanted
+    for i in range(half):
+        missing -= run.change[i] * axis[i]
+    for i in range(half):
+        component = (missing * axis[i].conjugate()).real
+        # Only in the sense in which the pair was asked for more than it has.
+        if run.fixed[i] * component > 0.0:
+            run.change[i] += component
+
+
+@in_place
+def _share(wanted: complex, run: Record, axis: ComplexArray, half: int) -> None:
+    """Components along the two free neighbouring directions; along the axis when only one is free."""
+    first, last, free = -1, -1, 0
+    for i in range(half):
+        if run.fixed[i] == 0:
+            run.change[i], free, last = 0.0, free + 1, i
+            first = i if first < 0 else first
+    if free == 1:
+        run.change[last] = (wanted * axis[last].conjugate()).real
+    if free < 2:
+        return
+    before, sign, slack = last, -1.0, -1e-12 * abs(wanted)
+    # Round once: from the last free axis, seen backwards, to the first one, and over the next to the last.
+    for turn in range(2 * half):
+        i, here = turn % half, 1.0 if turn < half else -1.0
+        if run.fixed[i] != 0:
+            continue
+        a, b = sign * axis[before], here * axis[i]
+        between = (a.conjugate() * b).imag
+        one, two = (wanted.conjugate() * b).imag / between, (a.conjugate() * wanted).imag / between
+        if min(one, two) >= slack:
+            run.change[before], run.change[i] = sign * max(one, 0.0), here * max(two, 0.0)
+            return
+        before, sign = i, here

@@ -17,10 +17,10 @@ import numpy as np
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
 from ringbalance.reduced_model.gas_line import standing_amplitude
-from ringbalance.reduced_model.injection.injections import Injections
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.injection.pair import Injections
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import FILLING, HELD
-from ringbalance.results.findings import Finding
+from ringbalance.results.rows import Finding
 from ringbalance.scene.models import Scene
 
 _DIGITS: Final = 4

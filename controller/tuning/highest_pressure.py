@@ -8,7 +8,7 @@ from typing import Final
 from scipy.optimize import brentq
 
 from ringbalance.reduced_model.gas_line import line_answers
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import with_value
 

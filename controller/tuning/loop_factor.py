@@ -19,19 +19,13 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.algorithms.law_based import LawBased
-from ringbalance.controller.algorithms.target_vector import TargetVector
-from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
-from ringbalance.controller.liquid_ring.reach import (
-    LEAST_PRESSURE,
-    NEARLY_EMPTY,
-    starting_pressure,
-)
-from ringbalance.controller.loop_records import RUN
-from ringbalance.controller.moment_table import MomentTable
+from ringbalance.controller.algorithms.built_in import TargetVector
+from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, split_change
+from ringbalance.controller.liquid_ring.plant import LEAST_PRESSURE, NEARLY_EMPTY, starting_pressure
+from ringbalance.controller.loop_records import RUN, MomentTable
 from ringbalance.controller.rotor import chamber_directions
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio, stalled_fill_ratio
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

@@ -12,7 +12,7 @@ from ringbalance.controller.tuning.dead_time import compensated, dead_times, off
 from ringbalance.controller.tuning.loop_factor import loop_factor, with_driving_gas
 from ringbalance.controller.tuning.recommendation import FactorUncertainty, recommended_gain
 from ringbalance.controller.tuning.settling import Progress, SettlingTimes, many_runs, tried
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 
 _INTEGRAL_PERIODS: Final = 5.0

@@ -10,17 +10,15 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
-from ringbalance.controller.ensemble.monte_carlo import Probability, simulate_ensemble
-from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
-from ringbalance.controller.liquid_ring.plant import DiscState
+from ringbalance.controller.ensemble import Probability, simulate_ensemble
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.members import Members, MemberUncertainty
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_gas
-from ringbalance.reduced_model.law.model import BalancerModel
-from ringbalance.reduced_model.operating.residual import Drawing, Holding, stalled_fill_ratio
-from ringbalance.results.findings import Finding
-from ringbalance.results.rows import Quantity
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import Drawing, Holding, stalled_fill_ratio
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
@@ -174,7 +172,7 @@ def _beyond_capacity(
     scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, runs: int
 ) -> tuple[float, float]:
     """Of the drawn runs, the fraction whose unbalance is beyond the liquid, and beyond it under this gas."""
-    ring, state = law_based_of(scene, model).ring, DiscState.initial(disc=scene.disc)
+    ring = law_based_of(scene, model).ring
     drawn = Members.drawn(scene, uncertainty_95=widths, seed=scene.run.seed, block=0)
     stalled = stalled_fill_ratio(
         law=model.flow, total=2 * scene.disc.initial_fill, gas_pressure=scene.gas.pressure
@@ -184,7 +182,7 @@ def _beyond_capacity(
         residual = drawn.first(runs).residual_fill(Drawing.of(asked, law=model.flow))
         left = (
             ring.unreachable_vibration(
-                state=state, rotor=_rotor(scene, drawn, number), least_fill=max(float(fill), at_least)
+                rotor=_rotor(scene, drawn, number), least_fill=max(float(fill), at_least)
             )
             for number, fill in enumerate(residual)
         )

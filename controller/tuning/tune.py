@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
-from ringbalance.controller.checks import check_settings
-from ringbalance.controller.liquid_ring.plant import DiscState
-from ringbalance.controller.liquid_ring.reach import BEYOND_CAPACITY, RUNS_BACK
-from ringbalance.controller.terms import run_models
+from ringbalance.controller.liquid_ring.plant import BEYOND_CAPACITY, RUNS_BACK
+from ringbalance.controller.terms import check_settings, run_models
 from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
 from ringbalance.controller.tuning.loop_factor import (
     LoopFactor,
@@ -35,9 +33,9 @@ from ringbalance.controller.tuning.search import (
 )
 from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
 from ringbalance.controller.tuning.view import tuning_rows
-from ringbalance.reduced_model.chamber.gravity import check_ring
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import neglected_in_injections
 from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import finite
@@ -136,11 +134,8 @@ def _judged(
 
 def _beyond_capacity(scene: Scene, model: BalancerModel) -> float:
     """With gas that drives the liquid: what only a higher pressure can do is not beyond the disc."""
-    plant, state = (
-        law_based_of(with_driving_gas(scene, model), model).ring,
-        DiscState.initial(disc=scene.disc),
-    )
-    return plant.unreachable_vibration(state=state, rotor=scene.rotor)
+    ring = law_based_of(with_driving_gas(scene, model), model).ring
+    return ring.unreachable_vibration(rotor=scene.rotor)
 
 
 def _line_reaches(lines: tuple[LineAnswer, ...], *, settles: bool) -> bool | None:

@@ -7,11 +7,9 @@ from collections.abc import Iterator
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.reduced_model.gas_line import line_text, line_warning
 from ringbalance.reduced_model.terms import neglected_in_injections
-from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import percent
-from ringbalance.results.result import Rows
-from ringbalance.results.rows import Quantity
-from ringbalance.results.table import Table
+from ringbalance.results.result import Rows, Table
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import finite
 
 

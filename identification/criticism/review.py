@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_with
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.criticism.explained import Explained, shares_explained
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.ranges import ComparedColumn, compared_columns
@@ -25,6 +25,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
 from ringbalance.scene.arrays import FloatArray, StringArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.paths import with_values_at
 
 _BY_LAW: Final = ("injection", "transfer", "flow")
 """Kinds that the law of the tube's flow decides on."""
@@ -122,10 +123,7 @@ def _by_other_machines(problem: Problem, scene: EccentricScene) -> Iterator[tupl
     kinds = {block.observations.kind for block in problem.blocks}
     for name, (kind, paths) in WITHOUT.items():
         if kind in kinds and not fitted & set(paths):
-            other = scene
-            for path in paths:
-                other = eccentric_with(other, 0.0, name=path)
-            yield name, problem.predicted(other)
+            yield name, problem.predicted(with_values_at(scene, dict.fromkeys(paths, 0.0)))
 
 
 def _by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, FloatArray]]:

@@ -11,10 +11,10 @@ import numpy as np
 
 from ringbalance.identification.kinds.kind import Kind, Observations, column, positive
 from ringbalance.physics.gas import HEAT_CAPACITY_RATIO, GasLine
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
-from ringbalance.physics.sloshing.system import sloshing_system
-from ringbalance.physics.tube.ends import entrance_loss, exit_loss
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.sloshing_system import sloshing_system
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
+from ringbalance.physics.tube.local_losses import entrance_loss, exit_loss
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Tube
 

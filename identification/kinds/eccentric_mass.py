@@ -8,9 +8,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.integrate import plant_step, substeps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import LOCKED, STUCK, rest_state
+from ringbalance.controller.eccentric_mass.integration import plant_step, substeps
+from ringbalance.controller.eccentric_mass.plant import LOCKED, STUCK, PlantParameters, rest_state
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.kinds.kind import (
     Grid,

@@ -34,7 +34,7 @@ from ringbalance.identification.kinds.kind import (
     positive,
 )
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics.tube.uncertainty import corrected_state
+from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.scene.arrays import ComplexArray, FloatArray, IntArray
 from ringbalance.scene.models import Scene
 

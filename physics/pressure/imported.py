@@ -16,11 +16,10 @@ import numpy as np
 from skfem.quadrature import get_quadrature
 
 from ringbalance.mesh.chamber import FREE_SURFACE
-from ringbalance.mesh.cut.faceting import SAFETY, faceting
+from ringbalance.mesh.faceting import SAFETY, faceting
 from ringbalance.mesh.liquid_body import Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import Tetrahedra, scikit_fem_mesh, tetrahedra
-from ringbalance.physics.pressure.elements import Side, quadratic_basis, side
-from ringbalance.physics.pressure.solve import RotatingLiquid, solve_on
+from ringbalance.physics.pressure.solve import RotatingLiquid, Side, quadratic_basis, side, solve_on
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry

@@ -15,11 +15,12 @@ from scipy.interpolate import CubicSpline
 
 from ringbalance.mesh.chamber import FREE_SURFACE, ChamberMesh, chamber_mesh
 from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
-from ringbalance.physics.pressure.elements import quadratic_basis, side
 from ringbalance.physics.pressure.solve import (
     PressureSolution,
     RotatingLiquid,
     WeakProblem,
+    quadratic_basis,
+    side,
     solve_pressure,
 )
 from ringbalance.physics.results import Statistics, Status, StatusCode

@@ -17,7 +17,7 @@ _MEAN_OF_LAYER: Final = 0.75
 """What the draining of the layer itself, 1/2, and its mean in place of its edge, 1/4, take off ln(R/r)."""
 
 
-def point_sink_depth(*, flow_rate: npt.ArrayLike, acceleration: float) -> FloatArray:
+def _point_sink_depth(*, flow_rate: npt.ArrayLike, acceleration: float) -> FloatArray:
     """Depth over a point in a flat wall at which gas reaches it, h = 0.6884 (Q^2/g_c)^(1/5), m.
 
     Bernoulli's equation from the surface at rest to the axis of a point sink,
@@ -33,13 +33,13 @@ def point_sink_depth(*, flow_rate: npt.ArrayLike, acceleration: float) -> FloatA
     return np.asarray(_POINT_SINK * (rate**2 / acceleration) ** 0.2)
 
 
-def rim_depth(*, flow_rate: npt.ArrayLike, acceleration: float, bore: float) -> FloatArray:
+def _rim_depth(*, flow_rate: npt.ArrayLike, acceleration: float, bore: float) -> FloatArray:
     """Depth that lets a flow over the rim of a port as over a weir, h = (3/2) [Q/(pi d sqrt(g_c))]^(2/3), m.
 
     The flow over a rim of length pi d is at most that at critical depth 2 h/3,
     Q = pi d (2/3)^1.5 sqrt(g_c) h^1.5. Of a deeper layer more would fall into the port than the tube takes:
     it stays drowned.
-    Args: as `point_sink_depth`; `bore`: d of the round port, m.
+    Args: as `_point_sink_depth`; `bore`: d of the round port, m.
     Source: the broad-crested weir, bent into a circle. That the level over an outlet which lets gas in
         follows from the flow alone, and that such a model bounds the level over one that runs full: abstract
         of Proc. IMechE 198 (1984), doi:10.1243/PIME_PROC_1984_198_016_02.
@@ -59,13 +59,13 @@ def draw_down_depth(
 ) -> FloatArray:
     """Mean depth of a layer over a port at which gas enters it, m.
 
-    Near the port h is the smaller one of `point_sink_depth` and `rim_depth`, each of which suffices; they
+    Near the port h is the smaller one of `_point_sink_depth` and `_rim_depth`, each of which suffices; they
     cross at u = 1.2 sqrt(g_c d), so that wide ports follow the rim and narrow ones the sink. Around it the
     liquid comes as a viscous layer of depth y on the wall, Q(s) = 2 pi s (g_c/(3 nu)) y^3 dy/ds. With
     Q(s) = Q (1 - s^2/R^2), as the whole layer drains, from s = r = max(h, d/2) on
     y^4 = h^4 + (6 nu Q/(pi g_c)) [ln(s/r) - s^2/(2 R^2)], whose mean over the wall is
     H = (h^4 + (6 nu Q/(pi g_c)) [ln(R/r) - 3/4])^(1/4).
-    Args: as `rim_depth`; `kinematic_viscosity`: nu, m^2/s. `feed_radius`: R, of the circle with the wall's
+    Args: as `_rim_depth`; `kinematic_viscosity`: nu, m^2/s. `feed_radius`: R, of the circle with the wall's
         area, m; needed with a viscosity. `below`: liquid under the port, c, which makes the layer y + c deep.
     Raises: ValueError: an acceleration that is not positive and finite.
     Range: a port in the middle of its wall; a laminar layer, thin against R. Of a turbulent one, which water
@@ -76,8 +76,8 @@ def draw_down_depth(
         raise ValueError("acceleration must be positive and finite: a disc at rest holds no liquid")
     rate = np.asarray(flow_rate, dtype=np.float64)
     h = np.minimum(
-        point_sink_depth(flow_rate=rate, acceleration=acceleration),
-        rim_depth(flow_rate=rate, acceleration=acceleration, bore=bore),
+        _point_sink_depth(flow_rate=rate, acceleration=acceleration),
+        _rim_depth(flow_rate=rate, acceleration=acceleration, bore=bore),
     )
     if np.all(np.asarray(kinematic_viscosity) == 0):
         return h

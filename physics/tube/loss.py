@@ -1,10 +1,13 @@
-"""Loss coefficient k(u) of the connecting tube, k = 2 (H_A - H_C)/u^2 - 1, from laminar to turbulent flow,
-and where its correlations are used outside what their sources state."""
+"""Loss coefficient k(u) of the connecting tube, k = 2 (H_A - H_C)/u^2 - 1, and its uncertainty.
+
+That is each correlation's spread and each uncertain input's effect; and where correlations are used outside
+what their sources state.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -12,14 +15,265 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
-from ringbalance.physics.tube.bends import bend_in_range
-from ringbalance.physics.tube.ends import LAMINAR_ENTRY_LENGTH
-from ringbalance.physics.tube.rotation import STRAIGHT_CRITICAL_REYNOLDS
-from ringbalance.physics.tube.rotation_table import rotation_table_covers
+from ringbalance.physics.tube.friction import (
+    STRAIGHT_CRITICAL_REYNOLDS,
+    friction_factor,
+    friction_uncertainty,
+    turbulent_friction_ratio,
+    turbulent_share,
+)
+from ringbalance.physics.tube.local_losses import (
+    LAMINAR_ENTRY_LENGTH,
+    bend_in_range,
+    bend_uncertainty,
+    entrance_loss,
+    exit_loss,
+    straight_length,
+)
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio, rotation_table_covers
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.physics.tube.uncertainty import uncertainty_parts, with_errors
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.uncertain import FITTED, NORMAL_95, fitted_causes
+
+INPUT_PART: Final = "input: "
+"""What the names of parts by inputs begin with."""
+MODEL_CAUSES: Final[Mapping[str, str]] = {
+    "friction correlation": "friction",
+    "rotation model": "rotation",
+    "rotation entry": "rotation",
+    "ends": "entrance",
+    "bends": "bends",
+}
+"""Causes of `model_parts`, each with the term of k that its error changes."""
+BUILT_CAUSES: Final[Mapping[str, tuple[str, float]]] = {
+    "friction as built": ("friction", 0.04),
+    "rotation as built": ("rotation", 0.4),
+    "entrance as built": ("entrance", 0.2),
+    "bends as built": ("bends", 0.4),
+}
+"""Of a tube as it was built: the term that differs from the correlation's, and by what share of it (95 %).
+
+Correlations are for straight round tubes and clean edges.  A tube that follows the circle of the crest has a
+secondary flow of its own, not small against that of rotation; a bore out of round changes f by some percent;
+an edge broken by 2 % of the bore takes a fifth off K; handbooks give K of one bend with a spread of half of
+it. For parameters that are fitted to a tube that was built; the uncertainty of k for a design has none of
+them.
+"""
+TUBE_INPUTS: Final = (
+    "bore",
+    "length",
+    "roughness",
+    "extra_loss",
+    "drag_coefficient",
+    "kinematic_viscosity",
+    "speed",
+)
+"""Quantities of a scene that k depends on."""
+_TERMS: Final = {**MODEL_CAUSES, **{cause: term for cause, (term, _) in BUILT_CAUSES.items()}}
+_CREEPING: Final = 0.2
+_INERTIAL: Final = 57.0
+_EKMAN: Final = 47.21
+_LARGEST_ERROR: Final = 0.5
+"""Of a constant k."""
+DEVELOPMENT_SHARE: Final = 1.0
+"""Half-width of what development adds, over rotation's extra friction on one developing length.
+
+One stands for an inlet that the secondary flow reaches only after that length.  Three-dimensional solutions
+of the inlet, a parabola or a blunt profile, at (Re, R) = (100, 100), (200, 50) and (20, 200), gave from -0.70
+to +0.20, beyond what the same inlet costs at rest: a blunt one loses less where rotation keeps flow blunt.
+"""
+
+
+def uncertainty_parts(
+    scene: Scene, *, velocity: FloatArray, state: TubeState, fitted: bool = True
+) -> Mapping[str, FloatArray]:
+    """Expanded uncertainties (95 %) of k, one per cause; independent, so they combine by the root of the sum
+    of squares.
+    Args: `state`: the terms of k of the scene's tube at these velocities. `fitted`:
+        whether those of inputs and errors that were fitted together count.
+    Returns: Half-width of k by cause, each the shape of `velocity`; parts that vanish everywhere are kept.
+    Source: ASME V&V 20-2009, input uncertainty by sensitivity; model spreads stand with the correlations.
+    """
+    by_input = _input_parts(scene, k_of=lambda designs: corrected_state(designs.scene, velocity[..., None]).k)
+    together = f"{INPUT_PART}{FITTED}"
+    return unfitted_parts(scene, model_parts(tube=scene.tube, state=state)) | {
+        name: part for name, part in by_input.items() if fitted or name != together
+    }
+
+
+def unfitted_parts(scene: Scene, parts: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Parts of `model_parts` but for the causes whose errors the scene's joint distribution holds."""
+    fitted = fitted_causes(scene)
+    return {cause: part for cause, part in parts.items() if cause not in fitted}
+
+
+def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
+    """Expanded uncertainties (95 %) of k by the correlations and tables themselves.
+
+    Returns: Half-width of k by cause, each the shape of the state's arrays; none of a prescribed k.
+    Source: the spreads stand with the correlations.
+    """
+    if tube.drag_coefficient is not None:
+        return {}
+    re, rough, ratio = state.reynolds, tube.roughness / tube.bore, state.critical_ratio
+    straight = straight_length(tube=tube) / tube.bore
+    lam = rotating_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
+    tur = turbulent_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
+    friction = friction_uncertainty(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=lam.value,
+        turbulent_ratio=tur.value,
+        critical_ratio=ratio,
+    )
+    higher = friction_factor(
+        reynolds=re,
+        relative_roughness=rough,
+        laminar_ratio=lam.value + lam.uncertainty,
+        turbulent_ratio=tur.value + tur.uncertainty,
+        critical_ratio=ratio,
+    )
+    ends = (
+        entrance_loss(tube=tube, reynolds=re, critical_ratio=ratio)[1],
+        exit_loss(tube=tube, reynolds=re, critical_ratio=ratio, friction_ratio=lam.value)[1],
+    )
+    return {
+        "friction correlation": straight * friction,
+        "rotation model": tube.length / tube.bore * (higher - state.rotating_friction),
+        "rotation entry": _development_part(tube, state, lam.value),
+        "ends": np.sqrt(sum(e**2 for e in ends)),
+        "bends": _bends_part(tube, state),
+    }
+
+
+def _bends_part(tube: Tube, state: TubeState) -> FloatArray:
+    """One cause, so those of all bends add up."""
+    straight = friction_factor(reynolds=state.reynolds, relative_roughness=tube.roughness / tube.bore)
+    parts = (
+        bend_uncertainty(
+            bend=bend,
+            bore=tube.bore,
+            friction_factor=straight,
+            reynolds=state.reynolds,
+            rotation_reynolds=state.rotation_reynolds,
+            critical_ratio=state.critical_ratio,
+        )
+        for bend in tube.bends
+    )
+    return np.asarray(sum(parts, start=np.zeros(state.reynolds.shape)))
+
+
+def with_errors(*, tube: Tube, state: TubeState) -> TubeState:
+    """The state with the errors that `Tube.model_errors` supposes of its models.
+
+    e(Re) = (U/1.96) (n cos ln Re + m sin ln Re) of each cause, n and m its two parts: a random function of
+    standard deviation U/1.96 at every Re, with the correlation cos(ln Re - ln Re') between two of them.  Over
+    a small range that is a level and a slope of U/1.96 per e-fold of Re, which is what the residuals of
+    measured smooth tubes have.
+    Errors of a constant k count for half of it at most: no error makes a loss a gain.
+    """
+    if not tube.model_errors:
+        return state
+    parts, terms, bends = _all_parts(tube, state), dict(state.terms), state.bends
+    angle, lumped = np.log(state.reynolds), np.zeros(state.k.shape)
+    for each in tube.model_errors:
+        if each.cause not in parts:
+            continue
+        width = parts[each.cause]
+        error = width / NORMAL_95 * (each.even * np.cos(angle) + each.odd * np.sin(angle))
+        if "decree" in terms:
+            lumped = lumped + error
+            continue
+        term = _TERMS[each.cause]
+        if term == "bends":
+            bends = tuple(k * (1 + error / terms[term]) for k in bends)
+        terms[term] = terms[term] + error
+    if "decree" in terms:
+        terms["decree"] = terms["decree"] + _limited(lumped, _LARGEST_ERROR * state.k)
+    return replace(state, terms=terms, bends=bends)
+
+
+def _all_parts(tube: Tube, state: TubeState) -> Mapping[str, FloatArray]:
+    """Half-widths of k by its models, and by what differs in a tube that was built."""
+    built = {
+        cause: share * np.abs(state.terms[term])
+        for cause, (term, share) in BUILT_CAUSES.items()
+        if term in state.terms
+    }
+    return model_parts(tube=tube, state=state) | built
+
+
+def _limited(width: FloatArray, largest: FloatArray) -> FloatArray:
+    """A half-width that stays below another one, and is unchanged while it is small against that."""
+    return np.asarray(width * (1 + (width / largest) ** 4) ** -0.25)
+
+
+def corrected_state(scene: Scene, velocity: npt.ArrayLike) -> TubeState:
+    """`tube_state` with the scene's corrections of its models."""
+    return with_errors(tube=scene.tube, state=tube_state(scene, velocity))
+
+
+def _development_part(tube: Tube, state: TubeState, friction_ratio: FloatArray) -> FloatArray:
+    """What laminar flow that is still developing may add to k."""
+    laminar = 1 - turbulent_share(reynolds=state.reynolds, critical_ratio=state.critical_ratio)
+    developing = developing_length(
+        reynolds=state.reynolds, rotation_reynolds=state.rotation_reynolds, friction_ratio=friction_ratio
+    )
+    return laminar * development_uncertainty(
+        length=tube.length, bore=tube.bore, developing=developing, rotation_loss=state.terms["rotation"]
+    )
+
+
+def _input_parts(scene: Scene, *, k_of: Callable[[Designs], FloatArray]) -> dict[str, FloatArray]:
+    """Expanded uncertainties (95 %) of k by what the scene leaves uncertain.
+
+    Args: `k_of`: k of designs at given velocities, which are held; the last axis runs over the designs.
+    Returns: Half-width of k by input, each without that axis; "input: fitted" of all fitted together.
+    """
+    effects = input_effects(scene, k_of, among=TUBE_INPUTS)[1]
+    return {f"{INPUT_PART}{name}": effect for name, effect in effects.items()}
+
+
+def developing_length(
+    *, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike, friction_ratio: npt.ArrayLike
+) -> FloatArray:
+    """Way on which the slowest disturbance of laminar rotating flow falls by e, in diameters, as a bound.
+
+    l/d = 0.2 + Re/(57 F) + sqrt(R)/47.21
+
+    The three are the creeping end effect; the carrying of vorticity, 0.0175 Re without rotation; and the
+    exact limit of fast rotation without inertia, geostrophic flow over the section's depth that friction in
+    its Ekman layers wears down.
+    Args: `friction_ratio`: F of developed laminar flow there, broadcasts.
+    Returns: l/d, of the broadcast shape: at least the length of the section's eigenproblem, at most 3 times
+        it.
+    Range: compared with the decay rates of the case `developing_flow` for Re up to 2000, R up to 1e4, R Re
+        up to 3e5.
+    Source: our bound of computed decay rates, with exact limits.
+    """
+    re, rotation, ratio = (
+        np.asarray(v, dtype=np.float64) for v in (reynolds, rotation_reynolds, friction_ratio)
+    )
+    return np.asarray(_CREEPING + re / (_INERTIAL * ratio) + np.sqrt(rotation) / _EKMAN)
+
+
+def development_uncertainty(
+    *, length: float, bore: float, developing: npt.ArrayLike, rotation_loss: npt.ArrayLike
+) -> FloatArray:
+    """Half-width of k for flow that is not developed yet: rotation's share on the developing length.
+
+    k_rot (l/L) (1 - exp(-L/l))
+    Args: `length`: L of the tube, m. `bore`: d, m. `developing`: l/d, any shape. `rotation_loss`: k_rot,
+        rotation's extra friction on the whole tube, broadcasts.
+    Returns: expanded uncertainty (95 %), of the broadcast shape.
+    Source: the share stands with `DEVELOPMENT_SHARE`; the exponential is that of the slowest disturbance.
+    """
+    share = np.asarray(developing, dtype=np.float64) * bore / length
+    way = -share * np.expm1(-1 / share)
+    return np.asarray(DEVELOPMENT_SHARE * way * np.abs(np.asarray(rotation_loss, dtype=np.float64)))
+
 
 FULLY_TURBULENT_REYNOLDS: Final = 4000.0
 """Re above which a straight tube's flow is taken as turbulent."""

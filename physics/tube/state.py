@@ -9,13 +9,20 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.bends import bend_loss, straight_length
-from ringbalance.physics.tube.ends import entrance_loss, exit_loss, kinetic_factor
-from ringbalance.physics.tube.friction import friction_factor, reynolds_number, rotation_reynolds_number
-from ringbalance.physics.tube.rotation import (
+from ringbalance.physics.tube.friction import (
     STRAIGHT_CRITICAL_REYNOLDS,
     critical_reynolds,
+    friction_factor,
+    reynolds_number,
+    rotation_reynolds_number,
     turbulent_friction_ratio,
+)
+from ringbalance.physics.tube.local_losses import (
+    bend_loss,
+    entrance_loss,
+    exit_loss,
+    kinetic_factor,
+    straight_length,
 )
 from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import FloatArray

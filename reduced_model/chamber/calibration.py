@@ -12,11 +12,9 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, head_square, surface_radius
 from ringbalance.physics.results import Estimate, Statistics, Status
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure, measured_closed_forms
+from ringbalance.reduced_model.chamber.contributions import chamber_status, mean_gravity, unmodelled_fractions
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
-from ringbalance.reduced_model.chamber.range import chamber_status, mean_gravity
-from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
-from ringbalance.reduced_model.chamber.values import RingValues
+from ringbalance.reduced_model.chamber.values import RingValues, chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.tables import HermiteTable, level_table, table_from_samples
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects

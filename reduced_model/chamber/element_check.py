@@ -10,13 +10,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.cut.table import TOLERANCE, chamber_table
+from ringbalance.mesh.chamber_table import TOLERANCE, chamber_table
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.pressure.imported import solved_ring
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
-from ringbalance.reduced_model.chamber.closed_forms import chamber_closed_forms, chamber_pressure
-from ringbalance.reduced_model.chamber.values import RingValues
+from ringbalance.reduced_model.chamber.values import RingValues, chamber_closed_forms, chamber_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
 from ringbalance.scene.describe import scene_fault

@@ -1,7 +1,7 @@
 """Liquid of one pair of chambers through time: the event-driven march, the only way that liquid moves.
 
 `dynamics` is what moves it (a law's column, gas line, valve, lift to the crest), as a record for compiled
-code; `pair` a pair's state and the way in from Python; `injections` one injection by what it shall move.
+code; `pair` a pair's state, the way in from Python, and one injection by what it shall move.
 Compiled: `column` forces and conditions in the tube, `gas` the line, `lift` the way up to the crest, `step`
 one step in time, `events` what ends it, `march` all of it through the valves' movements.
 """

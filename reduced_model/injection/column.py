@@ -23,10 +23,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.reduced_model.injection.records import HEAD, HYDROSTATIC, RETURN_CREST, TO_CREST, Record
+from ringbalance.reduced_model.injection.dynamics import HEAD, HYDROSTATIC, RETURN_CREST, TO_CREST, Record
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.regime import CLEARING
-from ringbalance.scene.platform.compilation.compiled import in_place, inlined
+from ringbalance.scene.platform.compiled import in_place, inlined
 
 _SLOWEST: Final = 1e-150
 """m/s, below which the tube's loss is neglected."""

@@ -19,10 +19,10 @@ from ringbalance.reduced_model.injection.column import (
     steady,
     tabled,
 )
+from ringbalance.reduced_model.injection.dynamics import EVENTS, WORK, Event, P, Record, U, X
 from ringbalance.reduced_model.injection.lift import arrived, crest_stop, lift_push, shown
-from ringbalance.reduced_model.injection.records import EVENTS, WORK, Event, P, Record, U, X
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 NONE: Final = EVENTS.index(Event.NONE)
 STALLED: Final = EVENTS.index(Event.STALLED)

@@ -6,9 +6,9 @@ import math
 from typing import Final
 
 from ringbalance.physics.gas import LAMINAR_RATIO, flow_shape, flow_shape_slope
-from ringbalance.reduced_model.injection.records import P, Record, X
+from ringbalance.reduced_model.injection.dynamics import P, Record, X
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place, inlined
+from ringbalance.scene.platform.compiled import in_place, inlined
 
 _LEAST_GAS: Final = 1e-3
 """Fraction of a chamber that liquid never takes from its gas."""

@@ -28,9 +28,9 @@ from ringbalance.reduced_model.injection.column import (
     quasi_steady,
     tube_loss,
 )
+from ringbalance.reduced_model.injection.dynamics import P, Record, U, X
 from ringbalance.reduced_model.injection.gas import gas_volume, line_rates
-from ringbalance.reduced_model.injection.records import P, Record, U, X
-from ringbalance.scene.platform.compilation.compiled import in_place, inlined
+from ringbalance.scene.platform.compiled import in_place, inlined
 
 _BEHIND: Final = 0.54956
 _ARRIVES: Final = 0.62435

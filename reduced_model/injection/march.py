@@ -11,6 +11,7 @@ import math
 from typing import Final
 
 from ringbalance.reduced_model.injection.column import open_to_gas
+from ringbalance.reduced_model.injection.dynamics import EVENTS, Event, P, Record, U, X
 from ringbalance.reduced_model.injection.events import (
     EMPTY,
     FULL,
@@ -36,7 +37,6 @@ from ringbalance.reduced_model.injection.events import (
 )
 from ringbalance.reduced_model.injection.gas import end_pressure, near_end
 from ringbalance.reduced_model.injection.lift import arrived, front, set_out, shown
-from ringbalance.reduced_model.injection.records import EVENTS, Event, P, Record, U, X
 from ringbalance.reduced_model.injection.step import (
     BETWEEN,
     END,
@@ -46,7 +46,7 @@ from ringbalance.reduced_model.injection.step import (
     take,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place
+from ringbalance.scene.platform.compiled import in_place
 
 _ROUND_OFF: Final = 1e-12
 """s, of the clock of a valve."""

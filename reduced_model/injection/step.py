@@ -14,11 +14,11 @@ from typing import Final
 import numpy as np
 
 from ringbalance.reduced_model.injection.column import accelerations, hydrostatic, steady, tabled
+from ringbalance.reduced_model.injection.dynamics import WORK, P, Record, U, X
 from ringbalance.reduced_model.injection.gas import gas_volume, line_rates, near_end, rest_after
 from ringbalance.reduced_model.injection.lift import lift_rates, lift_speed
-from ringbalance.reduced_model.injection.records import WORK, P, Record, U, X
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import in_place, inlined
+from ringbalance.scene.platform.compiled import in_place, inlined
 
 _STAGES: Final = 4
 _GAMMA: Final = 0.57282

@@ -10,8 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, law_text, save_record
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import (
+    BalancerModel,
+    Conditions,
+    Flow,
+    Regime,
+    law_text,
+    save_record,
+)
 from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 from ringbalance.scene.models import Scene

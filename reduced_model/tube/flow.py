@@ -11,8 +11,8 @@ import numpy as np
 
 from ringbalance.physics.gas import pressure_factor, vented_pressure
 from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
-from ringbalance.physics.tube.uncertainty import corrected_state
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
+from ringbalance.physics.tube.loss import corrected_state
+from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.regime import (
     CLEARING_UNCERTAINTY,
@@ -24,10 +24,9 @@ from ringbalance.reduced_model.tube.regime import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, plain
 from ringbalance.scene.designs import Designs
-from ringbalance.scene.joint import fitted_causes
-from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR
+from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.uncertain import NORMAL_95, fitted_causes
 
 _LEAST, _MOST = np.log(1e-9), np.log(1e6)
 """ln u between which velocities are looked for, u in m/s."""

@@ -11,14 +11,14 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.physics.tube.uncertainty import (
+from ringbalance.physics.tube.loss import (
     corrected_state,
     model_parts,
     uncertainty_parts,
     unfitted_parts,
     with_errors,
 )
+from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, level_table, refined_table
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
@@ -28,9 +28,10 @@ from ringbalance.reduced_model.tube.path import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.describe import scene_fault
-from ringbalance.scene.faults import SceneError, toml_text
-from ringbalance.scene.joint import independent_half_widths
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.toml import toml_text
+from ringbalance.scene.uncertain import independent_half_widths
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""

@@ -7,9 +7,8 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.eccentric_mass.document import eccentric_document
 from ringbalance.controller.eccentric_mass.run import locked_run
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reports.figures.eccentric import eccentric_figures

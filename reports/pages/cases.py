@@ -8,8 +8,7 @@ from typing import Any, Final
 from ringbalance.reports.equations import equation_svg
 from ringbalance.reports.figures.cases import order_plot, series_plots
 from ringbalance.reports.prose import input_name, traced
-from ringbalance.reports.section import Record, Table
-from ringbalance.reports.tables import FOLDER, is_long, table_file
+from ringbalance.reports.section import Record
 from ringbalance.results.numbers import (
     MISSING,
     PLUS_MINUS,
@@ -22,6 +21,7 @@ from ringbalance.results.numbers import (
     shown,
     with_unit,
 )
+from ringbalance.results.result import Table
 
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
@@ -40,6 +40,23 @@ _NAMED_INPUTS: Final = 2
 _DIGITS: Final = 4
 """Most that a number in brief has: the inputs leave no more standing, however fine a comparison is."""
 _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
+
+
+TABLES: Final = "tables"
+"""Folder of the tables that are files."""
+LONG: Final = 14
+"""Rows above which a case's table is a file instead of a part of the page."""
+
+
+def is_long(table: Record) -> bool:
+    """Whether a case's table is a file of its own."""
+    return any(len(values) > LONG for values in table["columns"].values())
+
+
+def table_file(case: Record, table: Record) -> str:
+    """Name of the file of a case's table."""
+    stem = "".join(sign if sign.isalnum() else "_" for sign in table["name"].lower())
+    return f"{case['id']}_{stem[:60].strip('_')}.csv"
 
 
 def anchor(case: Record) -> str:
@@ -317,7 +334,7 @@ def case_view(case: Record) -> Record:
             *(_data_table(table) for table in case.get("tables") or [] if not is_long(table)),
         ],
         "files": [
-            (table["name"], f"{FOLDER}/{table_file(case, table)}")
+            (table["name"], f"{TABLES}/{table_file(case, table)}")
             for table in case.get("tables") or []
             if is_long(table)
         ],

@@ -30,7 +30,7 @@ from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.standing import CREDIBILITY, DOCUMENT
 from ringbalance.reports.prose import input_name
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.summary import OPEN
+from ringbalance.results.requirements import OPEN
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
 _KEY: Final = re.compile(r"\b[a-z_]+\.[a-z_]+\b")

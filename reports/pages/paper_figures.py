@@ -14,7 +14,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.reports.figures.paper import paper_figures
 from ringbalance.reports.section import Record, Section, Work

@@ -11,13 +11,9 @@ from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figures.operation import requirement_bars
 from ringbalance.reports.figures.style import Drawing
 from ringbalance.reports.prose import evidence_at, read, resting, traced, untraced
-from ringbalance.reports.section import Record, Table
+from ringbalance.reports.section import Record
 from ringbalance.reports.summary import (
     LIKELY,
-    MET,
-    MISSED,
-    OPEN,
-    UNASKED,
     above,
     below,
     decided,
@@ -30,6 +26,8 @@ from ringbalance.reports.summary import (
     worst,
 )
 from ringbalance.results.numbers import given, number, percent, shown
+from ringbalance.results.requirements import MET, MISSED, OPEN, UNASKED
+from ringbalance.results.result import Table
 from ringbalance.scene import Scene
 
 CAPACITY: Final = "Correction capacity in any direction"

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
+from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.section import Record, Section, Work

@@ -9,9 +9,14 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ringbalance.mesh.section import NoPlaneWavesError
-from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE
-from ringbalance.physics.sloshing.response import sloshing_response
+from ringbalance.physics.sloshing import (
+    FREQUENCY_UNCERTAINTY,
+    HIGHEST_TRUE,
+    LOWEST_TRUE,
+    resonant_fills,
+    sloshing_modes,
+    sloshing_response,
+)
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
 from ringbalance.reports.section import Record, Section, Work

@@ -14,7 +14,8 @@ from typing import Final
 from ringbalance.reports import summary
 from ringbalance.reports.figures.operation import tornado
 from ringbalance.reports.prose import input_name
-from ringbalance.reports.section import Record, Section, Table
+from ringbalance.reports.section import Record, Section
+from ringbalance.results.result import Table
 from ringbalance.verification.standing import HEADS, budget_standing, standing_rows
 
 _DRAWN: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 
 from ringbalance.reports.figures import style
 from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.section import Record, Section, Table, Work
-from ringbalance.results.numbers import MISSING, number, percent
+from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.result import Table
 from ringbalance.scene.models import Scene
-from ringbalance.verification.trade import TradeStudy, trade_study
+from ringbalance.verification.trade import TradeStudy, error_text, models_table, trade_study
 
 _LEAST: Final = 1e-12
 """Error at which a model that equals the finest is drawn."""
@@ -21,7 +21,7 @@ _LEAST: Final = 1e-12
 
 def _collect(work: Work) -> Record | None:
     """The trade of the scene, light: without meshes in three dimensions."""
-    return _study(work.scene).document()
+    return _study(work.scene).to_dict()
 
 
 @lru_cache(maxsize=4)
@@ -32,7 +32,7 @@ def _study(scene: Scene) -> TradeStudy:
 
 def _view(trade: Record, evidence: Record) -> Record:
     times = evidence["times"].get("trade") or {}
-    terms = [(row["term"], row["group"], _error(row["estimated_contribution"])) for row in trade["terms"]]
+    terms = [(row["term"], row["group"], error_text(row["estimated_contribution"])) for row in trade["terms"]]
     quantities = [quantity for quantity in trade["quantities"] if quantity["models"]]
     return {
         "terms": Table(
@@ -40,39 +40,20 @@ def _view(trade: Record, evidence: Record) -> Record:
             heads=("Term", "Group", "Estimated contribution"),
             rows=terms,
         ),
-        "quantities": [_quantity(each, times.get(each["quantity"], [])) for each in quantities],
+        "quantities": [_quantity(each, times) for each in quantities],
     }
 
 
-def _quantity(quantity: Record, times: list[Record]) -> Record:
-    speed = {entry["model"]: entry["designs_per_second"] for entry in times}
-    models, known = quantity["models"], quantity["uncertainty"]
+def _quantity(quantity: Record, times: Record) -> Record:
+    table = models_table(quantity, times)
+    speed = {each["model"]: each["designs_per_second"] for each in times.get(quantity["quantity"], ())}
     title = quantity["title"][0].upper() + quantity["title"][1:]
-    rows = [
-        (
-            model["model"],
-            MISSING if model is models[-1] else _error(model["error"]),
-            number(speed[model["model"]], digits=2) if model["model"] in speed else MISSING,
-        )
-        for model in models
-    ]
     return {
         "title": title,
-        "status": "" if quantity["status"]["code"] == "ok" else quantity["status"]["text"],
-        "models": Table(
-            caption=f"{title}. The last model is the finest, known to {_error(known)}.",
-            heads=("Model", "Error", "Designs a second"),
-            rows=rows,
-            style="",
-        ),
+        "status": table.note,
+        "models": table,
         "figure": _figure(quantity, speed, title),
     }
-
-
-def _error(value: float | None) -> str:
-    if value is None:
-        return MISSING
-    return percent(value, digits=2) if value >= 1e-3 else number(value, digits=2)
 
 
 def _figure(quantity: Record, speed: Record, title: str) -> Drawing:

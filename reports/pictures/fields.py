@@ -14,11 +14,17 @@ from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.liquid_body import Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
-from ringbalance.physics.pressure.elements import LinearSolution, quadratic_basis
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_on, solve_pressure
+from ringbalance.physics.pressure.solve import (
+    LinearSolution,
+    PressureSolution,
+    RotatingLiquid,
+    quadratic_basis,
+    solve_on,
+    solve_pressure,
+)
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
+from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.results.numbers import given
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry

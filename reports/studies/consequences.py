@@ -11,13 +11,13 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.ensemble.monte_carlo import Ensemble, ensemble_dynamics, simulate_ensemble
+from ringbalance.controller.ensemble import Ensemble, ensemble_dynamics, simulate_ensemble
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -318,7 +318,7 @@ def _ending(simulation: Simulation) -> str:
 def _run_document(run: Run) -> dict[str, Any]:
     simulation = run.simulation
     whole = simulation_document(simulation)
-    closed = [i.time + i.operation.duration for i in simulation.injections]
+    closed = [i.time + i.duration for i in simulation.injections]
     end = min(float(simulation.time[-1]), 1.2 * max(closed, default=np.inf))
     known = np.flatnonzero(simulation.time <= end)
     shown = known[np.unique(np.linspace(0, known.size - 1, POINTS).round().astype(np.intp))]
@@ -340,7 +340,7 @@ def _run_document(run: Run) -> dict[str, Any]:
         "operations": len({injection.time for injection in simulation.injections}),
         "injections": len(simulation.injections),
         "gas": whole.get("gas"),
-        "gas_time_s": float(sum(i.operation.duration for i in simulation.injections)),
+        "gas_time_s": float(sum(i.duration for i in simulation.injections)),
         "limit_m": simulation.limit,
         "time_s": simulation.time[shown].tolist(),
         "amplitude_m": simulation.amplitude[shown].tolist(),

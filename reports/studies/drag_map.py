@@ -20,7 +20,7 @@ from scipy.interpolate import PchipInterpolator
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.operating.point import priming_pressure
+from ringbalance.reduced_model.operating_point import priming_pressure
 from ringbalance.reports.studies.drag_point import DragPoint
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.designs import Designs

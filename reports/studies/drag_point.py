@@ -12,10 +12,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.tube.loss import flow_states, range_notes
+from ringbalance.physics.tube.loss import TUBE_INPUTS, corrected_state, flow_states, model_parts, range_notes
 from ringbalance.physics.tube.state import TubeState
-from ringbalance.physics.tube.uncertainty import TUBE_INPUTS, corrected_state, model_parts
-from ringbalance.reduced_model.chamber.closed_forms import chamber_pressure
+from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
@@ -24,9 +23,8 @@ from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.reduced_model.tube.regime import TubeEnds, can_flow
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
-from ringbalance.scene.joint import input_sides, without_fitted
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, nominal_value
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, input_sides, nominal_value, without_fitted
 
 _STEP: Final = 1e-5
 """Of ln u, for slopes."""

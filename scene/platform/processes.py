@@ -16,15 +16,13 @@ from types import TracebackType
 from typing import Final, ParamSpec, TypeVar
 
 from ringbalance.scene.faults import SceneError
+from ringbalance.scene.platform.garbage import COLLECTED_AT
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 _THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _LOG: Final = logging.getLogger("ringbalance")
-_COLLECTED_AT: Final = (50_000, 50, 1000)
-"""Objects between two collections, then collections of one generation for one of the next.  The interpreter's
-own 700, 10, 10 look through all that stays (modules, meshes, results): 4 % of a report's processor time."""
 _WORKER_ENDED: Final = (
     "ringbalance: a worker process was ended by the system, probably for lack of memory; its work is done "
     "again in this process. Should that be ended too, close other programs and run again"
@@ -123,17 +121,6 @@ def beside(
         yield crew
 
 
-@contextmanager
-def seldom_collected() -> Iterator[None]:
-    """Look for garbage more seldom within a block that makes much and keeps most of it."""
-    before = gc.get_threshold()
-    gc.set_threshold(*_COLLECTED_AT)
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
-
-
 def end_with(gone: Callable[[], object]) -> None:
     """End this process as soon as another is gone. Args: `gone`: returns when the other process is gone."""
 
@@ -146,7 +133,7 @@ def end_with(gone: Callable[[], object]) -> None:
 
 def _begin() -> None:
     """What a worker does first."""
-    gc.set_threshold(*_COLLECTED_AT)
+    gc.set_threshold(*COLLECTED_AT)
     parent = parent_process()
     if parent is not None:
         end_with(parent.join)

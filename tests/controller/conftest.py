@@ -17,8 +17,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection import column
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage, Switch, pass_time
-from ringbalance.reduced_model.law.flow_law import Flow, Regime
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.arrays import BoolArray, FloatArray
@@ -176,7 +175,7 @@ def ring_of(scene: models.Scene) -> Callable[..., LiquidRing]:
     def make(model: BalancerModel, *, gas_pressure: float = 0.7e6, chambers: int = 4) -> LiquidRing:
         under = replace(scene, gas=replace(scene.gas, pressure=gas_pressure))
         dynamics = dynamics_of(scene=under, model=model, modelled=())
-        return LiquidRing(model=model, chambers=chambers, dynamics=dynamics)
+        return LiquidRing(model=model, chambers=chambers, dynamics=dynamics, total=0.5)
 
     return make
 

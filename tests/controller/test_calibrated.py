@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from ringbalance import bundled_scene, load_scene
-from ringbalance.controller.ensemble.samples import MemberUncertainty
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.members import MemberUncertainty
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.injection.records import Event
-from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.injection.dynamics import Event
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import InputUncertainty

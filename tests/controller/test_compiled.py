@@ -11,8 +11,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from ringbalance.controller import compiled_loop, moment_table
-from ringbalance.scene.platform.compilation.compiled import compiled, compiled_sources
+from ringbalance.controller import compiled_loop, loop_records
+from ringbalance.scene.platform.compiled import compiled, compiled_sources
 
 
 def _sum_of_sines(values: np.ndarray[Any, np.dtype[np.float64]], factor: float) -> float:
@@ -38,7 +38,7 @@ def test_division_by_zero_is_infinite_as_in_numpy() -> None:
 
 def test_without_compilation_functions_stay_plain() -> None:
     text = (
-        "from ringbalance.controller.eccentric_mass.plant.integrate import plant_step\n"
+        "from ringbalance.controller.eccentric_mass.integration import plant_step\n"
         "assert type(plant_step).__name__ == 'function'\n"
     )
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
@@ -66,7 +66,7 @@ def test_what_compiled_code_alone_calls_has_no_machine_code_of_its_own() -> None
 PROGRAM = """
 import numba
 from numba.core import config
-from ringbalance.scene.platform.compilation.compiled import compiled, compiled_sources
+from ringbalance.scene.platform.compiled import compiled, compiled_sources
 from ringbalance.controller import compiled_loop
 before = config.CACHE_DIR
 def twice(x):
@@ -93,12 +93,12 @@ def _run(tmp_path: Path, **more: str) -> str:
 
 
 def test_every_compiled_functions_source_tells_stale_code() -> None:
-    modules = (compiled_loop, moment_table)
+    modules = (compiled_loop, loop_records)
     functions = [
         one.py_func for module in modules for one in vars(module).values() if hasattr(one, "py_func")
     ]
     files = {Path(function.__code__.co_filename).resolve() for function in functions}
-    assert "formulas.py" in {file.name for file in files}
+    assert "loop_records.py" in {file.name for file in files}
     assert files <= {path.resolve() for path in compiled_sources()}
 
 

@@ -14,7 +14,7 @@ import pytest
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.reports.studies.consequences import Consequences, LoopGain, find_consequences, loop_gain
 from ringbalance.scene.models import Scene

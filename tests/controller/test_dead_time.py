@@ -11,7 +11,7 @@ import pytest
 
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
-from ringbalance.controller.ensemble.monte_carlo import simulate_members
+from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning import search
 from ringbalance.controller.tuning import tune as tune_module
@@ -26,7 +26,7 @@ from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.tune import tune, tuning_document
 from ringbalance.reduced_model.gas_line import line_answers, line_warning, standing_amplitude
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_middle
 from ringbalance.scene.models import Scene
 

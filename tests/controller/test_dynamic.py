@@ -19,8 +19,7 @@ from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.injection.gas import line_rates
 from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage, pass_time
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene

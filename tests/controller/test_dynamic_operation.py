@@ -12,19 +12,14 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
 from ringbalance.reduced_model.injection.pair import PairState, Passage, pass_time
-from ringbalance.reduced_model.injection.records import Event
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Gas, Scene
-
-RingOf = Callable[..., LiquidRing]
 
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
@@ -37,28 +32,18 @@ PIPED = {"conductance": 1e-8, "critical_ratio": 0.3}
 
 @pytest.mark.parametrize("law", ["paper", "calibrated"])
 def test_a_lag_is_an_exact_delay(
-    law: str,
-    model: BalancerModel,
-    calibrated: BalancerModel,
-    plant: Plant,
-    scene: Scene,
-    ring_of: RingOf,
+    law: str, model: BalancerModel, calibrated: BalancerModel, plant: Plant, pulse: Pulse
 ) -> None:
     own = model if law == "paper" else calibrated
-    ring = ring_of(own)
-    start = DiscState.initial(disc=scene.disc)
-    prompt = ring.advance(start, gas_times={0: 0.3}, duration=0.3, points=30)
-    late = replace(ring, dynamics=plant(own, "valve lag", valve_lag=0.04))
-    begun = late.advance(start, gas_times={0: 0.3}, duration=0.3, points=30)
-    found = late.advance(begun.state, gas_times={}, duration=0.04, points=4)
-    shifted = np.concatenate([begun.fill_ratio, found.fill_ratio], axis=1)
-    assert np.all(shifted[:, :4] == 0.25)
-    assert shifted[:, 4:] == pytest.approx(prompt.fill_ratio, abs=1e-11)
-    operation = late.concluded(found.state, begun.operations[0])
-    assert operation.fill_after == pytest.approx(prompt.operations[0].fill_after, abs=1e-11)
-    assert operation.energy == pytest.approx(prompt.operations[0].energy, rel=1e-9)
-    assert operation.regime_start is prompt.operations[0].regime_start
-    assert found.state.rests
+    instants = np.linspace(0.01, 0.3, 30)
+    prompt = pulse(plant(own), 0.3, instants)
+    late = pulse(plant(own, "valve lag", valve_lag=0.04), 0.3, np.array([0.01, 0.04, *(0.04 + instants)]))
+    assert np.all(late.fills[:2] == 0.25)
+    assert late.fills[2:] == pytest.approx(prompt.fills, abs=1e-11)
+    assert late.fill == pytest.approx(prompt.fill, abs=1e-11)
+    assert late.motion.record.work == pytest.approx(prompt.motion.record.work, rel=1e-9)
+    assert late.motion.record.regime_start is prompt.motion.record.regime_start
+    assert late.motion.rests
 
 
 @pytest.mark.parametrize("term", ["tube inertia", "gas filling", "valve lag"])
@@ -357,13 +342,13 @@ def test_the_controller_commands_and_the_plant_follows(scene: Scene, calibrated:
         "valve lag",
     }
     quiet = simulate(slow, calibrated, modelled=())
-    assert run.injections[0].operation.duration == quiet.injections[0].operation.duration
+    assert run.injections[0].duration == quiet.injections[0].duration
     # The period runs from the commanded end, whatever the plant still does.
-    longest = max(i.operation.duration for i in run.injections if i.time == 0)
+    longest = max(i.duration for i in run.injections if i.time == 0)
     assert run.samples[1].time == pytest.approx(longest + 0.5)
     first = run.injections[0]
     at = int(np.flatnonzero(run.time == run.samples[1].time)[0])
-    assert run.fill_ratio[first.chamber][at] == first.operation.fill_after
+    assert run.fill_ratio[first.chamber][at] == first.fill_after
     opened = (run.time > 0) & (run.time <= 0.02)
     assert np.all(run.fill_ratio[first.chamber][opened] == 0.25)
 
@@ -384,7 +369,7 @@ def test_short_trials_settle_with_moving_liquid(scene: Scene, calibrated: Balanc
 def test_energy_is_pressure_times_displaced_volume(scene: Scene, model: BalancerModel) -> None:
     run = simulate(scene, model)
     for injection in run.injections:
-        done = injection.operation
+        done = injection
         volume = (done.fill_before - done.fill_after) * model.chamber_volume
         assert done.energy == pytest.approx(0.7e6 * volume, rel=1e-12)
-    assert run.energy == pytest.approx(math.fsum(i.operation.energy for i in run.injections))
+    assert run.energy == pytest.approx(math.fsum(i.energy for i in run.injections))

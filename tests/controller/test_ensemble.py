@@ -14,22 +14,21 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.algorithms.algorithm import Measurement
-from ringbalance.controller.ensemble.monte_carlo import (
+from ringbalance.controller.ensemble import (
+    _NOISE,
     QUANTILES,
     Probability,
     simulate_ensemble,
     simulate_members,
 )
-from ringbalance.controller.ensemble.run import _NOISE
-from ringbalance.controller.ensemble.samples import BLOCK, Members, MemberUncertainty
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.moment_table import MomentTable, pair_moment
+from ringbalance.controller.loop_records import MomentTable, pair_moment
+from ringbalance.controller.members import BLOCK, Members, MemberUncertainty
 from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Outcome
-from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment, paper_model
-from ringbalance.reduced_model.operating.residual import Drawing, residual_fill_ratio
+from ringbalance.reduced_model.residual_liquid import Drawing, residual_fill_ratio
 from ringbalance.scene.models import Scene
 
 EXACT = MemberUncertainty(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
+from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.controller.members import Members, MemberUncertainty
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 

@@ -13,7 +13,7 @@ import pytest
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 

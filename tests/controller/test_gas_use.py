@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.simulation import GasUse
+from ringbalance.controller.simulation import GasUse, Injection
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.gas_line import (
@@ -23,15 +22,11 @@ from ringbalance.reduced_model.gas_line import (
     line_text,
     line_warning,
 )
-from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.injections import Injections
-from ringbalance.reduced_model.injection.pair import Passage
-from ringbalance.reduced_model.injection.records import Event
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
+from ringbalance.reduced_model.injection.pair import Injections, Passage
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.models import Scene
-
-RingOf = Callable[..., LiquidRing]
 
 Plant = Callable[..., Dynamics]
 Pulse = Callable[..., Passage]
@@ -192,29 +187,44 @@ def test_a_pressure_on_the_axis_counts_with_its_column(
     assert forces(plants[1]).steady((0.25, 0.25), (0.7e6, 0.0), primed=True)[0] == pytest.approx(near_u)
 
 
-def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene, ring_of: RingOf) -> None:
-    ring = ring_of(model)
-    advance = ring.advance(DiscState.initial(disc=scene.disc), gas_times={0: 4.0}, duration=4.0, points=4000)
-    (operation,) = advance.operations
-    assert operation.event is Event.EMPTY
-    emptied = float(advance.instants[np.argmax(advance.fill_ratio[0] == 0)])
-    assert operation.run_dry == pytest.approx(4.0 - emptied, abs=2e-3)
-    found = GasUse.of(scene=scene, model=model, operations=advance.operations)
+def injection(done: Passage, duration: float) -> Injection:
+    """What a run would report of one opening of chamber A's valve, level chambers before it."""
+    record = done.motion.record
+    return Injection(
+        time=0.0,
+        chamber="A",
+        duration=duration,
+        fill_before=record.fill,
+        fill_after=done.fill,
+        regime_start=record.regime_start,
+        regime_end=record.regime_end,
+        event=record.event,
+        energy=record.work,
+        closing_pressure=record.closing_pressure,
+        run_dry=record.run_dry,
+    )
+
+
+def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene, plant: Plant, pulse: Pulse) -> None:
+    instants = np.linspace(1e-3, 4.0, 4000)
+    passage = pulse(plant(model), 4.0, instants)
+    done = injection(passage, 4.0)
+    assert done.event is Event.EMPTY
+    assert done.run_dry == pytest.approx(4.0 - instants[np.argmax(passage.fills == 0)], abs=2e-3)
+    found = GasUse.of(scene=scene, model=model, injections=[done])
     # A choked nozzle of 1.5 mm at 0.801 MPa and 20 degC passes 3.34 g/s of air at the most, 1.2929 kg/m^3.
     grams = 0.0404 * math.pi / 4 * 1.5e-3**2 * 801325.0 / math.sqrt(293.15)
-    assert found.passed_through == pytest.approx(grams * operation.run_dry / 1.2929, rel=2e-3)
+    assert found.passed_through == pytest.approx(grams * done.run_dry / 1.2929, rel=2e-3)
     assert found.below_residual == found.run_dry == 1
     warning = found.finding
     assert warning is not None
     assert (warning.code, warning.values["run_dry"]) == ("gas_passed_through", 1)
-    (brief,) = ring.advance(
-        DiscState.initial(disc=scene.disc), gas_times={0: 0.1}, duration=0.1, points=1
-    ).operations
-    assert GasUse.of(scene=scene, model=model, operations=[brief]).finding is None
+    brief = injection(pulse(plant(model), 0.1, np.array([0.1])), 0.1)
+    assert GasUse.of(scene=scene, model=model, injections=[brief]).finding is None
     residual = found.residual_fill_ratio
     assert 0 < residual < 0.2
     low = replace(brief, fill_after=0.9 * residual)
-    drawn = GasUse.of(scene=scene, model=model, operations=[low]).finding
+    drawn = GasUse.of(scene=scene, model=model, injections=[low]).finding
     assert drawn is not None
     assert drawn.code == "gas_entered_port"
     # The supply adds its gauge pressure to the ambient gas that was there.
@@ -222,28 +232,24 @@ def test_a_chamber_run_dry_passes_gas(model: BalancerModel, scene: Scene, ring_o
     assert found.normal_volume == pytest.approx(content + found.passed_through)
 
 
-def test_with_a_line_the_chamber_runs_dry_too(calibrated: BalancerModel, plant: Plant, scene: Scene) -> None:
-    ring = LiquidRing(
-        model=calibrated,
-        chambers=4,
-        dynamics=plant(calibrated, "gas filling", "tube inertia", conductance=1e-8, critical_ratio=0.3),
-    )
-    begun = ring.advance(DiscState.initial(disc=scene.disc), gas_times={0: 2.0}, duration=2.0, points=4000)
-    operation = begun.operations[0]
-    emptied = float(begun.instants[np.argmax(begun.fill_ratio[0] < 1e-12)])
-    assert operation.run_dry == pytest.approx(2.0 - emptied, abs=2e-3)
-    brief = ring.advance(DiscState.initial(disc=scene.disc), gas_times={0: 0.01}, duration=0.01, points=1)
-    done = brief.operations[0]
+def test_with_a_line_the_chamber_runs_dry_too(calibrated: BalancerModel, plant: Plant, pulse: Pulse) -> None:
+    line = {"conductance": 1e-8, "critical_ratio": 0.3}
+    dynamics = plant(calibrated, "gas filling", "tube inertia", **line)
+    instants = np.linspace(5e-4, 2.0, 4000)
+    passage = pulse(dynamics, 2.0, instants)
+    emptied = instants[np.argmax(passage.fills < 1e-12)]
+    assert passage.motion.record.run_dry == pytest.approx(2.0 - emptied, abs=2e-3)
+    brief = pulse(dynamics, 0.01, np.array([0.01])).motion.record
     # Choked, so the pressure rises by C p_0 p_1/V until the valve shuts.
     volume = 0.75 * calibrated.chamber_volume
-    assert done.closing_pressure == pytest.approx(1e-8 * 1e5 * 801325.0 / volume * 0.01, rel=0.02)
-    assert done.run_dry == 0
+    assert brief.closing_pressure == pytest.approx(1e-8 * 1e5 * 801325.0 / volume * 0.01, rel=0.02)
+    assert brief.run_dry == 0
 
 
 def test_a_run_reports_its_gas(model: BalancerModel, scene: Scene) -> None:
     run = simulate(scene, model=model)
     document = simulation_document(run)
-    gas, fills = document["gas"], [injection.operation.fill_after for injection in run.injections]
+    gas, fills = document["gas"], [injection.fill_after for injection in run.injections]
     content = 0.7e6 * math.fsum((1 - x) * model.chamber_volume for x in fills)
     assert gas["compression_energy_J"] == pytest.approx(content * math.log(801325.0 / AMBIENT))
     assert gas["fillings"] == len(run.injections)

@@ -9,7 +9,7 @@ import pytest
 
 from ringbalance.controller.tuning.highest_pressure import highest_pressure
 from ringbalance.reduced_model.gas_line import largest_correction, line_answers
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene import Scene
 from ringbalance.scene.uncertain import with_value
 from ringbalance.verification.loops import calibration_of

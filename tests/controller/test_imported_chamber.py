@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from block_discs import imported, turned
 
-from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.ensemble.samples import Members
+from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
+from ringbalance.controller.members import Members
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reduced_model.law.building import nominal_law
-from ringbalance.reduced_model.law.model import BalancerModel, MomentCurve
+from ringbalance.reduced_model.law.calibrated_law import nominal_law
+from ringbalance.reduced_model.law.flow_law import BalancerModel, MomentCurve
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.block_chambers import disc_chamber, imported, turned
+from ringbalance.verification.reference.block_chambers import disc_chamber
 
 ANGLE = 0.35
 

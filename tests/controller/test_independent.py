@@ -177,9 +177,8 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
             own = [i for i in injections if letters.index(i.chamber) % half == pair]
             rest = end - start
             x = float(run.fill_ratio[letters[driven[pair]]][at])
-            for injection in own:
-                done = injection.operation
-                driven[pair] = done.chamber
+            for done in own:
+                driven[pair] = letters.index(done.chamber)
                 x, primed[pair] = second.after(
                     done.fill_before, total, second.scene.gas.pressure, done.duration, primed=primed[pair]
                 )
@@ -187,7 +186,7 @@ def replayed(run: Simulation, second: Second) -> tuple[float, int]:
                 seen = float(run.fill_ratio[letters[driven[pair]]][closed])
                 worst = max(worst, abs(x - seen))
                 x, rest = seen, rest - done.duration
-                later = run.fill_ratio[letters[done.chamber]][until]
+                later = run.fill_ratio[done.chamber][until]
                 worst = max(worst, abs(done.fill_after - float(later)))
             if (primed[pair] or second.scene.tube.hump_radius is None) and rest > 0:
                 begun = x

@@ -16,16 +16,21 @@ from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of, target_vector_of
-from ringbalance.controller.algorithms.law_based import LawBased, _gas_time, learnt
-from ringbalance.controller.algorithms.wanted_moment import fill_for_moment, split_change
+from ringbalance.controller.algorithms.law_based import (
+    LawBased,
+    _gas_time,
+    fill_for_moment,
+    learnt,
+    split_change,
+)
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.loop_records import LOOP, MOMENT_NODES, RUN
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
+from ringbalance.reduced_model.injection.dynamics import WORKSPACE
 from ringbalance.reduced_model.injection.pair import Motion, packed
-from ringbalance.reduced_model.injection.records import WORKSPACE
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.scene.models import Scene
 

@@ -19,7 +19,7 @@ from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.injection.lift import crest_start, crest_stop, lift_rates, shown
 from ringbalance.reduced_model.injection.pair import Motion, Passage, packed
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.models import Scene
 

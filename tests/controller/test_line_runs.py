@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from ringbalance.controller.line_runs import line_runs, line_runs_document, line_runs_table
+from ringbalance.controller.document import line_runs, line_runs_document, line_runs_table
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 
 
@@ -31,7 +31,7 @@ def test_a_line_that_is_not_given_is_run_at_both_ends(scene: Scene, calibrated: 
     }
     # Late gas moves less in the same valve-open time, and the slow line is later.
     moved = [
-        run.injections[0].operation.fill_before - run.injections[0].operation.fill_after
+        run.injections[0].fill_before - run.injections[0].fill_after
         for run in (slow.run, fast.run, simulate(asked, calibrated))
     ]
     assert 0 < moved[0] < moved[1] < 1.1 * moved[2]

@@ -17,7 +17,7 @@ import pytest
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 
 PHASES = [90.0, 180.0, 270.0, 360.0]

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from ringbalance import bundled_scene, load_scene
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene

@@ -15,11 +15,11 @@ from scipy.integrate import solve_ivp
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
-from ringbalance.controller.ensemble.monte_carlo import simulate_members
+from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.terms import INERTIA
 from ringbalance.scene.arrays import FloatArray

@@ -10,10 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
-from ringbalance.controller.liquid_ring.reach import starting_pressure
+from ringbalance.controller.liquid_ring.plant import LiquidRing, starting_pressure
 from ringbalance.controller.rotor import chamber_directions, chamber_letters, disc_unbalance, wrapped
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 
@@ -91,7 +90,7 @@ def test_wrapping_ignores_whole_turns(turns: int) -> None:
     assert wrapped(1.2 + 2 * math.pi * turns) == pytest.approx(1.2, abs=1e-12)
 
 
-def left_over(plant: LiquidRing, state: DiscState, rotor: Rotor, *, wanted: complex) -> float:
+def left_over(plant: LiquidRing, rotor: Rotor, *, wanted: complex) -> float:
     """What the disc cannot form of a moment, kg m: of a rotor that vibrates 1 m per kg m, against it."""
     against = replace(
         rotor,
@@ -100,37 +99,32 @@ def left_over(plant: LiquidRing, state: DiscState, rotor: Rotor, *, wanted: comp
         initial_amplitude=abs(wanted),
         initial_phase=cmath.phase(-wanted),
     )
-    return plant.unreachable_vibration(state=state, rotor=against)
+    return plant.unreachable_vibration(rotor=against)
 
 
 @pytest.mark.parametrize("n", [4, 6, 8])
 def test_the_reach_is_the_polygon_of_full_pairs(
     scene: Scene, model: BalancerModel, n: int, ring_of: RingOf
 ) -> None:
-    state = DiscState.initial(disc=replace(scene.disc, chambers=n))
     plant = ring_of(model, chambers=n)
-    pair = plant.largest_pair_moment(state=state)
+    pair = plant.largest_pair_moment()
     assert pair == pytest.approx(PER_DIFFERENCE * 0.5, rel=1e-12)
     # All pairs full towards one corner: the side of the polygon is 2 M, its corners at M/sin(pi/n).
     corner = pair / math.sin(math.pi / n) * cmath.exp(1j * (math.pi / n if n % 4 == 0 else 0.0))
-    assert left_over(plant, state, scene.rotor, wanted=corner * 0.999) == 0.0
-    assert left_over(plant, state, scene.rotor, wanted=corner * 1.5) == pytest.approx(
-        abs(corner) / 2, rel=1e-9
-    )
+    assert left_over(plant, scene.rotor, wanted=corner * 0.999) == 0.0
+    assert left_over(plant, scene.rotor, wanted=corner * 1.5) == pytest.approx(abs(corner) / 2, rel=1e-9)
 
 
 def test_four_chambers_reach_a_square(scene: Scene, model: BalancerModel, ring_of: RingOf) -> None:
-    state, plant = DiscState.initial(disc=scene.disc), ring_of(model, chambers=4)
-    pair = PER_DIFFERENCE * 0.5
-    assert left_over(plant, state, scene.rotor, wanted=pair * (1.3 + 0.9j)) == pytest.approx(0.3 * pair)
-    assert left_over(plant, state, scene.rotor, wanted=pair * (1.3 + 1.4j)) == pytest.approx(0.5 * pair)
+    plant, pair = ring_of(model, chambers=4), PER_DIFFERENCE * 0.5
+    assert left_over(plant, scene.rotor, wanted=pair * (1.3 + 0.9j)) == pytest.approx(0.3 * pair)
+    assert left_over(plant, scene.rotor, wanted=pair * (1.3 + 1.4j)) == pytest.approx(0.5 * pair)
 
 
 def test_two_chambers_reach_a_line(scene: Scene, model: BalancerModel, ring_of: RingOf) -> None:
-    state = DiscState.initial(disc=replace(scene.disc, chambers=2))
     plant, pair = ring_of(model, chambers=2), PER_DIFFERENCE * 0.5
-    assert left_over(plant, state, scene.rotor, wanted=0.7 * pair) == pytest.approx(0.0, abs=1e-18)
-    assert left_over(plant, state, scene.rotor, wanted=(0.7 + 0.2j) * pair) == pytest.approx(0.2 * pair)
+    assert left_over(plant, scene.rotor, wanted=0.7 * pair) == pytest.approx(0.0, abs=1e-18)
+    assert left_over(plant, scene.rotor, wanted=(0.7 + 0.2j) * pair) == pytest.approx(0.2 * pair)
 
 
 def test_the_starting_pressure_of_the_paper_is_eq_19_at_rest(model: BalancerModel) -> None:

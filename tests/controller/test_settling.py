@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -12,11 +11,11 @@ import pytest
 
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.ensemble.monte_carlo import simulate_members
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
+from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
+from ringbalance.controller.terms import dynamics_of
 from ringbalance.controller.tuning.loop_factor import (
     LoopFactor,
     _largest_staying,
@@ -26,13 +25,12 @@ from ringbalance.controller.tuning.loop_factor import (
     vibration_rates,
 )
 from ringbalance.controller.tuning.recommendation import recommended_gain
-from ringbalance.reduced_model.injection.pair import PairState
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.injection.pair import Motion, PairState, opened, pass_time
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-
-RingOf = Callable[..., LiquidRing]
 
 STEPS = 200_000
 
@@ -55,22 +53,22 @@ def factor(scene: Scene, model: BalancerModel) -> LoopFactor:
 # --- the loop factor ---
 
 
-def test_the_rate_is_what_a_short_injection_does(scene: Scene, model: BalancerModel, ring_of: RingOf) -> None:
+def test_the_rate_is_what_a_short_injection_does(scene: Scene, model: BalancerModel) -> None:
     fills = balanced_fills(scene, model)
-    pairs = tuple(PairState(fill=float(x), total=0.5) for x in fills)
-    state = DiscState(pairs=pairs)
-    plant = ring_of(model, gas_pressure=scene.gas.pressure)
+    dynamics = dynamics_of(scene=scene, model=model, modelled=())
+    rates, short = vibration_rates(scene, model), 1e-5
 
-    def seen(at: DiscState) -> complex:
-        moment = disc_unbalance(moment=model.moment, fill_ratio=at.fills())
+    def seen(first: FloatArray) -> complex:
+        moment = disc_unbalance(moment=model.moment, fill_ratio=(*first, *(0.5 - first)))
         return complex(scene.rotor.vibration(moment))
 
-    assert abs(seen(state)) < 1e-12
-    rates, short = vibration_rates(scene, model), 1e-5
+    assert abs(seen(fills)) < 1e-12
     for chamber in range(4):
-        after = plant.advance(state, gas_times={chamber: short}, duration=short, points=1).state
-        change = abs(seen(after) - seen(state)) / short
-        assert change == pytest.approx(rates[chamber % 2, chamber // 2], rel=1e-4)
+        pair, side, after = chamber % 2, chamber // 2, fills.copy()
+        motion = Motion(pending=opened(dynamics, chamber=side, duration=short))
+        begun = PairState(fill=float(fills[pair]), total=0.5, motion=motion)
+        after[pair] = pass_time(dynamics, begun, instants=np.array([short])).fill
+        assert abs(seen(after) - seen(fills)) / short == pytest.approx(rates[pair, side], rel=1e-4)
 
 
 def test_the_balanced_fills_of_many_chambers_keep_the_residual_fill(scene: Scene) -> None:

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from ringbalance.controller.document import _sparkline
 from ringbalance.controller.loop import simulate
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from ringbalance.reduced_model.injection import column, step
-from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.records import HEAD, TO_CREST
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.injection.dynamics import HEAD, TO_CREST, Dynamics
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 
 
 def plain_form() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

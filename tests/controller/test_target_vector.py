@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.built_in import Memory
-from ringbalance.controller.algorithms.target_vector import TargetVector, _vector_shares
+from ringbalance.controller.algorithms.built_in import Memory, TargetVector, vector_shares
 from ringbalance.controller.rotor import chamber_directions
 
 PID = TargetVector(
@@ -36,7 +35,7 @@ def components(
 ) -> tuple[tuple[int, float], ...]:
     """Chamber and share of a vector split over the directions on either side of it."""
     without = np.array(at_residual or (False,) * chambers)
-    first, share, second, other = _vector_shares(chambers, angle, length, without)  # type: ignore[arg-type]
+    first, share, second, other = vector_shares(chambers, angle, length, without)  # type: ignore[arg-type]
     return ((first, share),) if chambers == 2 else ((first, share), (second, other))
 
 

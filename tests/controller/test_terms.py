@@ -12,7 +12,7 @@ from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import run_models
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ringbalance import bundled_scene, load_scene
-from ringbalance.reduced_model.injection.records import Event
+from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.reference.marched import marched

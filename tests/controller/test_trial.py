@@ -7,8 +7,7 @@ import math
 import pytest
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.built_in import Memory
-from ringbalance.controller.algorithms.trial import Trial
+from ringbalance.controller.algorithms.built_in import Memory, Trial
 
 TRIAL = Trial(
     chambers=4,

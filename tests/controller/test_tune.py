@@ -21,7 +21,7 @@ from ringbalance.controller.eccentric_mass.scene_records import (
     eccentric_drawn,
     eccentric_scene,
 )
-from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.tuning import FIRST_RUNS, _eccentric_settling, tune_eccentric
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates
@@ -29,7 +29,7 @@ from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.tune import tune, tuning_document
 from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import brentq
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
-from ringbalance.controller.ensemble.monte_carlo import Probability
+from ringbalance.controller.ensemble import Probability
 from ringbalance.controller.tuning.loop_factor import loop_factor, usable_fill, with_driving_gas
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.result import Tuning
@@ -19,7 +19,7 @@ from ringbalance.controller.tuning.search import Candidate, Search, search, with
 from ringbalance.controller.tuning.settling import SettlingTimes
 from ringbalance.controller.tuning.tune import _status_of, tune
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty

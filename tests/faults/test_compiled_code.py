@@ -14,14 +14,14 @@ from pathlib import Path
 import pytest
 
 from ringbalance.scene import bundled_scene
-from ringbalance.scene.platform.compilation.cache import code_root
+from ringbalance.scene.platform.kept_code import code_root
 
 pytestmark = pytest.mark.faults
 
 PROGRAM = """
 import sys
 from typing import NamedTuple
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 
 class Pair(NamedTuple):
     one: float
@@ -101,7 +101,7 @@ DAMAGE = (
     + """
 import random, shutil
 from pathlib import Path
-from ringbalance.scene.platform.compilation.cache import code_root
+from ringbalance.scene.platform.kept_code import code_root
 
 def flip(path):
     content = bytearray(path.read_bytes())

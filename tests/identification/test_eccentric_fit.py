@@ -13,12 +13,10 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
     eccentric_scene,
-    eccentric_value,
-    eccentric_with,
 )
 from ringbalance.identification.criticism.review import Review
 from ringbalance.identification.fitting import fit
@@ -29,6 +27,7 @@ from ringbalance.identification.next_measurement import _offered_rows, _words_of
 from ringbalance.identification.parameters import FitError
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.paths import value_at, with_values_at
 
 NOISE = 20e-6
 SPEEDS = np.linspace(8.0, 24.0, 24)
@@ -76,9 +75,7 @@ def positioning(true: EccentricScene, seed: int, noise: float = 0.002) -> Observ
 
 def test_a_run_up_gives_back_bearing_and_imbalance(scene: EccentricScene) -> None:
     truth = {"rotor.stiffness": 1080.0, "rotor.damping": 11.5, "imbalance.mass": 0.17, "imbalance.phase": 0.7}
-    true = scene
-    for name, value in truth.items():
-        true = eccentric_with(true, value, name=name)
+    true = with_values_at(scene, truth)
     result = fit(scene, data=[run_up(true, 1)])
     assert [each.name for each in result.parameters] == list(truth)
     for each in result.parameters:
@@ -101,9 +98,7 @@ def test_only_the_product_of_mass_and_radius_is_identified(scene: EccentricScene
 
 def test_positioning_gives_back_friction_and_motor(scene: EccentricScene) -> None:
     truth = {"masses.friction_arm[0]": 0.012, "motor.torque_constant": 0.0093}
-    true = scene
-    for name, value in truth.items():
-        true = eccentric_with(true, value, name=name)
+    true = with_values_at(scene, truth)
     result = fit(scene, data=[positioning(true, 3)], parameters=list(truth))
     for each in result.parameters:
         low, high = each.interval
@@ -167,7 +162,7 @@ def test_the_next_speed_narrows_as_expected(scene: EccentricScene) -> None:
 
 def test_data_of_a_rotor_without_damping(scene: EccentricScene) -> None:
     """Off the critical speed: the damping of the scene, held, is told from none, and none is preferred."""
-    none = eccentric_with(scene, 1e-9, name="rotor.damping")
+    none = with_values_at(scene, {"rotor.damping": 1e-9})
     for true, outcome in ((scene, "fitted"), (none, "other")):
         (law,) = Review.of(fit(scene, data=[run_up(true, 7)], parameters=["imbalance.mass"])).laws
         assert law.other == "a rotor without damping"
@@ -178,7 +173,7 @@ def test_data_of_a_rotor_without_damping(scene: EccentricScene) -> None:
 
 def test_a_mass_reaches_the_speed_at_which_motor_and_friction_balance(scene: EccentricScene) -> None:
     """B V = C phi' + mu_f b (W + phi')^2, solved by hand; whirl moves it by less than two per cent."""
-    stiff = eccentric_with(scene, 1e6, name="rotor.stiffness")
+    stiff = with_values_at(scene, {"rotor.stiffness": 1e6})
     plant, volts, speed = PlantParameters.of(stiff), 9.0, 10.5
     times = np.array([4.0, 4.0 + 2 * math.pi / 5])
     columns = {
@@ -214,22 +209,22 @@ def test_friction_holds_a_small_voltage(scene: EccentricScene) -> None:
         "speed": np.array([10.5]),
         "angle": np.zeros(1),
     }
-    stiff = eccentric_with(scene, 1e7, name="rotor.stiffness")
+    stiff = with_values_at(scene, {"rotor.stiffness": 1e7})
     assert KINDS["positioning"].predict(stiff, observed("positioning", columns), None)[0] == 0.0
 
 
 def test_every_uncertain_quantity_can_be_changed(scene: EccentricScene) -> None:
     for name in (each.path for each in balancer_of(scene).inputs()):
-        changed = eccentric_with(scene, 0.125, name=name)
-        assert eccentric_value(changed, name) == 0.125
-        assert eccentric_with(changed, eccentric_value(scene, name), name=name) == scene
+        changed = with_values_at(scene, {name: 0.125})
+        assert value_at(changed, name) == 0.125
+        assert with_values_at(changed, {name: value_at(scene, name)}) == scene
 
 
 def test_what_cannot_be_fitted_is_said(scene: EccentricScene) -> None:
     data = [run_up(scene, 1)]
     with pytest.raises(FitError, match=r"allowed: rotor\.mass"):
         fit(scene, data=data, parameters=["bore"])
-    still = eccentric_with(scene, 0.0, name="masses.friction_arm[1]")
+    still = with_values_at(scene, {"masses.friction_arm[1]": 0.0})
     with pytest.raises(FitError, match="is zero"):
         fit(still, data=data, parameters=["masses.friction_arm[1]"])
     with pytest.raises(FitError, match="each once"):

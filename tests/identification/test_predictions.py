@@ -10,7 +10,6 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
-from ringbalance.controller.liquid_ring.plant import DiscState, LiquidRing
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.device import Device, Models
@@ -19,6 +18,7 @@ from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrated_model
+from ringbalance.reduced_model.injection.pair import PairState, opened, pass_time
 from ringbalance.reduced_model.terms import HELD, INERTIA
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
@@ -54,16 +54,17 @@ def test_injections_are_those_of_the_closed_loop(paper_scene: Scene) -> None:
     zeros = {name: [0.0] * 3 for name in READINGS}
     found = predicted(scene, observations("injection", columns | zeros, ["A", "C", "D"]))
     model = calibrated_model(scene)
-    plant = LiquidRing(
-        model=model,
-        chambers=4,
-        dynamics=dynamics_of(scene=scene, model=model, modelled=[INERTIA, HELD]),
-    )
-    state, before, expected = DiscState.initial(disc=scene.disc), 0j, []
-    k = scene.rotor.influence
+    dynamics = dynamics_of(scene=scene, model=model, modelled=[INERTIA, HELD])
+    pairs, before, expected = [PairState(fill=0.25, total=0.5)] * 2, 0j, []
     for chamber, time in ((0, 0.2), (2, 0.1), (3, 0.15)):
-        state = plant.advance(state, gas_times={chamber: time}, duration=3.0, points=1).state
-        after = complex(k * disc_unbalance(moment=model.moment, fill_ratio=np.array(state.fills())))
+        begun = pairs[chamber % 2]
+        valve = opened(dynamics, chamber=chamber // 2, duration=time)
+        begun = replace(begun, motion=replace(begun.motion, pending=valve))
+        end = pass_time(dynamics, begun, instants=np.array([3.0]))
+        pairs[chamber % 2] = replace(begun, fill=end.fill, primed=end.primed, motion=end.motion)
+        first = np.array([pair.fill for pair in pairs])
+        moment = disc_unbalance(moment=model.moment, fill_ratio=np.concatenate([first, 0.5 - first]))
+        after = complex(scene.rotor.influence * moment)
         expected.append(after - before)
         before = after
     np.testing.assert_allclose(found[:3] + 1j * found[3:], expected, rtol=2e-4)

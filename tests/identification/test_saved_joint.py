@@ -13,7 +13,7 @@ import pytest
 from synthetic_rigs import Rig, fitted, rig
 
 from ringbalance.cli import main
-from ringbalance.controller.ensemble.samples import Members, MemberUncertainty
+from ringbalance.controller.members import Members, MemberUncertainty
 from ringbalance.identification.balancers import changed
 from ringbalance.identification.device import Device, Models
 from ringbalance.identification.kinds.kind import Observations
@@ -21,14 +21,14 @@ from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.physics.tube.uncertainty import MODEL_CAUSES
+from ringbalance.physics.tube.loss import MODEL_CAUSES
 from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.chamber.closed_forms import measured_closed_forms
+from ringbalance.reduced_model.chamber.values import measured_closed_forms
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR, ModelError
+from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR, ModelError
 from ringbalance.scene.models import Scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 
 PAPER = str(bundled_scene("liquid_ring_paper"))
 INJECTIONS = str(example_measurements.FOLDER / "injection.csv")

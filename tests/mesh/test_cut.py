@@ -12,10 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from ringbalance.mesh.cut.faceting import drawing_error
-from ringbalance.mesh.cut.integrals import LONGEST, integrals, walls_about
-from ringbalance.mesh.cut.patches import split_patches, wall_patches
-from ringbalance.mesh.cut.table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
+from ringbalance.mesh.chamber_table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
+from ringbalance.mesh.faceting import drawing_error
 from ringbalance.mesh.geometry import (
     chamber_volume,
     half_angle,
@@ -26,6 +24,7 @@ from ringbalance.mesh.geometry import (
     surface_radius,
     wall_square,
 )
+from ringbalance.mesh.wall_integrals import LONGEST, integrals, split_patches, wall_patches, walls_about
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import STRETCHED, CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from block_discs import sector_chamber
 
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
@@ -15,11 +16,11 @@ from ringbalance.mesh.quadratic_tetrahedra import (
     scikit_fem_mesh,
     tetrahedra,
 )
-from ringbalance.physics.pressure.elements import quadratic_basis, side
+from ringbalance.physics.pressure.solve import quadratic_basis, side
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.block_chambers import block_chamber, sector_chamber
+from ringbalance.verification.reference.block_chambers import block_chamber
 
 _ANGLE, _WIDTH = np.pi / 2, 1.3
 

@@ -9,8 +9,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from ringbalance.mesh.cut.table import ChamberTable, chamber_table
-from ringbalance.mesh.cut.tilted import TiltedLiquid, tilted_liquid
+from ringbalance.mesh.chamber_table import ChamberTable, TiltedLiquid, chamber_table, tilted_liquid
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.reference.block_chambers import block_chamber
 

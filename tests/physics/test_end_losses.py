@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.physics.results import StatusCode
-from ringbalance.physics.tube.ends import end_table, laminar_entrance_loss, laminar_exit_loss
+from ringbalance.physics.tube.local_losses import end_table, laminar_entrance_loss, laminar_exit_loss
 from ringbalance.verification.navier_stokes.end_losses import (
     End,
     EndMesh,

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ringbalance.physics.results import StatusCode
-from ringbalance.physics.tube.ends import laminar_entrance_loss, laminar_exit_loss
+from ringbalance.physics.tube.local_losses import laminar_entrance_loss, laminar_exit_loss
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.verification.navier_stokes.flow_fields import (

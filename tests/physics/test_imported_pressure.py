@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from block_discs import sector_chamber
 
 from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.chamber_file.record import CellKind
-from ringbalance.verification.reference.block_chambers import sector_chamber
 
 _RHO, _OMEGA, _A, _ANGLE, _WIDTH = 900.0, 150.0, 0.77, np.pi / 2, 1.3
 _PRESSURE = _RHO * _OMEGA**2 * (1 - _A**2) / 2

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from block_discs import sector_chamber
 
 from ringbalance.mesh.geometry import liquid_area, surface_radius
 from ringbalance.mesh.section import NoPlaneWavesError, middle_section
-from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing.response import sloshing_response
+from ringbalance.physics.sloshing import resonant_fills, sloshing_modes, sloshing_response
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber, sector_chamber
+from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
 
 _FILL = 0.3
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics.pressure.elements import quadratic_basis
-from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, quadratic_basis
 from ringbalance.physics.pressure.surface import find_surface, refined_surface, solve_with_gravity
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray

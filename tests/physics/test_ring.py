@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
 from ringbalance.physics.convergence import GridVerdict
-from ringbalance.physics.pressure import elements
+from ringbalance.physics.pressure import solve
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.pressure.ring_samples import QUANTITIES, liquid_integrals
 from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
@@ -182,7 +182,7 @@ def test_impossible_arguments_are_refused(disc: Disc, change: Mapping[str, Any])
 
 
 def test_a_failed_solve_is_said_and_claims_nothing(disc: Disc, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(elements, "_factorised", lambda _, right: 0.9 * right)
+    monkeypatch.setattr(solve, "_factorised", lambda _, right: 0.9 * right)
     ring = ring_quantities(disc=disc, density=RHO, angular_velocity=OMEGA, fill_ratio=[0.0, 0.2])
     assert ring.status.code is StatusCode.NOT_CONVERGED
     assert "0.2" in ring.status.text

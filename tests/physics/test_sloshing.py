@@ -15,9 +15,8 @@ from skfem.models.poisson import laplace
 from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.results import StatusCode
-from ringbalance.physics.sloshing.modes import resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing.response import SloshingResponse, sloshing_response
-from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
+from ringbalance.physics.sloshing import SloshingResponse, resonant_fills, sloshing_modes, sloshing_response
+from ringbalance.physics.sloshing_system import SloshingSystem, sloshing_system
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.reference.sloshing_exact import CosineWaves
 
@@ -55,7 +54,7 @@ def still(monkeypatch: pytest.MonkeyPatch) -> None:
         found = sloshing_system(**arguments)
         return replace(found, coriolis=0 * found.coriolis)
 
-    monkeypatch.setattr("ringbalance.physics.sloshing.modes.sloshing_system", without)
+    monkeypatch.setattr("ringbalance.physics.sloshing.sloshing_system", without)
 
 
 @pytest.mark.usefixtures("still")

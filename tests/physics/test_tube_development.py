@@ -13,13 +13,13 @@ from scipy.optimize import root
 from scipy.special import jv, roots_jacobi
 
 from ringbalance.mesh.bent_tube import Segment, swept_tube
-from ringbalance.physics.tube.ends import ROTATING_PROFILE_UNCERTAINTY, kinetic_factor
-from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
-from ringbalance.physics.tube.uncertainty import (
+from ringbalance.physics.tube.local_losses import ROTATING_PROFILE_UNCERTAINTY, kinetic_factor
+from ringbalance.physics.tube.loss import (
     DEVELOPMENT_SHARE,
     developing_length,
     development_uncertainty,
 )
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.verification.cases.developing_flow.case import slowest_decay
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import (

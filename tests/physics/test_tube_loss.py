@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ringbalance
-from ringbalance.physics.tube.bends import bend_loss, bend_uncertainty
 from ringbalance.physics.tube.friction import reynolds_number, rotation_reynolds_number
+from ringbalance.physics.tube.local_losses import bend_loss, bend_uncertainty
 from ringbalance.physics.tube.loss import TubeLoss, tube_loss
 from ringbalance.scene.models import Bend, Liquid, Scene, Tube
 from ringbalance.scene.origins import InputUncertainty

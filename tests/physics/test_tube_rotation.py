@@ -8,7 +8,7 @@ from fluids.friction import helical_turbulent_fd_Mori_Nakayama
 from numpy.polynomial import chebyshev
 from scipy.linalg import solve, toeplitz
 
-from ringbalance.physics.tube.rotation import (
+from ringbalance.physics.tube.friction import (
     critical_reynolds,
     curved_friction_ratio,
     turbulent_friction_ratio,

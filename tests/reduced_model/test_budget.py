@@ -15,8 +15,8 @@ from scipy.optimize import brentq
 from scipy.stats import binom
 
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.reduced_model.budget import UNITS, Budget, budgets
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.calibration_record import UNITS, Budget
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.tube.heads import log_heads
 from ringbalance.reduced_model.tube.regime import CLEARING, RELEASED
@@ -175,7 +175,7 @@ def _coverage(scene: Scene, *, count: int, seed: int) -> dict[str, FloatArray]:
 
     A model's error is drawn with the inputs: an interval that holds both must be judged with both.
     """
-    told, generator = budgets(scene=scene, calibration=calibrate(scene)), np.random.default_rng(seed)
+    told, generator = calibrate(scene).budgets, np.random.default_rng(seed)
     errors: dict[str, list[float]] = {
         name: [] for quantity in told for name in (quantity, f"{quantity}: inputs")
     }
@@ -259,7 +259,7 @@ def test_the_core_answers_drawn_devices_as_quadrature_and_root_finding_do(table_
 
 def test_inputs_are_named_by_their_place_in_the_scene(table_1_scene: Scene) -> None:
     scene = table_1_scene
-    told = budgets(scene=(uncertain := _uncertain(scene, STATED)), calibration=calibrate(uncertain))
+    told = calibrate(_uncertain(scene, STATED)).budgets
     known = {f"{table}.{name}" for name, table in UNCERTAIN_QUANTITIES.items()}
     assert all(set(budget.inputs) <= known for budget in told.values())
     assert set(told["chamber_volume"].inputs) == {
@@ -280,7 +280,7 @@ def test_a_scene_with_exact_inputs_leaves_numerics_and_models(table_1_scene: Sce
     exact = _uncertain(
         scene, dict.fromkeys(("density", "kinematic_viscosity", "roughness", "draw_down_factor"), 0.0)
     )
-    for budget in budgets(scene=exact, calibration=calibrate(exact)).values():
+    for budget in calibrate(exact).budgets.values():
         assert not budget.inputs
         assert budget.total == math.hypot(budget.numerical, budget.model) > 0
 
@@ -288,7 +288,7 @@ def test_a_scene_with_exact_inputs_leaves_numerics_and_models(table_1_scene: Sce
 def test_a_blocked_tube_has_neither_crest_pressure_nor_margin(table_1_scene: Scene) -> None:
     scene = table_1_scene
     blocked = with_value(scene=scene, quantity="pressure", value=0.1e6)
-    told = budgets(scene=blocked, calibration=calibrate(blocked))
+    told = calibrate(blocked).budgets
     assert told["velocity"].value == 0
     assert {"crest_pressure", "cavitation_margin"}.isdisjoint(told)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from ringbalance.reduced_model.cli import calibrate
-from ringbalance.reduced_model.law.loading import load_law
+from ringbalance.reduced_model.law.files import load_law
 from ringbalance.scene import SceneError, bundled_scene
 
 

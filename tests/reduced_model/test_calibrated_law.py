@@ -14,11 +14,10 @@ from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.estimates import range_flow
-from ringbalance.reduced_model.law.building import calibrated_law, nominal_law
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law, nominal_law
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.point import priming_pressure
-from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
+from ringbalance.reduced_model.operating_point import priming_pressure
+from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.scene.models import HumpGas, Scene

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from ringbalance.physics.tube.uncertainty import corrected_state
+from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import growing_root

@@ -16,10 +16,9 @@ from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
-from ringbalance.reduced_model.law.building import calibrated_law
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating.pressure_profile import HumpProfile
+from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.path import crest_span, path_radius, share_at_radius
 from ringbalance.scene.models import Scene

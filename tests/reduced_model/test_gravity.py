@@ -11,8 +11,7 @@ import pytest
 
 from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.physics.pressure.ring import ring_quantities
-from ringbalance.reduced_model.chamber.gravity import check_ring, closed_ring
-from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, check_ring, closed_ring
 from ringbalance.scene import SceneError
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Shaft

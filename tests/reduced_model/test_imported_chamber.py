@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from block_discs import imported, turned
 
 from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber import element_check
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
-from ringbalance.reduced_model.chamber.terms import unmodelled_fractions
+from ringbalance.reduced_model.chamber.contributions import unmodelled_fractions
 from ringbalance.reduced_model.chamber.values import share_across
 from ringbalance.reduced_model.documents import calibration_document
-from ringbalance.reduced_model.law.building import nominal_law
-from ringbalance.reduced_model.law.loading import load_law
+from ringbalance.reduced_model.law.calibrated_law import nominal_law
+from ringbalance.reduced_model.law.files import load_law
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.block_chambers import imported, turned
 
 FILLS = np.array([0.1, 0.25, 0.5])
 

@@ -7,8 +7,8 @@ import dataclasses
 import pytest
 
 from ringbalance.reduced_model.calibration_record import Calibration
+from ringbalance.reduced_model.estimates import first_gas_time
 from ringbalance.reduced_model.terms import LEFT_OUT, NOT_MODELLED, TERMS, ModelUsed, models_used
-from ringbalance.reduced_model.time_scales import first_gas_time
 from ringbalance.scene.models import Scene
 
 

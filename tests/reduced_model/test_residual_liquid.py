@@ -15,7 +15,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import Flow
-from ringbalance.reduced_model.operating.residual import reach_share, residual_fill_ratio
+from ringbalance.reduced_model.residual_liquid import reach_share, residual_fill_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty

@@ -12,7 +12,7 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import RowStatus, _row_status, calibration_document
-from ringbalance.results.findings import sentences
+from ringbalance.results.rows import sentences
 from ringbalance.scene import Scene
 
 FILLS = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.law.loading import load_law
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.files import load_law
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Scene

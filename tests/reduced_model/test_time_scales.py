@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ringbalance.reduced_model import estimates
-from ringbalance.reduced_model.time_scales import (
+from ringbalance.reduced_model.estimates import (
     deciding_gas_time,
     long_start_up_loss,
     start_up_loss,

@@ -10,7 +10,7 @@ import pytest
 
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.operating.tube_liquid import TubeLiquid
+from ringbalance.reduced_model.operating_point import TubeLiquid
 from ringbalance.reduced_model.tube.path import path_angle, path_radius
 from ringbalance.scene.models import Scene
 

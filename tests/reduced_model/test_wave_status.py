@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from ringbalance.physics.results import StatusCode
-from ringbalance.physics.sloshing.response import sloshing_response
+from ringbalance.physics.sloshing import sloshing_response
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.chamber.terms import _wave_mean, wave_height
+from ringbalance.reduced_model.chamber.contributions import _wave_mean, wave_height
 from ringbalance.reduced_model.chamber.values import by_quadrature
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.arrays import FloatArray

@@ -8,7 +8,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from ringbalance.reports import extremes_cli
 from ringbalance.reports.pages import extremes, sloshing
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene
@@ -86,15 +85,3 @@ def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
 
 def test_extremes_that_were_not_run_say_so() -> None:
     assert extremes.SECTION.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}
-
-
-def test_a_table_named_in_a_message_is_not_taken_for_markup(capsys: pytest.CaptureFixture[str]) -> None:
-    told = {
-        "judged": 3,
-        "endings": {"solved": 2, "refused with a message": 1},
-        "worst_residual": 1e-13,
-        "worst_error_over_half_width": 0.8,
-        "violations": [],
-    }
-    extremes_cli._show(told, extremes.axis_rows(table()))
-    assert "[rotor]" in capsys.readouterr().out

@@ -8,7 +8,7 @@ import pytest
 
 import ringbalance.reports.saved as saved_module
 from ringbalance.reports.saved import keep_cases, kept_cases, saved_cases
-from ringbalance.scene.platform.compilation.cache import write_checked
+from ringbalance.scene.platform.kept_code import write_checked
 
 
 @pytest.mark.parametrize("damage", [b"", b"{}", b"\xff" * 99], ids=["empty", "no checksum", "garbage"])

@@ -7,10 +7,9 @@ import re
 import generated_docs
 import pytest
 
-from ringbalance.results import findings
-from ringbalance.results.findings import Finding, Sentence, sentences, value_text
+from ringbalance.results import rows
 from ringbalance.results.numbers import SCALES
-from ringbalance.results.rows import Quantity
+from ringbalance.results.rows import Finding, Quantity, Sentence, Value, sentences
 
 PLACES = re.compile(r"\{(\w+)(?::([^};]*))?(?:;(\d))?\}")
 
@@ -36,7 +35,7 @@ def test_a_number_that_is_missing_is_an_error(monkeypatch: pytest.MonkeyPatch) -
     made_up = {
         "late": Sentence(severity="warning", text="after {time:s;2}", change={"run.time_limit": "raise"})
     }
-    monkeypatch.setattr(findings, "sentences", lambda: made_up)
+    monkeypatch.setattr(rows, "sentences", lambda: made_up)
     with pytest.raises(KeyError, match="time"):
         Finding(code="late").sentence()
     late = Finding(code="late", values={"time": 0.0123}, change={"run.time_limit": 200.0})
@@ -63,5 +62,9 @@ def test_a_number_that_is_missing_is_an_error(monkeypatch: pytest.MonkeyPatch) -
         ),
     ],
 )
-def test_one_filter_writes_every_value(value: findings.Value, unit: str, text: str) -> None:
-    assert value_text(value, unit) == text
+def test_one_filter_writes_every_value(
+    value: Value, unit: str, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sentence = Sentence(severity="info", text=f"{{it:{unit}}}")
+    monkeypatch.setattr(rows, "sentences", lambda: {"it": sentence})
+    assert Finding(code="it", values={"it": value}).sentence() == text

@@ -10,12 +10,9 @@ import math
 import pytest
 from rich.console import Console
 
-from ringbalance.results.findings import Finding
 from ringbalance.results.numbers import plain
-from ringbalance.results.render import csv_text, html_table
-from ringbalance.results.result import Result, Rows
-from ringbalance.results.rows import Parts, Quantity, around
-from ringbalance.results.table import Table
+from ringbalance.results.result import Result, Rows, Table, csv_text
+from ringbalance.results.rows import Finding, Parts, Quantity, around
 
 STALL = Quantity(
     key="stall_pressure",
@@ -71,7 +68,7 @@ def test_the_terminal_shows_a_lopsided_interval_and_the_status() -> None:
 def test_a_notebook_shows_the_same_rows() -> None:
     page = Answer()._repr_html_()
     assert "A &lt;disc&gt;" in page
-    assert STALL.text in page
+    assert f'<td style="text-align:right">{STALL.text}</td>' in page
     assert "beside the shaft" in page
 
 
@@ -82,12 +79,22 @@ def test_a_short_text_has_title_quantity_and_finding() -> None:
     assert finding.strip() == Answer().rows().findings[0].text
 
 
-def test_csv_and_html_hold_every_cell() -> None:
-    table = Table(heads=("a", "b\nm"), rows=[("x, y", "−1"), ("<z>", "2")])
-    assert list(csv.reader(io.StringIO(csv_text(table)))) == [["a", "b m"], ["x, y", "-1"], ["<z>", "2"]]
-    assert table.numeric == [False, True]
-    assert '<td style="text-align:right">2</td>' in html_table(table)
-    assert "&lt;z&gt;" in html_table(table)
+def test_csv_holds_every_cell() -> None:
+    text = csv_text({"time [s]": [0.1, 2e-9], "name, short": ["a", None]})
+    assert list(csv.reader(io.StringIO(text))) == [["time [s]", "name, short"], ["0.1", "a"], ["2e-09", ""]]
+
+
+@pytest.mark.parametrize(
+    ("cells", "numeric"),
+    [
+        (["\u22121", "2 mm", "\u2013"], True),
+        (['<span data-from="a">3</span>', "\ue000a.0\ue0014\ue002", "none"], True),
+        (["< 2", "a", "1"], False),
+    ],
+)
+def test_most_cells_decide_how_a_column_is_set(cells: list[str], numeric: bool) -> None:
+    """Behind tags and the marks of traces."""
+    assert Table(heads=("a",), rows=[(cell,) for cell in cells]).numeric == [numeric]
 
 
 @pytest.mark.parametrize(

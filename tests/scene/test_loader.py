@@ -238,6 +238,17 @@ def test_uncertainty_of_a_liquid(newcomer_document: dict[str, Any], load: Load) 
     assert spreads == {"density": (10.0, False), "kinematic_viscosity": (0.07, True), "bore": (2e-5, False)}
 
 
+@pytest.mark.parametrize(
+    ("written", "offsets"),
+    [("30 ms", (0.03,) * 4), (["10 ms", "20 ms", "0.03 s", "0 s"], (0.01, 0.02, 0.03, 0.0))],
+)
+def test_one_offset_for_all_valves_or_one_for_each(
+    paper_document: dict[str, Any], load: Load, written: Any, offsets: tuple[float, ...]
+) -> None:
+    paper_document["controller"]["gas_time_offset"] = written
+    assert load(paper_document).controller.offsets(4) == pytest.approx(offsets)
+
+
 def test_prescribed_drag_needs_no_length(newcomer_document: dict[str, Any], load: Load) -> None:
     newcomer_document["tube"] = {"bore": "2 mm", "drag_coefficient": 50}
     assert load(newcomer_document).tube.length == pytest.approx(0.12, rel=1e-15)

@@ -12,7 +12,8 @@ import time
 
 import pytest
 
-from ringbalance.scene.platform.processes import Workers, beside, seldom_collected
+from ringbalance.scene.platform.garbage import seldom_collected
+from ringbalance.scene.platform.processes import Workers, beside
 
 
 def test_the_work_of_an_ended_worker_is_done_again(caplog: pytest.LogCaptureFixture) -> None:

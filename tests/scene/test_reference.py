@@ -12,15 +12,14 @@ import pytest
 import scene_reference
 from generated_docs import fresh, text_of
 
-from ringbalance.controller.eccentric_mass import scene_rules
-from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS
+from ringbalance.controller.eccentric_mass.scene_records import CHECKS, ECCENTRIC_MASS
 from ringbalance.scene import Scene, loop_models, models
-from ringbalance.scene.chamber_file.keys import MeshKeys
+from ringbalance.scene.chamber_file.record import MeshKeys
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.kinds import Check
 from ringbalance.scene.origins import Measured
 from ringbalance.scene.rules import shape, working
-from ringbalance.scene.rules.check import Check
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 TABLES = tuple(LIQUID_RING.tables)
@@ -92,7 +91,7 @@ def test_uncertain_quantities() -> None:
 
 @pytest.mark.parametrize(
     ("schema", "checks"),
-    [(LIQUID_RING, (*shape.CHECKS, *working.CHECKS)), (ECCENTRIC_MASS, scene_rules.CHECKS)],
+    [(LIQUID_RING, (*shape.CHECKS, *working.CHECKS)), (ECCENTRIC_MASS, CHECKS)],
 )
 def test_checks_need_keys_that_exist(schema: Schema, checks: tuple[Check, ...]) -> None:
     for check in checks:

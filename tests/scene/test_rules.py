@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from ringbalance.scene.kinds import Finding, limit_above_noise
 from ringbalance.scene.models import Bend
 from ringbalance.scene.rules import shape, working
-from ringbalance.scene.rules.check import Finding
 
 RULES = {each.rule.__name__.removeprefix("_"): each.rule for each in (*shape.CHECKS, *working.CHECKS)}
 BENDS = (Bend(angle=1.5, radius=0.004), Bend(angle=1.0, radius=0.002))
@@ -35,7 +35,7 @@ BENDS = (Bend(angle=1.5, radius=0.004), Bend(angle=1.0, radius=0.002))
         RULES["liquid_stays_liquid"](1e5, 1e5),
         RULES["temperature_below_boiling"](373.0, 1e5, 1e5),
         RULES["gas_times_in_order"](0.1, 0.1),
-        RULES["limit_above_noise"](1e-8, 1e-8),
+        limit_above_noise("amplitude_noise", "um")(1e-8, 1e-8),
         RULES["sequence_complete"](("A", "C", "B", "E"), 4),
     ],
 )

@@ -9,6 +9,7 @@ from concurrent.futures import Future
 from typing import Any
 
 import pytest
+from block_discs import imported
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.models import Scene
@@ -17,7 +18,6 @@ from ringbalance.verification import runner
 from ringbalance.verification.assumptions import overridden
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference
-from ringbalance.verification.reference.block_chambers import imported
 from ringbalance.verification.runner import mutate_definition, run_case, run_cases, run_definition
 from ringbalance.verification.verdicts import Verdict
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
-from ringbalance.reduced_model.budget import UNITS
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
+from ringbalance.reduced_model.calibration_record import UNITS
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.document import case_document
 from ringbalance.verification.runner import paper_scene, run_case

@@ -19,7 +19,7 @@ from ringbalance.identification.kinds.bench import laminar_ratio, tank_frequency
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.reading import read_observations
-from ringbalance.physics.sloshing.range import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene

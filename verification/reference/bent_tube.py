@@ -26,7 +26,7 @@ import numpy as np
 
 from ringbalance.mesh.bent_tube import Segment, SweptTube, swept_tube
 from ringbalance.physics.results import Statistics, Status
-from ringbalance.physics.tube.bends import MOMENTUM_FACTOR
+from ringbalance.physics.tube.local_losses import MOMENTUM_FACTOR
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.verification.navier_stokes.continuation import StepRule, follow

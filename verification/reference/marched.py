@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from ringbalance.reduced_model.injection.dynamics import Column, Dynamics
+from ringbalance.reduced_model.injection.dynamics import Column, Dynamics, Event
 from ringbalance.reduced_model.injection.pair import Motion, PairState, opened, pass_time
-from ringbalance.reduced_model.injection.records import Event
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Tube
 from ringbalance.verification.reference.transfers import Drive, Integrator, Transfer, checked_instants

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from ringbalance.reduced_model.injection.records import Event
+from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray, clipped

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.simulation import Simulation
-from ringbalance.reduced_model.law.model import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, Table, from_range

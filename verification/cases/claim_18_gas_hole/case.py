@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ringbalance.mesh.cut.integrals import gauss
 from ringbalance.mesh.geometry import half_angle, surface_radius
 from ringbalance.mesh.quadratic_tetrahedra import derivatives, shapes, tetrahedra
+from ringbalance.mesh.wall_integrals import gauss
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene

@@ -11,7 +11,7 @@ import numpy as np
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.reduced_model.law.flow_law import FlowLaw
-from ringbalance.reduced_model.operating.residual import residual_fill_ratio
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
     Curve,

@@ -23,8 +23,8 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from ringbalance.physics.results import Status, StatusCode
+from ringbalance.physics.tube.loss import developing_length
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
-from ringbalance.physics.tube.uncertainty import developing_length
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found

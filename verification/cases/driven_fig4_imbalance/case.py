@@ -7,20 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
+from ringbalance.controller.eccentric_mass.imbalance_filter import (
+    FilterMatrices,
+    ProcessNoise,
+    filter_matrices,
     imbalance_history,
     locked_masses,
     start_estimate,
 )
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
-    FilterMatrices,
-    ProcessNoise,
-    filter_matrices,
-)
-from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.integration import run_plant
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.strategy.settings import believed_whirl
+from ringbalance.controller.eccentric_mass.settings import believed_whirl
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.eccentric_scenes import at_constant_speed, changed, convergence_time, thinned
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure

@@ -12,10 +12,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque, regulator_torque
-from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw
+from ringbalance.controller.eccentric_mass.settings import DriveLaw
+from ringbalance.controller.eccentric_mass.step import friction_torque, regulator_torque
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compilation.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled
 from ringbalance.verification.eccentric_scenes import changed
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
 

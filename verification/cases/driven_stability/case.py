@@ -8,8 +8,8 @@ import numpy as np
 
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque, regulator_torque
-from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw
+from ringbalance.controller.eccentric_mass.settings import DriveLaw
+from ringbalance.controller.eccentric_mass.step import friction_torque, regulator_torque
 from ringbalance.verification.cases.driven_fig6_effort.case import later_rate
 from ringbalance.verification.evidence import Evidence, Found, Level
 

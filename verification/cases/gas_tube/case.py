@@ -20,8 +20,7 @@ from ringbalance.mesh.geometry import (
     liquid_first_moment,
     surface_radius,
 )
-from ringbalance.reduced_model.chamber.closed_forms import chamber_closed_forms
-from ringbalance.reduced_model.chamber.values import drawing_shares
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms, drawing_shares
 from ringbalance.scene import liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import with_value

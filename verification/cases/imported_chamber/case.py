@@ -12,10 +12,9 @@ from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.physics.convergence import gci
-from ringbalance.physics.pressure.elements import quadratic_basis
 from ringbalance.physics.pressure.imported import solved_ring
-from ringbalance.physics.pressure.solve import solve_on
-from ringbalance.reduced_model.chamber.closed_forms import chamber_closed_forms
+from ringbalance.physics.pressure.solve import quadratic_basis, solve_on
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, from_half_width

@@ -11,10 +11,9 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.mesh.liquid_body import Level as SurfaceLevel
 from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
-from ringbalance.physics.pressure.elements import quadratic_basis, side
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
-from ringbalance.physics.pressure.solve import solve_on
+from ringbalance.physics.pressure.solve import quadratic_basis, side, solve_on
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene

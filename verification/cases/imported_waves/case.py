@@ -13,9 +13,8 @@ import numpy as np
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.mesh.section import middle_section
-from ringbalance.physics.sloshing.modes import sloshing_modes
-from ringbalance.physics.sloshing.response import sloshing_response
-from ringbalance.physics.sloshing.system import SloshingSystem, imported_system, section_system
+from ringbalance.physics.sloshing import sloshing_modes, sloshing_response
+from ringbalance.physics.sloshing_system import SloshingSystem, imported_system, section_system
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
@@ -39,7 +38,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if defect == "forcing_backwards":
         waves = replace(waves, mixed=-waves.mixed)
     imported_system.cache_clear()
-    with patch("ringbalance.physics.sloshing.system.section_system", _mutated(defect)):
+    with patch("ringbalance.physics.sloshing_system.section_system", _mutated(defect)):
         found = sloshing_modes(disc=disc, fill_ratio=_FILL, modes=_MODES).frequency_ratio
         swing = sloshing_response(
             disc=disc, fill_ratio=_FILL, angular_velocity=1.0, kinematic_viscosity=0.0, gravity=0.0

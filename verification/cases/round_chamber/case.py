@@ -7,8 +7,14 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.cut.integrals import LONGEST, Walls, integrals, walls_about
-from ringbalance.mesh.cut.patches import split_patches, wall_patches
+from ringbalance.mesh.wall_integrals import (
+    LONGEST,
+    Walls,
+    integrals,
+    split_patches,
+    wall_patches,
+    walls_about,
+)
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc, Scene

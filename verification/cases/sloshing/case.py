@@ -9,9 +9,14 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.sloshing.modes import default_sloshing_cells, resonant_fills, sloshing_modes
-from ringbalance.physics.sloshing.response import SloshingResponse, sloshing_response
-from ringbalance.physics.sloshing.system import SloshingSystem, sloshing_system
+from ringbalance.physics.sloshing import (
+    SloshingResponse,
+    default_sloshing_cells,
+    resonant_fills,
+    sloshing_modes,
+    sloshing_response,
+)
+from ringbalance.physics.sloshing_system import SloshingSystem, sloshing_system
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure

@@ -1,0 +1,206 @@
+"""How much a curved wall may differ from its drawing by facets, as far as the mesh alone shows it.
+
+Where two facets meet at a small angle delta, the wall is taken for a smooth one through their nodes.  An arc
+of angle delta over a facet of width h then stands off by h delta/12 on average where the facet is flat, and
+by h delta/60 where it is quadratic and delta is what is left of the bend.
+
+The outer wall, besides: the axis about which it is round, and parts that face inward.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.chamber_table import SLOPE_TOLERANCE, TOLERANCE, chamber_table
+from ringbalance.mesh.wall_integrals import gauss, wall_patches
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, edges_of
+from ringbalance.scene.chamber_file.record import OUTER_WALL, ChamberGeometry
+
+SMOOTH: Final = np.pi / 6
+"""Angle between two facets above which their edge is taken for one of the chamber."""
+COARSE: Final = np.radians(65)
+"""The same of a mesh without any curved edge, which may draw a round pillar as a hexagon."""
+SAFETY: Final = 1.5
+"""On the estimate: an arc drawn by few facets has one edge less than facets."""
+_FLAT: Final = 1 / 12
+_QUADRATIC: Final = 1 / 60
+_STRAIGHT: Final = 1e-6
+"""Distance of a middle node from the middle of its edge, over the edge."""
+_MIDDLES: Final = {3: ((0.5, 0), (1, 0.5), (0, 0.5)), 4: ((0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5))}
+"""Of the edges, (u, v)."""
+_ROUND: Final = 1e-4
+"""Departure of r^2, over its mean, up to which a wall counts as round about the shaft."""
+_BETTER: Final = 0.01
+"""Of the departure about the shaft, that is left about an axis of the wall's own."""
+_INWARD: Final = -0.05
+"""Radial part of a normal below which a wall faces the shaft, and not by rounding."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Faceting:
+    """Volumes that the drawing may miss along each smooth edge, all counted as of one sign."""
+
+    radius: FloatArray
+    """Of the edge, m."""
+    volume: FloatArray
+    """m^3."""
+    place: FloatArray
+    """x of the edge, m."""
+    wall: float
+    """Error of the mean of r^2 over the outer wall, m^2."""
+    steepest: float
+    """Largest angle between two facets that are taken for one smooth wall, rad."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _DrawingError:
+    """Expanded uncertainties (95 %) by facets and table, along the fills."""
+
+    volume: float
+    """Of the whole chamber, m^3."""
+    moment: FloatArray
+    """First moment along x, m^4."""
+    centroid: FloatArray
+    """Mean of x over the free surface, m."""
+    wall_square: FloatArray
+    """Mean of r^2 - a^2 over the outer wall, m^2."""
+    level: FloatArray
+    """a^2 of the free surface, m^2."""
+
+
+@lru_cache(maxsize=8)
+def faceting(geometry: ChamberGeometry) -> _Faceting:
+    """Estimate for the walls of a mesh."""
+    facets, corners = boundary_facets(geometry), corners_of(geometry.kind)
+    patches, outer = wall_patches(geometry)
+    first, second, ends = _shared_edges(facets[:, :corners])
+    areas = _areas(patches)
+    normals = _normals_at(patches, *np.array(_MIDDLES[corners]).T).reshape(-1, 3)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    bend = np.arccos(np.clip((normals[first] * normals[second]).sum(axis=1), -1, 1))
+    shares = _share(geometry, facets, corners)
+    bend = np.where(bend < (COARSE if np.all(shares == _FLAT) else SMOOTH), bend, 0.0)
+    sides = np.stack([first, second]) // corners
+    # A triangle's height is twice its area over the edge; a quadrilateral has two edges across the bend.
+    share = shares * (2 if corners == 3 else 0.5) * areas**2
+    places = geometry.points[ends]
+    missed = bend * share[sides].sum(axis=0) / np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
+    middle = places.mean(axis=1)
+    radius = np.hypot(middle[:, 0], middle[:, 1])
+    on_wall = np.all(outer[sides], axis=0)
+    return _Faceting(
+        radius=radius,
+        volume=missed,
+        place=middle[:, 0],
+        wall=float(2 * (radius * missed)[on_wall].sum() / areas[outer].sum()),
+        steepest=float(bend.max(initial=0.0)),
+    )
+
+
+def _areas(patches: FloatArray) -> FloatArray:
+    places, weights = gauss(3)
+    normals = _normals_at(patches, np.repeat(places, 3), np.tile(places, 3))
+    return np.asarray(np.linalg.norm(normals, axis=-1) @ np.outer(weights, weights).ravel())
+
+
+def _normals_at(patches: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
+    """X_u x X_v at points, shape (patches, points, 3)."""
+    one, zero = np.ones_like(u), np.zeros_like(u)
+    at = [np.stack([one, t, t**2]) for t in (u, v)]
+    slopes = [np.stack([zero, one, 2 * t]) for t in (u, v)]
+    along = np.einsum("nijx,ip,jp->npx", patches, slopes[0], at[1])
+    return np.cross(along, np.einsum("nijx,ip,jp->npx", patches, at[0], slopes[1]))
+
+
+def _shared_edges(corners: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Each edge of two facets: its place among the edges of both, facet by facet, and its ends."""
+    ends = np.sort(edges_of(corners).reshape(-1, 2), axis=1)
+    order = np.lexsort(ends.T)
+    pair = np.flatnonzero(np.all(ends[order][1:] == ends[order][:-1], axis=1))
+    return order[pair], order[pair + 1], ends[order[pair]]
+
+
+def _share(geometry: ChamberGeometry, facets: IntArray, corners: int) -> FloatArray:
+    """Of h delta, by which a wall stands off a facet; quadratic ones with straight edges count as flat."""
+    if facets.shape[1] == corners:
+        return np.full(len(facets), _FLAT)
+    at = geometry.points[facets[:, : 2 * corners]]
+    start, stop = at[:, :corners], np.roll(at[:, :corners], -1, axis=1)
+    sag = np.linalg.norm(at[:, corners:] - (start + stop) / 2, axis=-1)
+    straight = np.all(sag < _STRAIGHT * np.linalg.norm(stop - start, axis=-1), axis=1)
+    return np.where(straight, _FLAT, _QUADRATIC)
+
+
+def drawing_error(geometry: ChamberGeometry, *, fill_ratio: FloatArray) -> _DrawingError:
+    """Expanded uncertainties by facets in place of curved walls, and by the table between its nodes.
+
+    At a fixed fill ratio the surface moves by what the whole chamber and by what the wet walls hold more;
+    each edge counts with the sign that does most, to first order.
+    """
+    table, walls, x = chamber_table(geometry), faceting(geometry), fill_ratio[:, None]
+    level = table.level_of(fill_ratio * table.volume)
+    radius, wetness = np.sqrt(level), -table.at(level)[1][3]
+    area, centroid, _ = table.surface(radius)
+    wet = walls.radius > radius[:, None]
+    missed = SAFETY * walls.volume
+    # dV = -(area/2) dL on a concentric surface of area a times `area`.
+    moved = 2 * (np.abs(wet - x) @ missed + TOLERANCE * table.volume) / area
+    turned = np.abs(wet * (walls.place - centroid[:, None]) + x * centroid[:, None]) @ missed
+    aside = np.abs(
+        [table.surface(np.sqrt(np.maximum(level + s * moved, 0.0)))[1] - centroid for s in (-1, 1)]
+    )
+    return _DrawingError(
+        volume=float(missed.sum()) + TOLERANCE * table.volume,
+        moment=turned + TOLERANCE * table.columns[1, 0],
+        centroid=aside.max(axis=0) + (missed.sum() / table.volume + SLOPE_TOLERANCE) * centroid,
+        wall_square=wetness * (moved + SAFETY * walls.wall),
+        level=moved,
+    )
+
+
+def axis_beside_shaft(geometry: ChamberGeometry) -> FloatArray | None:
+    """Place of the axis about which the outer wall is round, m, shape (2,), where that is not the shaft.
+
+    Walls that turn about (c_x, c_y) have x^2 + y^2 = 2 c_x x + 2 c_y y + k_0 + k_1 z + k_2 z^2: cylinders and
+    cones of any draft.
+    Returns: c, by least squares over the wall's nodes; None for a wall that is round about the shaft, or not
+        round, or about an axis that it leaves on one side of the shaft, such as that of a bore.
+    """
+    points = geometry.points[np.unique(geometry.boundaries[OUTER_WALL])]
+    square = points[:, 0] ** 2 + points[:, 1] ** 2
+    size = float(np.sqrt(square.max()))
+    along = points[:, 2:] / size
+    about_shaft = np.concatenate([np.ones_like(along), along, along**2], axis=1)
+    about_own = np.concatenate([2 * points[:, :2] / size, about_shaft], axis=1)
+    found, own = _fitted(about_own, square)
+    _, shaft = _fitted(about_shaft, square)
+    centre = found[:2] / size
+    encloses = found[2] > 0  # k_0 = R^2 - c^2
+    beside = shaft > _ROUND and own < _BETTER * shaft
+    return np.asarray(centre) if beside and encloses else None
+
+
+def _fitted(terms: FloatArray, square: FloatArray) -> tuple[FloatArray, float]:
+    """Coefficients, and the largest departure over the mean."""
+    found = np.linalg.lstsq(terms, square, rcond=None)[0]
+    return np.asarray(found, dtype=np.float64), float(np.abs(terms @ found - square).max() / square.mean())
+
+
+def inward_share(geometry: ChamberGeometry) -> float:
+    """Share of the outer wall's area whose normal, out of the chamber, points towards the shaft."""
+    patches, outer = wall_patches(geometry)
+    places, weights = gauss(3)
+    u, v = np.repeat(places, 3), np.tile(places, 3)
+    powers = np.einsum("ip,jp->ijp", *(np.stack([np.ones_like(t), t, t**2]) for t in (u, v)))
+    at = np.einsum("nijx,ijp->npx", patches[outer], powers)
+    normals = _normals_at(patches[outer], u, v)
+    area = np.linalg.norm(normals, axis=-1)
+    radial = (normals[..., :2] * at[..., :2]).sum(axis=-1)
+    inward = radial < _INWARD * area * np.linalg.norm(at[..., :2], axis=-1)
+    share = area * np.outer(weights, weights).ravel()
+    return float(share[inward].sum() / share.sum())

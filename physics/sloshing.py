@@ -1,0 +1,370 @@
+"""Small oscillations of the liquid ring: natural frequencies, and the answer to gravity across the shaft.
+
+Natural frequencies scale with the speed, so a fill at which one of them equals it is resonant with gravity
+across the shaft at every speed. A new force on the free surface or another damping goes into
+`sloshing_system`, which builds the matrices; here they are solved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.faceting import SAFETY, faceting
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.convergence import gci
+from ringbalance.physics.results import Estimate, Status, StatusCode
+from ringbalance.physics.sloshing_system import SloshingSystem, imported_system, sloshing_system
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc
+
+FORMAL_ORDER: Final = 4.0
+"""Of an eigenvalue of quadratic elements: twice the order of its mode in the energy's norm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SloshingModes:
+    """Planar modes of the liquid in one chamber, lowest first."""
+
+    fill_ratio: FloatArray
+    """x, shape (n,)."""
+    surface_radius: FloatArray
+    """a, m, shape (n,)."""
+    frequency_ratio: Estimate
+    """s, natural angular frequency seen in the disc over the angular velocity, shape (n, modes)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Meshes:
+    """On which waves are solved: those given of a sector, two of an imported chamber's section."""
+
+    disc: Disc
+    cells: tuple[tuple[int, int], ...]
+    """Of a sector, finest first."""
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """Numbers of the meshes, finest first."""
+        return tuple(range(len(self.cells) if self.disc.geometry is None else 2))
+
+    def system(self, radius: float, level: int) -> tuple[SloshingSystem, float]:
+        """The problem below a surface of this radius, m, and its unit of length, m."""
+        disc = self.disc
+        if disc.geometry is None:
+            found = sloshing_system(disc=disc, surface_radius=radius, cells=self.cells[level])
+            return found, disc.outer_radius
+        return imported_system(
+            disc.geometry, surface_radius=radius, width=disc.axial_width, coarse=bool(level)
+        )
+
+    def half_width(self, values: FloatArray, radius: float) -> float:
+        """Uncertainty (95 %) of the first of the values on each mesh.
+
+        Source: grid convergence of Celik et al. (2008); of a section in straight lines, of order two, all
+        that halving them changes, and what the facets of a wall, between its nodes, miss of the depth.
+        """
+        if self.disc.geometry is None:
+            noise = 1e-12 * float(np.abs(values).max())
+            sizes = [1 / counts[1] for counts in self.cells]
+            return gci(
+                values=list(values), sizes=sizes, formal_order=FORMAL_ORDER, round_off=noise
+            ).uncertainty
+        outer = self.disc.outer_radius
+        # Frequencies grow with the root of the depth; r^2 changes by twice r times the depth.
+        deeper = SAFETY * faceting(self.disc.geometry).wall / (2 * outer)
+        return float(abs(values[0] - values[1]) + deeper / (2 * (outer - radius)) * abs(values[0]))
+
+
+def sloshing_modes(
+    *,
+    disc: Disc,
+    fill_ratio: npt.ArrayLike,
+    modes: int = 4,
+    cells: tuple[tuple[int, int], ...] | None = None,
+) -> _SloshingModes:
+    """Lowest natural frequencies of the liquid in one chamber, over the angular velocity.
+
+    (-s^2 S + 2 i s C + A) psi = 0; without Coriolis force and plates s_n^2 = k tanh(k ln(R2/a)), k = n
+    pi/theta.
+    Args:
+        fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
+        modes: how many, at least 1.
+        cells: three meshes or more, finest first; default twice `default_cells` and two coarser ones, with
+            more cells along the angle for many modes.  An imported chamber is solved in its middle section.
+    Raises: ValueError: fill ratios outside (0, 1], no modes, or fewer than three meshes.
+    Validity: small planar waves without viscosity on a circular surface, that is g much smaller than
+    omega^2 a; the ends are flat and the section is the same along the shaft, so gravity across it drives no
+    others.
+    Source: Eq. 10 of the liquid-ring paper with the inertia that it leaves out; derived in `section_system`.
+    """
+    fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
+    if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)) or modes < 1:
+        raise ValueError("fill_ratio must lie within (0, 1], and at least one mode must be asked for")
+    meshes = Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc, modes=modes))
+    if len(meshes.cells) < 3:
+        raise ValueError("cells must list at least three meshes, finest first")
+    radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
+    found = np.array([[_lowest(meshes, float(a), level, modes) for level in meshes.levels] for a in radii])
+    widths = [
+        [meshes.half_width(values, float(a)) for values in at.T] for a, at in zip(radii, found, strict=True)
+    ]
+    return _SloshingModes(
+        fill_ratio=fills,
+        surface_radius=radii,
+        frequency_ratio=Estimate(value=found[:, 0].copy(), uncertainty=np.array(widths)),
+    )
+
+
+def default_sloshing_cells(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, int], ...]:
+    """Three meshes that keep the lowest four frequencies of a chamber within 1e-4.
+
+    Args: `disc`: the disc; only its central angle counts. `modes`: how many are wanted; each has half a wave
+        more along the angle than the one before.
+    Returns: Cells along the radius and the angle, finest first.
+    Source: about five cells a wave on the coarsest mesh bring a quadratic element into its asymptotic range.
+    """
+    radial, angular = default_cells(disc=disc)
+    more = max(2, -(-4 * modes // angular) * 2)
+    return tuple((more * radial // k, more * angular // k) for k in (1, 2, 4))
+
+
+def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ...]:
+    """Fills at which a natural frequency equals the speed, s_n(x) = 1, whatever the speed.
+
+    Args: `modes`: how many of the lowest modes are looked at; higher ones resonate in thinner rings and are
+        damped more.
+    Returns: Mode number (from 1) and fill ratio of each, by mode.
+    Raises: ValueError: no modes.
+    Source: `sloshing_modes`; the frequencies grow with the fill.
+    """
+    if modes < 1:
+        raise ValueError("at least one mode must be asked for")
+    top = disc.max_fill_ratio
+    meshes = Meshes(disc=disc, cells=default_sloshing_cells(disc=disc, modes=modes)[1:])
+    tolerance = 1e-6 if disc.geometry is None else 1e-3
+
+    def excess(logarithm: float, mode: int) -> float:
+        a = float(surface_radius(disc=disc, fill_ratio=np.exp(logarithm)))
+        return float(_lowest(meshes, a, 0, modes)[mode - 1] - 1)
+
+    found = []
+    low, high = np.log(1e-4 * top), float(np.log(top))
+    for mode in range(1, modes + 1):
+        if excess(high, mode) > 0 > excess(low, mode):
+            high = float(brentq(excess, low, high, args=(mode,), xtol=tolerance))
+            found.append((mode, float(np.exp(high))))
+    return tuple(found)
+
+
+def _lowest(meshes: Meshes, a: float, level: int, modes: int) -> FloatArray:
+    ratios = meshes.system(a, level)[0].natural_frequencies()
+    if ratios.size < modes:
+        raise ValueError(f"a mesh has {ratios.size} modes, not {modes}: give it more cells along the surface")
+    return ratios[:modes]
+
+
+SMALL: Final = 0.3
+"""Displacement of the surface over the depth of the ring up to which waves count as small."""
+FREQUENCY_UNCERTAINTY: Final = 0.06
+"""U (95 %), relative, of a natural frequency by linear theory for waves of the height that experiments have.
+
+Bias of 2.2 % and twice the scatter of 2.8 % over every second tank of Addington, Dynamics of fuel in tanks,
+College of Aeronautics report CoA/N-99 (1960), without the scatter of the measurements themselves: real waves
+are slower in deep liquid and faster in shallow one.  The case `measured_waves` calculates it again.
+"""
+LOWEST_TRUE: Final = 1 - FREQUENCY_UNCERTAINTY
+"""Lower end of a natural frequency, over that of linear theory."""
+HIGHEST_TRUE: Final = 1 + FREQUENCY_UNCERTAINTY
+_GRID: Final = 25
+_ROUNDS: Final = 3
+_WITHIN: Final = 9
+"""Points between the neighbours of an extreme, in each round."""
+
+
+def swept(
+    response: Callable[[FloatArray], FloatArray], *, frequency_ratio: float, natural: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Extremes of a forced response while all natural frequencies vary within `FREQUENCY_UNCERTAINTY`.
+
+    Frequencies that are q times as high answer to a force at s as those of the theory do at s/q.
+    Args:
+        response: takes frequency ratios of the force, shape (m,), to values, shape (m, quantities).
+        frequency_ratio: s of the force, over the speed.
+        natural: natural frequencies over the speed: peaks are looked for there.
+    Returns: Lower and upper ends, shape (quantities,) each: seldom as far from the value on both sides.
+    """
+    low, high = frequency_ratio / HIGHEST_TRUE, frequency_ratio / LOWEST_TRUE
+    peaks = natural[(natural > low) & (natural < high)]
+    places = np.unique([*np.linspace(low, high, _GRID), *peaks])
+    values = response(places)
+    for _ in range(_ROUNDS):
+        found = np.unique([*values.argmin(axis=0), *values.argmax(axis=0)])
+        ends = zip(
+            places[np.maximum(found - 1, 0)], places[np.minimum(found + 1, places.size - 1)], strict=True
+        )
+        between = np.setdiff1d([x for end in ends for x in np.linspace(*end, _WITHIN)], places)
+        order = np.argsort(np.append(places, between))
+        values = np.concatenate([values, response(between)])[order]
+        places = np.append(places, between)[order]
+    return values.min(axis=0), values.max(axis=0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SloshingResponse:
+    """Forced planar oscillation of the liquid in one chamber, along an array of fill ratios."""
+
+    fill_ratio: FloatArray
+    """x, shape (n,)."""
+    surface_radius: FloatArray
+    """a, m, shape (n,)."""
+    amplification: Estimate
+    """Change of the chamber's moment over that of a surface which follows gravity at once, shape (n,).
+
+    Half-widths are those of the solution alone, here and below; the intervals hold them, too."""
+    amplification_interval: FloatArray
+    """Its lower and upper end (95 %), shape (n, 2), natural frequencies being known to
+    `FREQUENCY_UNCERTAINTY` only.  Where a mode may meet the force, the upper end rests on the damping."""
+    pressure_amplification: Estimate
+    """Change of the mean pressure on the outer wall over that under such a surface, shape (n,)."""
+    pressure_amplification_interval: FloatArray
+    """The same of it, shape (n, 2)."""
+    surface_amplitude: Estimate
+    """Largest displacement of the surface, m zero-to-peak, shape (n,)."""
+    surface_amplitude_interval: FloatArray
+    """The same of it, m, shape (n, 2)."""
+    damped_share: FloatArray
+    """Amplification with the walls' Stokes layers over that without any viscosity, shape (n,): near 1 away
+    from resonance, and where it is small the peak rests on an estimate of the damping."""
+    status: Status
+
+
+def sloshing_response(
+    *,
+    disc: Disc,
+    fill_ratio: npt.ArrayLike,
+    angular_velocity: float,
+    kinematic_viscosity: float,
+    gravity: float,
+    frequency_ratio: float = 1.0,
+    cells: tuple[tuple[int, int], ...] | None = None,
+) -> SloshingResponse:
+    """Answer of the liquid in one chamber to gravity that turns in the disc's frame.
+
+    (-s^2 S + 2 i s C + A + i s sqrt(i s E) W) psi = i s F with G = g r exp(i (angle + s omega t)), E =
+    nu/(omega R2^2); the reference is A psi = i s F, a surface always across the sum of both fields.  The
+    wall pressure follows from psi by p'/rho = G + c - i s phi - 2 psi.
+    Args:
+        fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
+        kinematic_viscosity: nu, m^2/s, zero or more; zero leaves resonance without a limit.
+        frequency_ratio: s, above 0; 1 for gravity.
+        cells: three meshes or more, finest first; default those of `sloshing_modes`.
+    Returns: SloshingResponse; status says where the waves might not be small, or gravity leaves no ring.
+    Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
+    Validity: small planar waves, of an imported chamber those of its middle section: waves along the shaft,
+        and what a section that changes along it does to them, are left out; thin Stokes layers on all walls
+        without the Coriolis force, which makes the damping, and with it a peak, good to a factor of two.
+    Source: derived in `section_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
+    """
+    fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
+    _check(fills, angular_velocity, kinematic_viscosity, gravity, frequency_ratio)
+    radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
+    meshes = Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc))
+    ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
+
+    def on_mesh(radius: float, level: int) -> FloatArray:
+        system, unit = meshes.system(radius, level)
+        answers = _answers(system, np.array([frequency_ratio]), ekman)[0]
+        return np.asarray(answers * [1.0, unit / disc.outer_radius, 1.0, 1.0])
+
+    found = np.array([[on_mesh(float(a), level) for level in meshes.levels] for a in radii])
+    widths = np.array(
+        [[meshes.half_width(values, float(a)) for values in at.T] for a, at in zip(radii, found, strict=True)]
+    )
+    scale = gravity / angular_velocity**2
+    amplitude = Estimate(value=scale * found[:, 0, 1], uncertainty=scale * widths[:, 1])
+    ends = np.array([_interval(meshes, float(a), frequency_ratio, ekman) for a in radii])
+    # At either end the solution errs by about the same share as in the middle.
+    share = (widths / found[:, 0])[:, [0, 1, 3]]
+    ends *= 1 + np.stack([-np.minimum(share, 1.0), share], axis=1)
+    return SloshingResponse(
+        fill_ratio=fills,
+        surface_radius=radii,
+        amplification=Estimate(value=found[:, 0, 0].copy(), uncertainty=widths[:, 0]),
+        amplification_interval=ends[:, :, 0].copy(),
+        pressure_amplification=Estimate(value=found[:, 0, 3].copy(), uncertainty=widths[:, 3]),
+        pressure_amplification_interval=ends[:, :, 2].copy(),
+        surface_amplitude=amplitude,
+        surface_amplitude_interval=scale * ends[:, :, 1],
+        damped_share=found[:, 0, 2].copy(),
+        status=_status(fills, disc.outer_radius - radii, scale * ends[:, 1, 1], scale - radii),
+    )
+
+
+def _interval(meshes: Meshes, radius: float, ratio: float, ekman: float) -> FloatArray:
+    """Ends by natural frequencies of moment, displacement (as `_answers`) and wall pressure, shape (2, 3)."""
+    # Peaks are looked for on the mesh in the middle, if there are three.
+    system, _ = meshes.system(radius, len(meshes.levels) // 3)
+
+    def response(ratios: FloatArray) -> FloatArray:
+        return _answers(system, ratios, ekman)[:, [0, 1, 3]]
+
+    return np.stack(swept(response, frequency_ratio=ratio, natural=system.natural_frequencies()))
+
+
+def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float, ratio: float) -> None:
+    if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)):
+        raise ValueError("fill_ratio must lie within (0, 1], and there must be at least one")
+    if not (np.isfinite([omega, ratio]).all() and omega > 0 and ratio > 0):
+        raise ValueError("angular_velocity and frequency_ratio must be finite and above zero")
+    if not (np.isfinite([viscosity, gravity]).all() and viscosity >= 0 and gravity >= 0):
+        raise ValueError("kinematic_viscosity and gravity must be finite and not negative")
+
+
+def _answers(system: SloshingSystem, ratios: FloatArray, ekman: float) -> FloatArray:
+    """Amplification, largest displacement for g/omega^2 = 1 (any unit of length), share left by damping, and
+    amplification of the wall pressure, by rows along the ratios.
+    """
+    s = ratios[:, None, None]
+    forcing = 1j * s * (system.outflow[1] + 1j * system.outflow[2])[:, None]
+    swinging = -(s**2) * system.kinetic + 2j * s * system.coriolis + system.centrifugal
+    layers = 1j * s * np.sqrt(1j * s * ekman) * system.wall_loss
+    damped, free, still = (
+        np.linalg.solve(matrix, forcing)[:, :, 0].T
+        for matrix in (swinging + layers, swinging, system.centrifugal.astype(np.complex128))
+    )
+    # Of the swing of the liquid's first moment, both components.
+    moment, reference, undamped = (
+        np.linalg.norm(system.outflow[1:] @ psi, axis=0) for psi in (damped, still, free)
+    )
+    displacement = np.abs(system.flux @ damped).max(axis=0) / ratios
+    pressure = (
+        system.wall_drive - 1j * ratios * (system.potential @ damped) + 2 * (system.surface_mean @ damped)
+    )
+    columns = (moment / reference, displacement, moment / undamped, np.abs(pressure / system.wall_drive))
+    return np.stack(columns, axis=1)
+
+
+def _status(fills: FloatArray, depth: FloatArray, amplitude: FloatArray, beyond: FloatArray) -> Status:
+    if np.any(beyond >= 0):
+        x = fills[np.argmax(beyond)]
+        return Status(
+            code=StatusCode.NO_RING,
+            text=f"at a fill ratio of {x:.3g} gravity is stronger than omega^2 a: turn the disc faster",
+        )
+    share = amplitude / depth
+    worst = int(np.argmax(share))
+    if share[worst] > SMALL:
+        return Status(
+            code=StatusCode.OUT_OF_RANGE,
+            text=(
+                f"at a fill ratio of {fills[worst]:.3g} waves may reach {share[worst]:.2g} of the ring's "
+                "depth, too high for this theory: avoid that fill, or turn the disc faster"
+            ),
+        )
+    return Status()

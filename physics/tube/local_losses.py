@@ -1,0 +1,344 @@
+"""Losses at places of the tube: its ends and its bends, by finite elements where flow is laminar.
+
+**Ends** cost what stands here beyond the kinetic energy that the "+1" in k + 1 already counts.
+
+**Bends**, smooth ones: by correlation where flow is turbulent. What a laminar bend costs beyond the friction
+of its own arc was computed for r = 2 d and 90 degrees at rest: 0.18, 0.55, 0.94 and 1.14 at Re 20, 50, 100
+and 200 (`verification.reference.bent_tube`). K_0 De^2/(De^2 + De_0^2) with the Dean number De = Re
+sqrt(d/2r) meets them within 0.05; other shapes are scaled by it and carry a wide half-width. In a tube that
+turns, curvature acts as rotation, R' = R +- s with s = (4/3) Re d/2r (`verification.reference.bent_tube`): a
+bend then costs more or less by its sense of turning, which a scene does not give.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from fluids.fittings import entrance_distance, entrance_rounded, entrance_sharp
+from scipy.interpolate import CubicSpline
+
+from ringbalance.physics.results import Estimate, Status, StatusCode
+from ringbalance.physics.tube.friction import turbulent_share
+from ringbalance.physics.tube.rotation_table import laminar_ratio
+from ringbalance.scene.arrays import BoolArray, FloatArray, clipped, plain
+from ringbalance.scene.models import Bend, Tube
+
+LAMINAR_ENTRY_LENGTH: Final = 0.056
+"""Entry length of laminar flow in diameters per Re."""
+ROTATING_PROFILE_UNCERTAINTY: Final = 0.15
+"""Expanded uncertainty (95 %) of the kinetic-energy factor of laminar flow in rotation."""
+_TURBULENT_KINETIC_FACTOR: Final = 1.06
+"""alpha of the 1/7-power profile."""
+_CREEPING: Final = 6 * np.pi
+_OTHER_ENTRANCE: Final = 0.15
+"""Spread of the laminar loss of an entrance that is not sharp: published excesses run from 0.2 to 0.33."""
+_SCALE, _LIMIT = 5.0, 2000.0
+_DOMAIN = 1e-3
+"""Relative: reservoir and tube are cut off at a distance, the edge is resolved down to 1e-4 of the bore."""
+_BEYOND_TABLE = 0.3
+"""Expanded uncertainty (95 %) of K added above the table, where steady laminar flow is not to be expected."""
+_FULL: Final = 2500.0
+"""Re at which it is whole, rising from the end of the table on: errors of k, a share of it, do not step."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _EndTable:
+    """Interpolants of one end over a = ln(1 + Re/5)."""
+
+    scaled: CubicSpline
+    """Spline of K Re/(1 + Re/5)^n, n = 1 for the entrance, 0 for the exit: slowly varying."""
+    numerical: FloatArray
+    """Discretisation uncertainty of K Re at the nodes."""
+    nodes: FloatArray
+    power: int
+    interpolation_error: float
+    """Largest gap of K Re to the points solved between nodes, over 1 + Re/5."""
+    rows: tuple[Mapping[str, str], ...]
+
+
+@lru_cache(maxsize=2)
+def end_table(end: str) -> _EndTable:
+    """The table of the "entrance" or the "exit", as it comes with the package."""
+    path = resources.files("ringbalance.physics") / "data" / "end_losses.csv"
+    lines = [x for x in path.read_text(encoding="utf-8").splitlines() if not x.startswith("#")]
+    rows = [row for row in csv.DictReader(lines) if row["end"] == end]
+    power = 1 if end == "entrance" else 0
+    nodes = [row for row in rows if row["kind"] == "node"]
+    a, y = (np.array([float(row[name]) for row in nodes]) for name in ("a", "fine"))
+    spline = CubicSpline(a, y * np.exp(-power * a))
+    checks = [row for row in rows if row["kind"] == "check"]
+    at, solved = (np.array([float(row[name]) for row in checks]) for name in ("a", "fine"))
+    gaps = np.abs(spline(at) * np.exp(power * at) - solved) * np.exp(-at)
+    return _EndTable(
+        scaled=spline,
+        numerical=np.array([float(row["uncertainty"]) for row in nodes]),
+        nodes=a,
+        power=power,
+        interpolation_error=float(gaps.max()),
+        rows=tuple(rows),
+    )
+
+
+def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
+    re = np.asarray(reynolds, dtype=np.float64)
+    if not (np.all(re > 0.0) and np.all(np.isfinite(re))):
+        raise ValueError("reynolds must be finite and above zero")
+    table = end_table(end)
+    inside = np.minimum(re, _LIMIT)
+    a = np.log1p(inside / _SCALE)
+    value = table.scaled(a) * np.exp(table.power * a) / inside
+    uncertainty_95 = np.interp(a, table.nodes, table.numerical) + table.interpolation_error * np.exp(a)
+    beyond, risen = re > _LIMIT, clipped((re - _LIMIT) / (_FULL - _LIMIT), 0.0, 1.0)
+    status = Status()
+    if np.any(beyond):
+        text = (
+            f"above Re = {_LIMIT:.0f} the value there is kept; use the turbulent loss where flow is turbulent"
+        )
+        status = Status(code=StatusCode.OUT_OF_RANGE, text=text)
+    return Estimate(
+        value=np.asarray(value, dtype=np.float64),
+        uncertainty=np.asarray(
+            uncertainty_95 / inside + _DOMAIN * np.abs(value) + _BEYOND_TABLE * risen**2 * (3 - 2 * risen),
+            dtype=np.float64,
+        ),
+        status=status,
+    )
+
+
+def laminar_entrance_loss(*, reynolds: npt.ArrayLike) -> Estimate:
+    """Loss of a sharp-edged entrance from a large reservoir, laminar.
+
+    K_ent = 2 (p_reservoir - p_tube)/(rho U^2) with the developed line of p carried back to the entrance; it
+    contains the developed stream's kinetic factor 2.  Creeping: 0.986 * 6 pi/Re.
+    Returns: Estimate of K_ent, the same shape; OUT_OF_RANGE above Re = 2000.
+    Raises: ValueError: a Reynolds number that is not finite and above zero.
+    Range: 0 < Re <= 2000, tube long enough for flow to develop.
+    Source: finite elements, `end_losses`.
+    """
+    return _end_loss("entrance", reynolds)
+
+
+def laminar_exit_loss(*, reynolds: npt.ArrayLike) -> Estimate:
+    """Loss of a sharp-edged exit into a large reservoir, laminar and developed; otherwise as the entrance.
+
+    K_exit = 2 (p_mouth - p_reservoir)/(rho U^2) with the developed line of p carried on to the mouth; about
+    zero at high Re, where the stream leaves with the pressure of the reservoir.
+    """
+    return _end_loss("exit", reynolds)
+
+
+def kinetic_factor(
+    *, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0, friction_ratio: npt.ArrayLike = 1.0
+) -> FloatArray:
+    """Kinetic-energy factor alpha of the developed profile: laminar 2, less in rotation; turbulent 1.06.
+
+    Laminar alpha = 1.2 + 0.8/F^1.5, smooth between laminar and turbulent: Coriolis forces blunt the profile,
+    down to u ~ (depth along the axis of rotation)^1.5 in fast rotation, which has alpha = 1.199.
+    Args: `critical_ratio`: critical Re over the straight tube's, broadcasts. `friction_ratio`: F of developed
+        laminar flow, broadcasts.
+    Range: laminar within `ROTATING_PROFILE_UNCERTAINTY` of finite-element solutions for R Re up to 3e5.
+    Source: integral of (w/u)^3 over the bore: exact for Poiseuille flow and for fast rotation without
+        inertia, our interpolation between; 1/7-power profile.
+    """
+    turned = turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
+    laminar = _laminar_kinetic_factor(np.asarray(friction_ratio, dtype=np.float64))
+    return np.asarray((1 - turned) * laminar + _TURBULENT_KINETIC_FACTOR * turned, dtype=np.float64)
+
+
+def _laminar_kinetic_factor(friction_ratio: FloatArray) -> FloatArray:
+    return np.asarray(1.2 + 0.8 * friction_ratio**-1.5)
+
+
+def _rounded(bore: float, radius: float) -> float:
+    return float(entrance_rounded(Di=bore, rc=radius, method="Rennels"))
+
+
+_ROUNDED: Final = np.vectorize(_rounded, otypes=[np.float64])
+
+
+def _turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:
+    """Loss coefficient of the entrance at high Re, and its expanded uncertainty (95 %).
+
+    Args: `tube`: the tube; `entrance` is "sharp", "rounded" (with `entrance_radius`) or "projecting".
+    Returns: K and its half-width: the spread of the published methods, 0.5 to 0.57 for a sharp edge and,
+        because the wall thickness of a projecting tube is not known, 0.5 to 1.1 there.
+    Source: Rennels and Hudson, Pipe Flow (2012), for sharp and rounded, Crane TP-410 for projecting, through
+        `fluids.fittings`.
+    """
+    if tube.entrance == "sharp":
+        return float(entrance_sharp(method="Rennels")), 0.08
+    if tube.entrance == "rounded":
+        loss: float = plain(_ROUNDED(tube.bore, tube.entrance_radius))
+        return loss, 0.03 + 0.2 * loss
+    return float(entrance_distance(Di=tube.bore, method="Crane")), 0.3
+
+
+def entrance_loss(
+    *, tube: Tube, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """Entrance loss beyond the profile's kinetic energy, (p_reservoir - p_tube) 2/(rho u^2) - f L/d - alpha.
+
+    Laminar: K_ent - 2 of a sharp entrance by finite elements, turbulent: the entrance's K, blended over the
+    transition.
+    Args: `critical_ratio`: critical Re over the straight tube's, broadcasts.
+    Returns: K and its expanded uncertainty (95 %), of the broadcast shape.
+    Source: `laminar_entrance_loss`; an entrance that is not sharp has the same laminar value with a
+        wider half-width.
+    """
+    re = np.asarray(reynolds, dtype=np.float64)
+    turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
+    turbulent, half_width = _turbulent_entrance_loss(tube=tube)
+    table = laminar_entrance_loss(reynolds=re)
+    laminar = table.value - 2
+    unlike = 0.0 if tube.entrance == "sharp" else _OTHER_ENTRANCE + 0.2 * _CREEPING / re
+    uncertainty_95 = (1 - turned) * (table.uncertainty + unlike) + turned * half_width
+    gap = 2 * turned * (1 - turned) * (laminar - turbulent)
+    return (1 - turned) * laminar + turned * turbulent, np.hypot(uncertainty_95, gap)
+
+
+def exit_loss(
+    *,
+    tube: Tube,
+    reynolds: npt.ArrayLike,
+    critical_ratio: npt.ArrayLike = 1.0,
+    friction_ratio: npt.ArrayLike = 1.0,
+) -> tuple[FloatArray, FloatArray]:
+    """What a laminar exit adds to the "+1": alpha - 1 + K_exit, as the stream carries alpha u^2/2 away.
+
+    Turbulent it is zero, because there the "+1" is the whole exit loss.
+    Args: `tube`: the tube; one too short for a developed laminar profile widens the half-width. `reynolds`:
+        Re, any shape, positive. `critical_ratio`: critical Re over the straight tube's, broadcasts.
+        `friction_ratio`: F of developed laminar flow, broadcasts.
+    Returns: K and its expanded uncertainty (95 %), of the broadcast shape.
+    Source: alpha of `kinetic_factor`; K_exit from `laminar_exit_loss`, which is for the profile
+        without rotation.
+    """
+    re, ratio = (np.asarray(v, dtype=np.float64) for v in (reynolds, friction_ratio))
+    turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
+    undeveloped = np.minimum(1.0, LAMINAR_ENTRY_LENGTH * re * tube.bore / tube.length)
+    table = laminar_exit_loss(reynolds=re)
+    blunted = ROTATING_PROFILE_UNCERTAINTY * np.minimum(1.0, (ratio - 1) / 0.1)
+    uncertainty_95 = (1 - turned) * (table.uncertainty + 0.3 * undeveloped + blunted) + 0.06 * turned
+    gap = 2 * turned * (1 - turned)
+    carried = _laminar_kinetic_factor(ratio) - 1
+    return (1 - turned) * (carried + table.value), np.hypot(uncertainty_95, gap)
+
+
+_BEND_UNCERTAINTY: Final = 0.25
+"""Expanded uncertainty (95 %) of a turbulent bend's loss, relative: the spread of the published methods."""
+_LAMINAR_BEND_UNCERTAINTY: Final = 0.6
+"""The same of what a laminar bend adds at rest: for shapes other than the one that was computed."""
+_LARGEST_EXCESS: Final = 1.25
+"""K_0, for 90 degrees and r = 2 d."""
+_HALF_WAY_DEAN: Final = 28.0
+"""De_0."""
+MOMENTUM_FACTOR: Final = 4 / 3
+"""Mean of u^2 over U^2 in Poiseuille flow."""
+
+
+def bend_loss(
+    *,
+    bend: Bend,
+    bore: float,
+    friction_factor: npt.ArrayLike,
+    reynolds: npt.ArrayLike,
+    rotation_reynolds: npt.ArrayLike = 0.0,
+    critical_ratio: npt.ArrayLike = 1.0,
+) -> FloatArray:
+    """Loss coefficient of one bend, with the friction of its own arc in it.
+
+    K = f phi r/d + (1 - w) K_lam + w (K_tur - f phi r/d), w from laminar to turbulent;
+    K_lam = K_0 (phi/90 deg) 2 sqrt(d/2r) De^2/(De^2 + De_0^2) s^2/(s^2 + R^2).
+    Args:
+        bend: angle phi and centre-line radius r.
+        friction_factor: f (Darcy) of the straight tube at rest at the same Re, any shape.
+        critical_ratio: critical Re over the straight tube's, broadcasts.
+    Range: computed for r = 2 d and 90 degrees up to Re 200 at rest, and at Re 200, R 118; elsewhere scaled.
+    Source: finite elements, see the head of this module; `_turbulent_bend_loss`.
+    """
+    f, re, rotation, turned = _broadcast(friction_factor, reynolds, rotation_reynolds, critical_ratio)
+    arc = f * bend.angle * bend.radius / bore
+    rest, shift = _laminar_excess(bend, bore, re)
+    added = rest * shift**2 / (shift**2 + rotation**2)
+    turbulent = _turbulent_bend_loss(bend=bend, bore=bore, friction_factor=f)
+    return np.asarray(arc + (1 - turned) * added + turned * (turbulent - arc))
+
+
+def bend_uncertainty(
+    *,
+    bend: Bend,
+    bore: float,
+    friction_factor: npt.ArrayLike,
+    reynolds: npt.ArrayLike,
+    rotation_reynolds: npt.ArrayLike = 0.0,
+    critical_ratio: npt.ArrayLike = 1.0,
+) -> FloatArray:
+    """Expanded uncertainty (95 %) of `bend_loss`; the friction of the arc counts as known."""
+    f, re, rotation, turned = _broadcast(friction_factor, reynolds, rotation_reynolds, critical_ratio)
+    rest, shift = _laminar_excess(bend, bore, re)
+    more, less = laminar_ratio(reynolds=re, rotation_reynolds=np.abs([rotation + shift, rotation - shift]))
+    turning = 64 / re * bend.angle * bend.radius / bore * (more - less) / 2
+    laminar = np.hypot(_LAMINAR_BEND_UNCERTAINTY * rest, turning)
+    turbulent = _turbulent_bend_loss(bend=bend, bore=bore, friction_factor=f)
+    return np.asarray((1 - turned) * laminar + turned * _BEND_UNCERTAINTY * turbulent)
+
+
+def _broadcast(
+    friction_factor: npt.ArrayLike,
+    reynolds: npt.ArrayLike,
+    rotation_reynolds: npt.ArrayLike,
+    critical_ratio: npt.ArrayLike,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """The first three in one shape, and the share of turbulent flow."""
+    f, re, rotation = np.broadcast_arrays(
+        *(np.asarray(v, dtype=np.float64) for v in (friction_factor, reynolds, rotation_reynolds))
+    )
+    return f, re, rotation, turbulent_share(reynolds=re, critical_ratio=critical_ratio)
+
+
+def _laminar_excess(bend: Bend, bore: float, re: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What a laminar bend at rest adds to the friction of its arc, and s, its curvature as a rotation."""
+    tight = bore / (2 * bend.radius)
+    dean, shift = re * np.sqrt(tight), MOMENTUM_FACTOR * re * tight
+    shape = bend.angle / (math.pi / 2) * np.sqrt(tight) / 0.5
+    return _LARGEST_EXCESS * shape * dean**2 / (dean**2 + _HALF_WAY_DEAN**2), shift
+
+
+def _turbulent_bend_loss(*, bend: Bend, bore: float, friction_factor: npt.ArrayLike) -> FloatArray:
+    """Loss coefficient of one bend in turbulent flow, with the friction of its own arc in it.
+
+    K = f phi r/d + (0.10 + 2.4 f) sin(phi/2) + 6.6 f (sqrt(sin(phi/2)) + sin(phi/2)) (d/r)^(4 phi/pi)
+    Args: `bend`: angle phi and centre-line radius r. `friction_factor`: f (Darcy) of the straight tube at the
+        same Re, any shape.
+    Range: turbulent flow in smooth tubes, phi up to 180 degrees, r/d of at least 0.5.
+    Source: Rennels and Hudson, Pipe Flow (2012), as in `fluids.fittings.bend_rounded`, which takes no arrays.
+    """
+    f, sine = np.asarray(friction_factor, dtype=np.float64), np.sin(bend.angle / 2)
+    tight = (bore / bend.radius) ** (4 * bend.angle / math.pi)
+    turning = (0.10 + 2.4 * f) * sine + 6.6 * f * (np.sqrt(sine) + sine) * tight
+    return np.asarray(f * bend.angle * bend.radius / bore + turning, dtype=np.float64)
+
+
+def bend_in_range(*, bend: Bend, bore: npt.ArrayLike) -> BoolArray:
+    """Whether a bend lies within the formula's range: an angle up to 180 degrees and r/d of at least 0.5."""
+    return np.asarray((bend.angle <= math.pi * (1 + 1e-9)) & (bend.radius >= np.asarray(bore) / 2))
+
+
+def straight_length(*, tube: Tube) -> float:
+    """Length of the tube, m, without the arcs of its bends, whose friction their loss includes.
+
+    Raises: ValueError: arcs longer than the tube.
+    """
+    straight = tube.length - sum(b.angle * b.radius for b in tube.bends)
+    if np.any(straight < -1e-9 * tube.length):
+        raise ValueError("the bends' arcs are longer than the tube: lengthen tube.length or take a bend away")
+    longest: float = plain(np.maximum(straight, 0.0))
+    return longest

@@ -1,0 +1,403 @@
+"""What each thing that a chamber's model may leave out is worth, before any solve, and where models hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ringbalance.mesh.geometry import (
+    chamber_volume,
+    half_angle,
+    head_square,
+    liquid_area,
+    surface_radius,
+    wall_square,
+)
+from ringbalance.physics.gas import pressure_factor
+from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
+from ringbalance.physics.results import Status, StatusCode
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE, SMALL
+from ringbalance.reduced_model.chamber.tilted_ring import closed_ring
+from ringbalance.reduced_model.chamber.values import (
+    by_closed_form,
+    by_quadrature,
+    drawing_shares,
+    share_across,
+)
+from ringbalance.scene.arrays import FloatArray, distinct
+from ringbalance.scene.models import Scene
+from ringbalance.scene.rules.working import LARGEST_COMPRESSION, METAL_DENSITY, bulk_modulus
+
+_NO_BASIS: Final = "the scene gives no basis for an estimate"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contribution:
+    """What leaving one thing out is worth, judged before anything is solved."""
+
+    value: float | None
+    """Relative to the quantity that it changes; None where the scene gives no basis for an estimate."""
+    formula: str
+    """How it is estimated, with its numbers."""
+    time: float | None = None
+    """Valve-open time that it costs of a long injection, s; None for a term that is no time."""
+    default_range: tuple[float, float] | None = None
+    """Value at both ends of a default range, where the scene does not give the numbers."""
+
+    def above(self, tolerance: float) -> bool:
+        """Whether it exceeds a tolerance."""
+        return self.value is not None and self.value > tolerance
+
+    def reason(self, tolerance: float | None) -> str:
+        """Formula and value, compared with a tolerance where one is given; the same text in every command."""
+        return f"{self.formula}; {self._comparison(tolerance)}"
+
+    def _comparison(self, tolerance: float | None) -> str:
+        if self.default_range is not None:
+            low, high = (percent(end) for end in self.default_range)
+            return f"not in the scene: {low if low == high else f'{low} to {high}'} over a default range"
+        if self.value is None:
+            return _NO_BASIS
+        if not tolerance:
+            return percent(self.value)
+        side = "above" if self.above(tolerance) else "below"
+        return f"{percent(self.value)} is {side} the tolerance of {percent(tolerance)}"
+
+
+def percent(fraction: float) -> str:
+    """A fraction in per cent, to two digits."""
+    value = 100 * fraction
+    return f"{value:.0f} %" if 99.5 <= abs(value) < 1e6 else f"{value:.2g} %"
+
+
+Terms = Mapping[str, Contribution]
+
+PLATES: Final = "plates between the chambers"
+RIPPLE: Final = "gravity, ripple at 1x"
+MEAN: Final = "gravity, mean over a turn"
+SLOSHING: Final = "sloshing at 1x"
+
+SURFACE_TENSION: Final = 0.073
+"""Of water at 20 degC against air, N/m: taken for every ordinary liquid, as an upper bound."""
+METAL_SURFACE_TENSION: Final = 0.72
+"""Of gallium, N/m: taken above `METAL_DENSITY`."""
+_MODES: Final = 24
+"""Of a chamber; what higher ones hold of gravity's tilt falls with the square of their number."""
+_SWING_FLOOR: Final = 0.2
+"""Of the moment's ripple: by so much the estimate of the amplification may be off."""
+_CORIOLIS: Final = 2.0
+"""Of the pressure's ripple, times the swing: 2 omega times the flux along the ring, which is about that under
+which a free particle follows gravity however thin the ring."""
+
+
+def surface_tension(scene: Scene) -> float:
+    """Surface tension to include; the scene gives none.
+
+    Returns: N/m, an upper bound.
+    Source: IAPWS R1-76(2014) for water; gallium near its melting point for metals.
+    """
+    return METAL_SURFACE_TENSION if scene.liquid.density > METAL_DENSITY else SURFACE_TENSION
+
+
+def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
+    """Share of the liquid's pressure at R2 that surface tension can make, sigma (2/B + 1/(a alpha) + 1/a)/P.
+
+    The moment hardly feels it: the same share of a surface's shape, taken as a whole.
+    Returns: Shares by "pressures" and "moments", along the fills, which are above zero.
+    Source: contact line over area of the free surface, contact angle zero, plus the ring's own curvature.
+    """
+    disc, square = scene.disc, scene.rotor.speed**2
+    a = surface_radius(disc=disc, fill_ratio=fills)
+    alpha = half_angle(disc=disc, radius=a)
+    pressure = scene.liquid.density * square * (disc.outer_radius**2 - a**2) / 2
+    jump = surface_tension(scene) * (2 / disc.axial_width + 1 / (a * alpha) + 1 / a)
+    # A meniscus of length sqrt(sigma/(rho omega^2 a)) along each wall moves its own cross-section of liquid.
+    length = np.sqrt(surface_tension(scene) / (scene.liquid.density * square * a))
+    depth = disc.outer_radius - a
+    moved = length**2 * (1 / (a * alpha * depth) + 2 / (disc.axial_width * depth))
+    return {"pressures": jump / pressure, "moments": moved}
+
+
+def wall_layers(scene: Scene, fills: FloatArray) -> tuple[FloatArray, float]:
+    """Estimated contribution of friction at the walls, relative, along the fills; and the Ekman number.
+
+    Source: g/(omega^2 a) sqrt(Ek), Ek = nu/(omega R2^2), of the liquid's swing on a horizontal shaft.
+    """
+    omega, a = abs(scene.rotor.speed), surface_radius(disc=scene.disc, fill_ratio=fills)
+    ekman = scene.liquid.kinematic_viscosity / (omega * scene.disc.outer_radius**2)
+    gravity = scene.environment.gravity if scene.environment.shaft == "horizontal" else 0.0
+    return gravity / (omega**2 * a) * ekman**0.5, ekman
+
+
+def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]:
+    """Contribution of what no model holds: surface tension, friction at the walls, waves of finite height.
+
+    An imported chamber has besides what its facets leave of smooth walls, and by how much its moment exceeds
+    that along its middle, for which moments and lambda are given.
+    Returns: Relative, of "pressures" (the wall's), "heads" and "moments", shape (n,) each; zero without
+        liquid.
+    Source: sum of the estimates, errors of one sign at worst.
+    """
+    found, wet = {}, fills > 0
+    common = wall_layers(scene, fills[wet])[0] + _wave_mean(scene, fills[wet])
+    drawn = drawing_shares(scene.disc, fills[wet])
+    aside = np.hypot(1.0, share_across(scene.disc, fills[wet])) - 1
+    tension = capillary_share(scene, fills[wet])
+    a = surface_radius(disc=scene.disc, fill_ratio=fills[wet])
+    # The same pressure of surface tension is more of a mean over a wall that is nearer to the surface.
+    nearer = head_square(disc=scene.disc, surface_radius=a) / wall_square(disc=scene.disc, surface_radius=a)
+    shares = {
+        "pressures": nearer * tension["pressures"] + common + drawn.wall_pressure,
+        "heads": tension["pressures"] + common + drawn.hydrostatic_pressure,
+        "moments": tension["moments"] + common + (drawn.moment + aside),
+    }
+    for part, share in shares.items():
+        found[part] = np.zeros(fills.shape)
+        found[part][wet] = share
+    return found
+
+
+class Swing(NamedTuple):
+    """Amplification of gravity's ripple, natural frequencies being known to `FREQUENCY_UNCERTAINTY`."""
+
+    lowest: FloatArray
+    largest: FloatArray
+
+
+def amplification(scene: Scene, fills: FloatArray | float) -> Swing:
+    """Estimate of how much the swinging liquid enlarges gravity's ripple, |1/(1 - (1 + i d)/s^2)|.
+
+    Returns: Factors along the fills; 1 on a vertical shaft.
+    Source: s^2 = k tanh(k ln(R2/a)), the lowest mode without Coriolis force, driven at s = 1; d, `_swing`.
+    """
+    if scene.environment.shaft == "vertical":
+        return Swing(np.ones(np.shape(fills)), np.ones(np.shape(fills)))
+    disc = scene.disc
+    depth = np.log(disc.outer_radius / surface_radius(disc=disc, fill_ratio=fills))
+    return _swing(scene, np.pi / disc.central_angle, depth, disc.central_angle / 2)
+
+
+def wave_height(scene: Scene, fills: FloatArray) -> FloatArray:
+    """Estimated height that gravity's waves may have, zero-to-peak, over the depth of the ring.
+
+    A surface across gravity alone, g/omega^2 sin(phi) and cos(phi), is taken apart into the modes of a
+    chamber with half-angle alpha, k = j pi/(2 alpha), each of which answers as in `amplification` with the
+    largest swing that its frequency's uncertainty allows. For the 90 deg of the liquid-ring paper within a
+    factor of three of finite elements, thin rings included; half circles from a quarter of them up.
+    """
+    if scene.environment.shaft == "vertical":
+        return np.zeros(np.shape(fills))
+    a = surface_radius(disc=scene.disc, fill_ratio=fills)[..., None]
+    alpha, mode = half_angle(disc=scene.disc, radius=a), np.arange(1, _MODES + 1)
+    k = mode * np.pi / (2 * alpha)
+    less, more = (alpha * np.sinc((k + sign) * alpha / np.pi) for sign in (-1, 1))
+    shares = np.abs(less + np.where(mode % 2, -more, more)) / alpha
+    answers = shares * _swing(scene, k, np.log(scene.disc.outer_radius / a), alpha).largest
+    # The two parts follow each other by a quarter of a turn.
+    height = np.hypot(answers[..., ::2].sum(axis=-1), answers[..., 1::2].sum(axis=-1))
+    tilt = scene.environment.gravity / scene.rotor.speed**2
+    return np.asarray(height * tilt / (scene.disc.outer_radius - a[..., 0]))
+
+
+def _swing(scene: Scene, k: FloatArray | float, depth: FloatArray, alpha: FloatArray | float) -> Swing:
+    """|1/(1 - (1 + i d)/s^2)| over what s may be, of modes cos(k phi) of rings ln(R2/a) deep.
+
+    d = (E/2)^(1/2) [2 R2/B + q/depth + (1 - q)/alpha], q = 2 k depth/sinh(2 k depth), is what Stokes layers
+    on ends, outer wall and plates take at s = 1, E = nu/(omega R2^2); at a peak within a factor of two of
+    finite elements.
+    Source: the layers of `sloshing_system` on phi = cosh(k ln(R2/r)) cos(k phi), plates at r = R2.
+    """
+    disc, twice = scene.disc, 2 * k * depth
+    ekman = scene.liquid.kinematic_viscosity / (abs(scene.rotor.speed) * disc.outer_radius**2)
+    shallow = -2 * twice * np.exp(-twice) / np.expm1(-2 * twice)
+    layers = 2 * disc.outer_radius / disc.axial_width + shallow / depth + (1 - shallow) / alpha
+    damping, square = np.sqrt(ekman / 2) * layers, k * np.tanh(k * depth)
+    ends = LOWEST_TRUE**2 * square, HIGHEST_TRUE**2 * square
+    low, high, nearest = (1 / np.hypot(1 - 1 / end, damping / end) for end in (*ends, np.clip(1.0, *ends)))
+    return Swing(np.minimum(low, high), np.asarray(nearest))
+
+
+def _wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
+    """Bound of what waves do to the means over a turn, relative: (eta/h)^2/4, at most 1.
+
+    In shallow waves the mean square of the velocity is g_c <eta^2>/h, of which Bernoulli's equation takes
+    half from the wall pressure and as much from the surface's mean place; <eta^2> is at most eta^2/2.
+    """
+    return np.minimum(wave_height(scene, fills) ** 2 / 4, 1.0)
+
+
+def chamber_contributions(scene: Scene, fills: FloatArray) -> Mapping[str, Terms]:
+    """Contributions to wall pressure and to moment with lambda, the largest over fills."""
+    rows = [_at(scene, float(x)) for x in fills]
+    return {part: _terms(scene, [row[part] for row in rows], part) for part in ("pressures", "moments")}
+
+
+def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
+    base = by_closed_form(scene, fill)
+    tilted = by_quadrature(scene, fill) if scene.environment.gravity else base
+    lowest, largest = (float(end) for end in amplification(scene, np.array(fill)))
+
+    def gravity(ripple: float, mean: float, swing: float) -> dict[str, float]:
+        return {RIPPLE: ripple, SLOSHING: ripple * swing, MEAN: mean}
+
+    return {
+        "pressures": gravity(
+            tilted.wall_pressure_ripple / base.wall_pressure,
+            abs(tilted.wall_pressure / base.wall_pressure - 1),
+            _CORIOLIS * max(1.0, largest),
+        ),
+        "moments": gravity(
+            tilted.moment_ripple / base.moment,
+            max(
+                abs(tilted.moment / base.moment - 1),
+                abs(tilted.moment_per_mass / base.moment_per_mass - 1),
+            ),
+            max(abs(lowest - 1), abs(largest - 1)) + _SWING_FLOOR,
+        ),
+    }
+
+
+def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
+    largest = {name: max((row[name] for row in rows), default=0.0) for name in (RIPPLE, SLOSHING, MEAN)}
+    disc = scene.disc
+    # Eqs. 1 and 2: S_c = theta (R2^2 - R1^2)/2, without plates.
+    sector = disc.central_angle / 2 * (disc.outer_radius**2 - disc.inner_radius**2)
+    bare = sector * disc.axial_width
+    strips = 1 - chamber_volume(disc=disc) / bare
+    pressures = part == "pressures"
+    first = "rho omega^2 G |R2 s_2 - a s|/P" if pressures else "rho B a^2 G |shape|/U"
+    swing = "2 max(1, |1/(1 - 1/s^2)|)" if pressures else "||1/(1 - 1/s^2)| - 1|"
+    known = percent(FREQUENCY_UNCERTAINTY)
+    found = (
+        (PLATES, strips, "1 - V/(B theta (R2^2 - R1^2)/2)"),
+        (RIPPLE, largest[RIPPLE], f"{first}, G = g/omega^2"),
+        (
+            SLOSHING,
+            largest[SLOSHING],
+            f"ripple times {swing}, s^2 = k tanh(k ln(R2/a)), k = pi/theta, s known to {known}",
+        ),
+        (MEAN, largest[MEAN], "order (G/a)^2, by quadrature"),
+    )
+    return {term: Contribution(value=float(value), formula=formula) for term, value, formula in found}
+
+
+FILLS: Final = (0.2, 0.5, 1.0)
+"""Shares of max_fill_ratio."""
+
+
+@lru_cache(maxsize=64)
+def chamber_fills(scene: Scene) -> FloatArray:
+    """Fill ratios at which a chamber is judged: those of the range at which gravity leaves a closed ring.
+
+    Returns: x, shape (n,); empty where there is none.
+    """
+    fills = range_fills(scene)
+    return fills[closed_ring(scene, fills)]
+
+
+def range_fills(scene: Scene) -> FloatArray:
+    """Fill ratios of `FILLS`, with the one at which sloshing is resonant where that lies within."""
+    fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), _resonant_fill(scene)
+    if resonant is None or not fills[0] < resonant < fills[-1]:
+        return fills
+    return distinct(np.append(fills, resonant))
+
+
+@lru_cache(maxsize=8)
+def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]]:
+    """Contributions to wall pressure and moment at the worst fill of the range, as `chamber_contributions`.
+
+    Returns: By "pressures" and "moments", over `chamber_fills`; over the whole range where no ring is closed.
+    """
+    closed = chamber_fills(scene)
+    return chamber_contributions(scene, closed if closed.size else range_fills(scene))
+
+
+def mean_gravity(scene: Scene) -> float:
+    """Estimated contribution of gravity to the means over a turn, wall pressure or moment."""
+    found = range_contributions(scene)
+    return max(found[part][MEAN].value or 0.0 for part in ("pressures", "moments"))
+
+
+def compression(scene: Scene, fills: FloatArray) -> FloatArray:
+    """By how much the liquid is denser on the outer wall, p/K, with the scene's gas pressure on it.
+
+    Returns: Shares along the fills; those above `LARGEST_COMPRESSION` are beyond every model here, and so
+        are velocities that such a pressure drives.
+    Source: p = f p_gas + rho omega^2 (R2^2 - a^2)/2; `scene.rules.working`.
+    """
+    column = hydrostatic_pressure(
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        inner=surface_radius(disc=scene.disc, fill_ratio=fills),
+        outer=scene.disc.outer_radius,
+    )
+    pressure = column + max(scene.gas.pressure, 0.0) * pressure_factor(scene)
+    return np.asarray(pressure / bulk_modulus(scene.liquid))
+
+
+def chamber_status(scene: Scene) -> Status:
+    """Whether linear sloshing, a closed ring and one density hold over the range of fills, by estimates."""
+    fills = chamber_fills(scene)
+    if fills.size == range_fills(scene).size:
+        dense = _dense(scene)
+        return _waves(scene, fills) if dense.ok else dense
+    lowest = f"above a fill ratio of {fills[0]:.3g} only" if fills.size else "at no fill of this scene"
+    return Status(
+        code=StatusCode.NO_RING if fills.size == 0 else StatusCode.OUT_OF_RANGE,
+        text=(
+            f"gravity leaves a closed ring {lowest}: elsewhere liquid runs along the wall every turn and no "
+            "model describes it; turn faster or fill more"
+        ),
+    )
+
+
+def _dense(scene: Scene) -> Status:
+    share = float(compression(scene, np.array([scene.disc.max_fill_ratio]))[0])
+    if share <= LARGEST_COMPRESSION:
+        return Status()
+    pressure = share * bulk_modulus(scene.liquid)
+    return Status(
+        code=StatusCode.OUT_OF_RANGE,
+        text=(
+            f"up to {pressure / 1e6:.4g} MPa on the outer wall would make the liquid {percent(share)} denser "
+            f"there, and no model holds above {percent(LARGEST_COMPRESSION)}, velocities included: lower "
+            "rotor.speed, gas.pressure or disc.max_fill_ratio"
+        ),
+    )
+
+
+def _waves(scene: Scene, fills: FloatArray) -> Status:
+    """Whether the swinging surface stays small against the ring's depth, by the estimate of its swing."""
+    swing = wave_height(scene, fills)
+    worst = int(np.argmax(swing))
+    if swing[worst] <= SMALL:
+        return Status()
+    sector = "" if scene.disc.geometry is None else "in a plain sector of the same opening, "
+    return Status(
+        code=StatusCode.OUT_OF_RANGE,
+        text=(
+            f"{sector}at a fill ratio of {fills[worst]:.3g} waves may reach about {swing[worst]:.2g} "
+            "of the ring's depth, too high for linear sloshing, the finest model: avoid that fill, or turn "
+            "faster"
+        ),
+    )
+
+
+def _resonant_fill(scene: Scene) -> float | None:
+    """Fill ratio at which the lowest mode meets the speed, s = 1, by the same estimate.
+
+    Returns: x; None without gravity across the shaft, or where the mode stays below the speed at any fill.
+    Source: tanh(k ln(R2/a)) = 1/k.
+    """
+    disc, k = scene.disc, np.pi / scene.disc.central_angle
+    if scene.environment.shaft == "vertical" or scene.environment.gravity == 0 or k <= 1:
+        return None
+    radius = disc.outer_radius * float(np.exp(-np.arctanh(1 / k) / k))
+    if radius < disc.inner_radius:
+        return None
+    return float(liquid_area(disc=disc, surface_radius=radius)) * disc.axial_width / chamber_volume(disc=disc)

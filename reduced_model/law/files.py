@@ -1,0 +1,195 @@
+"""Reading a law back from its file, with every error reported as errors of a scene are."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import MISSING, Field, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, cast
+
+import numpy as np
+
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
+from ringbalance.reduced_model.law.flow_law import FORMAT, VERSION, CompleteLaw
+from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment
+from ringbalance.reduced_model.tables import HermiteTable
+from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
+from ringbalance.reduced_model.tube.heads import TubeHeads
+from ringbalance.reduced_model.tube.regime import TubePath
+from ringbalance.scene.faults import Fault, SceneError
+
+_RECORDS: Final[Mapping[str, type]] = MappingProxyType(
+    {
+        record.__name__: record
+        for record in (
+            CalibratedLaw,
+            CalibratedMoment,
+            HermiteTable,
+            DriveUncertainty,
+            PaperLaw,
+            PaperMoment,
+            TubeHeads,
+            TubePath,
+        )
+    }
+)
+_LAWS: Final = (CalibratedLaw, PaperLaw)
+_POSITIVE: Final = frozenset(
+    {
+        "density",
+        "chamber_volume",
+        "tube_area",
+        "max_fill_ratio",
+        "axial_width",
+        "central_angle",
+        "step",
+        "gas_factor",
+    }
+)
+_NOT_NEGATIVE: Final = frozenset(
+    {"ambient_pressure", "drag_coefficient", "interpolation_error", "released", "froude_velocity"}
+)
+_LONGEST: Final = 40
+_VARIANTS: Final = "tuple[CalibratedLaw, ...]"
+
+
+class _Reader:
+    """Collects the errors of one file while its records are built."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.faults: list[Fault] = []
+
+    def fault(self, where: str, value: str, problem: str, allowed: str) -> None:
+        table, _, key = where.rpartition(".")
+        short = value if len(value) <= _LONGEST else value[: _LONGEST - 3] + "..."
+        self.faults.append(
+            Fault(file=self.file, table=table, key=key, value=short, problem=problem, allowed=allowed)
+        )
+
+    def record(self, data: object, expected: tuple[type, ...], where: str) -> Any:
+        """Build a record, or note why it cannot be built and return None."""
+        names = ", ".join(t.__name__ for t in expected)
+        if not isinstance(data, dict) or data.get("type") not in {t.__name__ for t in expected}:
+            found = data.get("type") if isinstance(data, dict) else data
+            self.fault(f"{where}.type", _shown(found), "this is no such record", names)
+            return None
+        kind, before = _RECORDS[data["type"]], len(self.faults)
+        known = {f.name: f for f in fields(kind)}
+        for key in sorted(set(data) - set(known) - {"type"}):
+            self.fault(f"{where}.{key}", _shown(data[key]), "unknown key", ", ".join(known))
+        values = {name: self.field(data, f, f"{where}.{name}") for name, f in known.items()}
+        if len(self.faults) > before:
+            return None
+        try:
+            return kind(**values)
+        except ValueError as error:
+            self.fault(f"{where}.type", data["type"], str(error), "values that fit together")
+            return None
+
+    def field(self, data: Mapping[str, object], field: Field[Any], where: str) -> Any:
+        if field.name not in data and field.default is not MISSING:
+            # A key that earlier files do not have.
+            return field.default
+        if field.name not in data:
+            self.fault(where, "missing", "the key is missing", str(field.type))
+            return None
+        value, optional = data[field.name], str(field.type).endswith("| None")
+        if value is None and optional:
+            return None
+        if str(field.type) == _VARIANTS:
+            return self.variants(value, where)
+        return self.value(value, str(field.type).removesuffix(" | None"), field.name, where)
+
+    def variants(self, value: object, where: str) -> tuple[CalibratedLaw, ...]:
+        if not isinstance(value, list) or len(value) % 2:
+            self.fault(where, _shown(value), "it is not a list of pairs of laws", "a list of pairs of laws")
+            return ()
+        return tuple(self.record(each, (CalibratedLaw,), f"{where}[{i + 1}]") for i, each in enumerate(value))
+
+    def value(self, value: object, kind: str, name: str, where: str) -> Any:
+        checks: Mapping[str, tuple[Callable[[object], bool], str]] = {
+            "str": (lambda v: isinstance(v, str), "a text"),
+            "bool": (lambda v: isinstance(v, bool), "true or false"),
+            "float": (lambda v: _is_number(v) and _allowed(name, cast(float, v)), _range(name)),
+            "FloatArray": (
+                lambda v: isinstance(v, list) and all(map(_is_number, v)),
+                "a list of finite numbers",
+            ),
+        }
+        if kind not in checks:
+            return self.record(value, (_RECORDS[kind],), where)
+        fits, allowed = checks[kind]
+        if not fits(value):
+            self.fault(where, _shown(value), f"it is not {allowed}", allowed)
+            return None
+        if kind == "FloatArray":
+            return np.array(value, dtype=np.float64)
+        return float(cast(float, value)) if kind == "float" else value
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, bool) or not isinstance(value, float | int):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def _allowed(name: str, value: float) -> bool:
+    return value > 0 if name in _POSITIVE else value >= 0 if name in _NOT_NEGATIVE else True
+
+
+def _range(name: str) -> str:
+    if name in _POSITIVE:
+        return "a number above 0"
+    return "a number of at least 0" if name in _NOT_NEGATIVE else "a finite number"
+
+
+def _shown(value: object) -> str:
+    return json.dumps(value, default=str)
+
+
+def load_law(path: Path | str) -> CompleteLaw:
+    """Read a law that a law's `save` wrote.
+
+    Returns: The law, equal to the saved one bit for bit; it carries its moment, volumes and density.
+    Raises: SceneError: a file that cannot be read or is no law; every fault names key, value and what is
+        allowed.
+    """
+    file = Path(path)
+    reader = _Reader(str(file))
+    law = None
+    for content in _content(reader, file):
+        law = reader.record(content.get("law"), _LAWS, "law")
+    if reader.faults:
+        raise SceneError(reader.faults)
+    return cast(CompleteLaw, law)
+
+
+def _content(reader: _Reader, file: Path) -> Iterator[Mapping[str, object]]:
+    """The file's top level, or nothing and an error."""
+    wanted = f'a file written by "ringbalance calibrate SCENE --save {file.name}"'
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        reader.fault("", "", f"the file cannot be read: {error.strerror or error}", wanted)
+    except (ValueError, RecursionError) as error:
+        reader.fault("", "", f"the file is not JSON: {error}", wanted)
+    else:
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            found = content.get("format") if isinstance(content, dict) else None
+            reader.fault("format", _shown(found), "the file is not a saved law", f'"{FORMAT}", {wanted}')
+        elif content.get("version") != VERSION:
+            reader.fault(
+                "version",
+                _shown(content.get("version")),
+                "written by another release, whose law lacks what this one needs: calibrate again",
+                str(VERSION),
+            )
+        else:
+            yield content

@@ -1,0 +1,331 @@
+"""The pressure along the tube's path, from the driven chamber over the crest to the opposite one.
+
+A tube at rest without liquid over its crest: how far each leg is full, and what lies between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ringbalance.physics.gas import vented_pressure
+from ringbalance.physics.pressure.hydrostatics import column_radius
+from ringbalance.physics.tube.loss import corrected_state
+from ringbalance.physics.tube.state import TubeState
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, DirectedState
+from ringbalance.reduced_model.law.flow_law import Flow, Regime
+from ringbalance.reduced_model.tube.flow import column_pressure
+from ringbalance.reduced_model.tube.path import (
+    Places,
+    crest_span,
+    lowest_place,
+    path_radius,
+    reversed_tube,
+    share_at_radius,
+)
+from ringbalance.reduced_model.tube.regime import TubeEnds
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.models import Scene, Tube
+
+_Filled = Callable[[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HumpProfile:
+    """State of the tube along its path; arrays of one shape, from the driven to the opposite chamber.
+
+    A path coordinate stands twice where the pressure steps (ends, bends) or the tube stops being full.
+    """
+
+    path: FloatArray
+    """s, m, from 0 to the tube's length, never falling."""
+    radius: FloatArray
+    """r, m."""
+    pressure: FloatArray
+    """Gauge, Pa; of the gas or the cavity where the tube is not full.  First and last: in the chamber."""
+    full: BoolArray
+    """Whether liquid fills the bore."""
+    regime: Regime
+    """Of the flow."""
+    velocity: float
+    """u, m/s, negative in reverse; zero when blocked."""
+    hump_path: float | None
+    """s of the crest where the pressure is lowest, the end of its arc, m; None without one."""
+    hump_pressure: float | None
+    """Pressure over the crest, gauge, Pa; None without one."""
+    cavity_pressure: float | None
+    """At which a column separates at the crest: vapour, or the downstream chamber's gas; gauge, Pa."""
+    cavitation_margin: float | None
+    """Pressure over the crest of a full siphon under these conditions, less the cavity pressure, Pa.
+    Negative: no such siphon exists, so the flow is separated or a resting column separates.  When blocked,
+    it is that of a primed tube."""
+    cavitation_margin_uncertainty: float | None
+    """Expanded uncertainty (95 %), Pa."""
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        scene: Scene,
+        law: CalibratedLaw,
+        fill_ratio: float,
+        opposite_fill_ratio: float | None = None,
+        gas_pressure: float | None = None,
+        primed: bool = False,
+        points: int = 401,
+    ) -> HumpProfile:
+        """Follow the pressure along the path at one operating state.
+
+        p(s) = p_A + P_A - rho omega^2 (R2^2 - r^2)/2 - K(s) rho u^2/2, with K the loss up to there and alpha
+
+        Where the column is separated the cavity reaches from the crest to the column that the opposite
+        chamber supports; the momentum of what falls onto it is left out.
+        Args:
+            fill_ratio: x of the driven chamber.
+            opposite_fill_ratio: default max_fill_ratio - fill_ratio.
+            gas_pressure: gauge, Pa, in the driven chamber; default the scene's.
+            primed: whether the tube holds a continuous column beforehand.
+            points: number of even places along the path; more stand where something changes.
+        Raises: ValueError: a fill ratio outside the range, a NaN, a negative absolute pressure, or under 2
+            points.
+        Range: legs as in `path`; the scene does not give where the bends lie: evenly over both legs.
+        Source: Eqs. 13 to 18 of the liquid-ring paper, taken along the path.
+        """
+        if points < 2:
+            raise ValueError("points must be at least 2")
+        gas = scene.gas.pressure if gas_pressure is None else gas_pressure
+        other = law.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
+        flow = law.evaluate(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas, primed=primed)
+        forward, backward = (
+            DirectedState.of(law=law, fills=(fill_ratio, other), gas_pressure=gas, reverse=r)
+            for r in (False, True)
+        )
+        state = backward if forward.ends.driving_pressure() < 0 else forward
+        tube = reversed_tube(scene.tube) if state.reverse else scene.tube
+        margin = state.margin(law=law)
+        if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
+            line = _blocked(scene, law, forward, primed, points)
+        else:
+            cavity = _pressure_over_crest(law, state, abs(float(flow.velocity)))
+            line = _flowing(scene, tube, abs(float(flow.velocity)), state.ends, cavity, points)
+            if state.reverse:
+                line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
+        return _profile(scene, law, flow, state, margin, line)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Line:
+    """State along s/L; arrays of one shape."""
+
+    share: FloatArray
+    pressure: FloatArray
+    full: BoolArray
+
+
+def _profile(
+    scene: Scene,
+    law: CalibratedLaw,
+    flow: Flow,
+    state: DirectedState,
+    margin: tuple[float, float] | tuple[None, None],
+    line: _Line,
+) -> HumpProfile:
+    tube, humped = scene.tube, scene.tube.hump_radius is not None
+    start, end = crest_span(tube)
+    crest = start if state.reverse else end
+    place = int(np.argmin(np.abs(line.share - crest)))
+    return HumpProfile(
+        path=line.share * tube.length,
+        radius=path_radius(tube=tube, share=line.share),
+        pressure=line.pressure,
+        full=line.full,
+        regime=Regime(int(flow.regime)),
+        velocity=float(flow.velocity),
+        hump_path=crest * tube.length if humped else None,
+        hump_pressure=float(line.pressure[place]) if humped else None,
+        cavity_pressure=_cavity_pressure(law, state),
+        cavitation_margin=margin[0],
+        cavitation_margin_uncertainty=margin[1],
+    )
+
+
+def _pressure_over_crest(law: CalibratedLaw, state: DirectedState, velocity: float) -> float | None:
+    """Of the cavity or gas that the column spills into at a velocity; None where it is full, or at rest."""
+    crest, head = law.path.crest, law.heads.to_crest(reverse=state.reverse)
+    if crest is None or head is None or velocity == 0:
+        return None
+    log_u, driving = np.log(velocity), state.ends.driving_pressure()
+    if law.density * float(np.exp(law.heads.head(log_u))) > driving * (1 - 1e-9):
+        return None
+    return float(crest.resting_pressure(state.ends) - law.density * np.exp(head(log_u)))
+
+
+def _cavity_pressure(law: CalibratedLaw, state: DirectedState) -> float | None:
+    crest = law.path.crest
+    return None if crest is None else float(crest.cavity_pressure(state.ends))
+
+
+def _flowing(
+    scene: Scene, tube: Tube, velocity: float, ends: TubeEnds[float], cavity: float | None, points: int
+) -> _Line:
+    """Along a tube in which liquid flows or a column rests, from its upstream end."""
+    terms = corrected_state(replace(scene, tube=tube), velocity) if velocity else None
+    head = scene.liquid.density * velocity**2 / 2
+    if cavity is not None and terms is not None:
+        return _separated(scene, tube, terms, ends, cavity, head, points)
+    at = Places.along(tube=tube, points=points)
+    lost = 0.0 if terms is None else head * at.loss_before(tube=tube, state=terms)
+    hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share))
+    return _Line(
+        share=at.share,
+        pressure=np.asarray(ends.upstream_pressure() - hydrostatic - lost),
+        full=np.ones(at.share.shape, dtype=np.bool_),
+    )
+
+
+def _separated(
+    scene: Scene,
+    tube: Tube,
+    terms: TubeState,
+    ends: TubeEnds[float],
+    cavity: float,
+    head: float,
+    points: int,
+) -> _Line:
+    """Full up to the crest, then a cavity, then the column that the downstream chamber supports."""
+    top = ends.downstream_gas + ends.back_pressure()
+
+    def behind(at: Places) -> FloatArray:
+        """Pressure of a full tube seen from its downstream end."""
+        lost = float(terms.k) + 1 - at.loss_before(tube=tube, state=terms)
+        return np.asarray(
+            top - column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share)) + head * lost
+        )
+
+    first = Places.along(tube=tube, points=points)
+    crest = lowest_place(tube, float(terms.along) * head / scene.liquid.density, scene.rotor.speed**2)
+    again = 1.0 if ends.downstream_open() else _full_again(first, behind, cavity, crest)
+    at = Places.along(tube=tube, points=points, doubled=(crest, again))
+    from_top = ends.upstream_pressure() - column_pressure(
+        scene=scene, radius=path_radius(tube=tube, share=at.share)
+    )
+    ahead = from_top - head * at.loss_before(tube=tube, state=terms)
+    near = (at.share < crest) | ((at.share == crest) & ~at.after)
+    far = (at.share > again) | ((at.share == again) & at.after)
+    pressure = np.where(near, ahead, np.where(far, behind(at), cavity))
+    return _Line(share=at.share, pressure=pressure, full=near | far)
+
+
+def _full_again(at: Places, behind: Callable[[Places], FloatArray], cavity: float, hump: float) -> float:
+    """Share of the path from which on the column seen from its downstream end is above the cavity."""
+    low = np.flatnonzero((behind(at) < cavity) & (at.share >= hump))
+    if low.size == 0:
+        return hump
+    last = int(low[-1])
+    if last + 1 >= at.share.size:
+        return 1.0
+    start, stop = float(at.share[last]), float(at.share[last + 1])
+    if start == stop:
+        return start
+
+    def above(share: float) -> float:
+        inside = Places(share=np.array([share]), after=np.array([share < stop]))
+        return float(behind(inside)[0] - cavity)
+
+    return float(brentq(above, start, stop))
+
+
+def _blocked(scene: Scene, law: CalibratedLaw, state: DirectedState, primed: bool, points: int) -> _Line:
+    """Two columns at rest and what lies between; without a crest, each chamber's pressure up to the
+    middle."""
+    ends, crest = state.ends, law.path.crest
+    near, far = ends.upstream_pressure(), ends.downstream_pressure()
+    if crest is None:
+        at = Places.along(tube=scene.tube, points=points, doubled=(0.5,))
+        first = (at.share < 0.5) | ((at.share == 0.5) & ~at.after)
+        pressure = np.where(first, near, far) - ends.port_pressure
+        return _Line(share=at.share, pressure=pressure, full=np.ones(first.shape, dtype=np.bool_))
+    cavity = crest.cavity_pressure(ends) if primed and ends.upstream_covered() else None
+    stop = _rest(scene=scene, ends=ends, cavity=cavity, crest_pressure=crest.column_pressure)
+    at = Places.along(tube=scene.tube, points=points, doubled=(stop.near, stop.far))
+    hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=scene.tube, share=at.share))
+    in_near = ((at.share < stop.near) | ((at.share == stop.near) & ~at.after)) & ends.upstream_covered()
+    in_far = ((at.share > stop.far) | ((at.share == stop.far) & at.after)) & (not ends.downstream_open())
+    pressure = np.where(in_near, near - hydrostatic, np.where(in_far, far - hydrostatic, stop.between))
+    # A chamber that leaves its port open shows its own gas there.
+    pressure[0] = pressure[0] if ends.upstream_covered() else max(pressure[0], ends.upstream_gas)
+    return _Line(share=at.share, pressure=pressure, full=in_near | in_far)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Rest:
+    """Two columns and what lies between them."""
+
+    near: float
+    """s/L up to which the leg of the driven chamber is full."""
+    far: float
+    """s/L from which on the other leg is full."""
+    between: float
+    """Pressure of what lies between, gauge, Pa."""
+
+
+def _rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pressure: float) -> _Rest:
+    """Find the two columns of a tube at rest.
+
+    A separated column leaves a cavity at a given pressure.  An unprimed tube holds gas: vented, it is at the
+    opposite chamber's pressure; trapped, it is compressed isothermally from the hydrostatic pressures alone
+    until it leaves at the opposite port, and at least to what keeps the driven column below the crest.
+    Args: `ends`: pressures at the tube's ends, the driven chamber upstream; one that leaves its port open
+        supports no column. `cavity`: pressure of the cavity of a separated column, gauge, Pa; None for gas.
+        `crest_pressure`: D_m, column from the crest to the outer wall, Pa.
+    Source: hydrostatics in the rotating frame; Boyle's law.
+    """
+    outer, covered = scene.disc.outer_radius, ends.upstream_covered()
+    near, far = ends.upstream_pressure(), ends.downstream_pressure()
+
+    def leg(pressure: float, *, far_leg: bool) -> float:
+        """Fraction of the path where a column ends that a pressure at the outer wall supports."""
+        radius = column_radius(
+            density=scene.liquid.density,
+            angular_velocity=scene.rotor.speed,
+            pressure=max(pressure, 0.0),
+            outer=outer,
+        )
+        return share_at_radius(tube=scene.tube, radius=radius, far_leg=far_leg)
+
+    def filled(pressure: float, near: float) -> tuple[float, float]:
+        """Fractions of the path where the two columns end, under a pressure between them."""
+        first = leg(near - pressure, far_leg=False) if covered else 0.0
+        return first, 1.0 if ends.downstream_open() else leg(far - pressure, far_leg=True)
+
+    if cavity is not None:
+        between = cavity
+    elif not covered:
+        between = float(np.clip(ends.upstream_gas, 0.0, max(far - ends.port_pressure, 0.0)))
+    elif scene.tube.hump_gas == "vented":
+        between = 0.0
+    else:
+        between = _trapped(vented_pressure(scene), ends, filled, crest_pressure)
+    first, last = filled(between, near)
+    return _Rest(near=first, far=last, between=between)
+
+
+def _trapped(ambient: float, ends: TubeEnds[float], filled: _Filled, crest_pressure: float) -> float:
+    """Pressure of the trapped gas, gauge; the gas that fills the tube between the columns is kept."""
+    near_pressure, largest = (
+        ends.upstream_pressure(),
+        max(ends.downstream_pressure() - ends.port_pressure, 0.0),
+    )
+    first, last = filled(0.0, ends.upstream_hydrostatic)
+
+    def excess(pressure: float) -> float:
+        near, far = filled(pressure, near_pressure)
+        return float((ambient + pressure) * (far - near) - ambient * (last - first))
+
+    if largest <= 0:
+        return 0.0
+    root = largest if excess(largest) < 0 else 0.0 if excess(0.0) >= 0 else brentq(excess, 0.0, largest)
+    return float(np.clip(max(root, near_pressure - crest_pressure), 0.0, largest))

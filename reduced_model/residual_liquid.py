@@ -1,0 +1,297 @@
+"""What keeps a chamber from being emptied, gas in its port or too little, and whether a full one holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.physics.tube.draw_down import port_depth
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import FlowLaw
+from ringbalance.reduced_model.tube.flow import column_pressure, tube_path
+from ringbalance.results.rows import Finding
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import half_widths
+
+_SAMPLES: Final = 201
+"""Fills at which gas in the port is looked for first."""
+_PIECES: Final = 32
+"""Of an interval between them; a straight line over one is good to 1e-8 of a fill."""
+_STALL_SAMPLES: Final = 65
+_STALL_ROUNDS: Final = 4
+"""Of refinement, each to a 64th: 1e-8 of a fill is left."""
+NEARLY_EMPTY: Final = 1e-6
+"""Share of a pair's liquid with which a chamber's last liquid is looked at."""
+_NOTHING: Final = 1e-9
+"""Below this a fill ratio is not told from zero."""
+FACTOR: Final = "draw_down_factor"
+"""The scene's factor on the depth of `port_depth`, an uncertain input as any other."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drawing:
+    """At which fills gas enters the port of a chamber that a running tube empties."""
+
+    scene: Scene
+    fill_ratio: FloatArray
+    """Of the driven chamber, equally spaced."""
+    flow_rate: FloatArray
+    """Through the running tube there, m^3/s."""
+    depth: FloatArray
+    """Of the liquid over the port there, m."""
+
+    @classmethod
+    def of(cls, scene: Scene, *, law: FlowLaw) -> Drawing:
+        """Tabulate flow and depth of a scene under a law.
+
+        Raises: ValueError: a disc at rest.
+        """
+        fills = np.linspace(0.0, scene.disc.max_fill_ratio, (_SAMPLES - 1) * _PIECES + 1)
+        level = surface_radius(disc=scene.disc, fill_ratio=fills)
+        rate, _ = _flow_rate(scene, law, fills)
+        return cls(
+            scene=scene, fill_ratio=fills, flow_rate=rate, depth=np.asarray(scene.tube.port_radius - level)
+        )
+
+    def residual(self, *, depth: npt.ArrayLike = 1.0, velocity: npt.ArrayLike = 1.0) -> FloatArray:
+        """Fill ratio below which gas enters the port, with factors of the draw-down depth and the velocity.
+
+        The depth over the port, r_p - a(x), equals that of `port_depth` for the flow Q = S u(x) of the law's
+        running tube; the largest such x counts, because a chamber empties from above.
+        Returns: x from 0 (no gas before the chamber is empty, or no flow) to max_fill_ratio (gas at any
+            fill), of the factors' broadcast shape.
+        """
+        factor, faster = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v)) for v in (depth, velocity)))
+
+        def excess(places: npt.NDArray[np.intp]) -> FloatArray:
+            rate = faster[:, None] * self.flow_rate[places]
+            return factor[:, None] * port_depth(self.scene, flow_rate=rate) - self.depth[places]
+
+        last = self.fill_ratio.size - 1
+        drawn = excess(np.arange(0, last + 1, _PIECES)[None, :]) > 0
+        start = np.where(drawn.any(axis=1), last - _PIECES * np.argmax(drawn[:, ::-1], axis=1), -1)
+        places = np.clip(start[:, None], 0, last - _PIECES) + np.arange(_PIECES + 1)
+        fine = excess(places)
+        cell = _PIECES - 1 - np.argmax((fine > 0)[:, -2::-1], axis=1)
+        rows = np.arange(start.size)
+        above, under = fine[rows, cell], fine[rows, cell + 1]
+        step = self.fill_ratio[1] - self.fill_ratio[0]
+        part = above / np.where(above > under, above - under, 1.0)
+        inside = self.fill_ratio[places[rows, cell]] + step * part
+        found = np.where(start == last, self.fill_ratio[-1], np.where(start < 0, 0.0, inside))
+        # Where nothing flows, what rounding leaves over a port on the wall of a mesh is no residual.
+        return np.where(found > _NOTHING, found, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResidualLiquid:
+    """Limits of a pair's transfer under the scene's gas pressure; uncertainties are expanded (95 %).
+
+    Those of the least fill, and of what follows from it, stand in the calibration's budgets.
+    """
+
+    fill_ratio: float
+    """Of the driven chamber, at which gas enters its port."""
+    fill_ratio_uncertainty: float
+    depth: float
+    """Of the liquid over the port then, m."""
+    depth_uncertainty: float
+    flow_rate: float
+    """Through the tube then, m^3/s."""
+    stalled_fill_ratio: float
+    """Of the driven chamber, at which an injection moves no liquid any more."""
+    least_fill_ratio: float
+    """To which injections can bring a chamber: the larger one of both, at most equal fills."""
+    largest_fill_ratio: float
+    """That the opposite chamber reaches then."""
+    usable_volume: float
+    """That a pair can move from one chamber to the other, m^3."""
+    pair_moment: float
+    """Largest moment of a pair with one chamber empty, by geometry, kg m."""
+    usable_pair_moment: float
+    """Largest moment of a pair to which injections can bring it, kg m."""
+    reach: float
+    """Largest unbalance that all pairs together cancel in whatever direction it lies, kg m."""
+    reach_share: float
+    """The same over the usable moment of a pair."""
+
+    @property
+    def limited_by(self) -> Literal["draw_down", "gas_pressure", "nothing"]:
+        """What keeps a chamber from being emptied: gas in its port, or gas that drives no liquid any more."""
+        if self.least_fill_ratio == 0:
+            return "nothing"
+        return "gas_pressure" if self.stalled_fill_ratio > self.fill_ratio else "draw_down"
+
+    @classmethod
+    def of(cls, scene: Scene, *, law: CalibratedLaw) -> ResidualLiquid:
+        """Residual fill with its uncertainty, stall, and the volume and the moments that both leave.
+
+        Uncertainty of the residual fill: that of the depth, and of the velocity through it.
+        """
+        drawing, top = Drawing.of(scene, law=law), scene.disc.max_fill_ratio
+        x = float(drawing.residual()[0])
+        rate, width = (float(v[0]) for v in _flow_rate(scene, law, np.array([x])))
+        stated = half_widths(scene).get(FACTOR, 0.0) / scene.tube.draw_down_factor
+        relative = math.hypot(stated, _by_flow(scene, rate, width))
+        change = min(relative, 0.99)
+        low, high = (float(v) for v in drawing.residual(depth=np.array([1 - change, 1 + change])))
+        stalled = stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure)
+        least = min(max(x, stalled), top / 2)
+        usable, share = (
+            _pair_moment(law, top, least),
+            reach_share(scene.disc.chambers, passes_on=x >= stalled),
+        )
+        depth = float(port_depth(scene, flow_rate=rate))
+        return cls(
+            fill_ratio=x,
+            fill_ratio_uncertainty=(high - low) / 2,
+            depth=depth,
+            depth_uncertainty=relative * depth,
+            flow_rate=rate,
+            stalled_fill_ratio=stalled,
+            least_fill_ratio=least,
+            largest_fill_ratio=top - least,
+            usable_volume=(top - 2 * least) * chamber_volume(disc=scene.disc),
+            pair_moment=_pair_moment(law, top, 0.0),
+            usable_pair_moment=usable,
+            reach=share * usable,
+            reach_share=share,
+        )
+
+    def model_uncertainty(self, scene: Scene, *, law: CalibratedLaw, head: float) -> tuple[float, float]:
+        """Of the least fill and of the usable pair moment, kg m, by numerics and models alone.
+
+        Args: `law`: with these uncertainties and no others. `head`: that of a difference of two wall
+            pressures, Pa, which moves the stall.
+        """
+        top, x = scene.disc.max_fill_ratio, self.fill_ratio
+        rate, width = (float(v[0]) for v in _flow_rate(scene, law, np.array([x])))
+        change = min(_by_flow(scene, rate, width), 0.99)
+        drawn = Drawing.of(scene, law=law).residual(depth=np.array([1 - change, 1 + change]))
+        stalled = [
+            stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure + side * head)
+            for side in (1, -1)
+        ]
+        low, high = np.minimum(np.maximum(drawn, stalled), top / 2)
+        by_fill = (_pair_moment(law, top, low) - _pair_moment(law, top, high)) / 2
+        ends = law.moment.half_width(np.array([self.least_fill_ratio, self.largest_fill_ratio]))
+        return float(high - low) / 2, math.hypot(by_fill, *ends)
+
+
+def reach_share(chambers: int, *, passes_on: bool = True) -> float:
+    """Smallest radius of what n pairs cancel together, over what one does along its axis: cot(pi/(2 n)).
+
+    Each of n pairs, pi/n apart, gives a moment between -U and U along its axis: together a regular polygon of
+    2 n sides, U/sin(pi/(2 n)) to its corners and U cot(pi/(2 n)) to its sides: U with four chambers,
+    1.73 U with six.
+    Args: `passes_on`: whether a chamber that is emptied leaves its share to other pairs, as one at its
+        residual fill does. One that the gas drives no further is asked again and again: then U, along a pair.
+    Source: elementary geometry (a sum of segments is a zonotope).
+    """
+    return 1 / math.tan(math.pi / chambers) if passes_on else 1.0
+
+
+def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
+    """Fill ratio below which gas enters the port of the driven chamber under the scene's gas pressure."""
+    return float(Drawing.of(scene, law=law).residual()[0])
+
+
+def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float) -> float:
+    """Fill ratio at which an injection moves no liquid any more; total/2 where it moves none at equal fills.
+
+    An injection starts with what the tube holds while the gas is off. Over a crest where no column holds
+    that is p_gas = rho omega^2 (a^2 - r_m^2)/2 with vented gas, of a full siphon that of `stall_pressure`. A
+    long injection whose flow has carried the gas off the crest goes on to a lower fill, from which no
+    injection could correct any further.
+    """
+
+    def moves(fills: FloatArray) -> BoolArray:
+        opposite = total - fills
+        rest = law.evaluate(fill_ratio=fills, opposite_fill_ratio=opposite, gas_pressure=0.0, primed=True)
+        flow = law.evaluate(
+            fill_ratio=fills, opposite_fill_ratio=opposite, gas_pressure=gas_pressure, primed=rest.primed
+        )
+        return flow.velocity > 0
+
+    lowest = max(0.0, total - law.max_fill_ratio)
+    stopped = first_stalled(moves, start=total / 2, end=max(lowest, NEARLY_EMPTY * total))
+    return lowest if stopped is None else stopped
+
+
+def first_stalled(moves: Callable[[FloatArray], BoolArray], *, start: float, end: float) -> float | None:
+    """Fill from `start` down to `end` at which liquid first stops moving; None where it moves at all."""
+    for _ in range(_STALL_ROUNDS):
+        fills = np.linspace(start, end, _STALL_SAMPLES)
+        stopped = np.flatnonzero(~moves(fills))
+        if not stopped.size:
+            return None
+        if stopped[0] == 0:
+            return start
+        start, end = float(fills[stopped[0] - 1]), float(fills[stopped[0]])
+    return end
+
+
+def _pair_moment(law: CalibratedLaw, total: float, fill: float) -> float:
+    return float(law.moment.pair_moment(fill_ratio=max(total - fill, fill), opposite_fill_ratio=fill))
+
+
+def _by_flow(scene: Scene, rate: float, width: float) -> float:
+    """Relative change of the depth over the port by a half-width of the flow."""
+    low, here, high = port_depth(scene, flow_rate=np.array([max(rate - width, 0.0), rate, rate + width]))
+    return float((high - low) / (2 * here)) if rate > 0 else 0.0
+
+
+def _flow_rate(scene: Scene, law: FlowLaw, fills: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Q of the running tube and its expanded uncertainty, m^3/s."""
+    flow = law.evaluate(fill_ratio=fills, gas_pressure=scene.gas.pressure, primed=True)
+    return scene.tube.area * np.maximum(flow.velocity, 0.0), scene.tube.area * flow.uncertainty
+
+
+@dataclass(frozen=True, kw_only=True)
+class Holding:
+    """What becomes of the fullest chamber's liquid with the gas off."""
+
+    holds: bool
+    """Whether it stays there, by `TubePath.holds`."""
+    hump_radius: float | None
+    """Of the scene's crest, m; None without one."""
+    largest_hump_radius: float | None
+    """Of a crest that holds it whatever the pressure of a cavity there, m; None: no crest does."""
+
+    @classmethod
+    def of(cls, scene: Scene, *, fill_ratio: float) -> Holding:
+        """By hydrostatics, gravity left out. Args: `fill_ratio`: the largest that runs reach."""
+        path, wall = tube_path(scene), scene.disc.outer_radius
+        fullest = float(
+            surface_radius(disc=scene.disc, fill_ratio=min(fill_ratio, scene.disc.max_fill_ratio))
+        )
+        level = column_pressure(scene=scene, radius=fullest)
+        pull = scene.liquid.density * scene.rotor.speed**2 / 2
+        square = wall**2 - path.holding_pressure(level) / pull if pull > 0 else 0.0
+        return cls(
+            holds=path.holds(level),
+            hump_radius=scene.tube.hump_radius,
+            largest_hump_radius=math.sqrt(square) if square > 0 else None,
+        )
+
+    @property
+    def finding(self) -> Finding | None:
+        """That a correction does not last, and the crest that would hold it; None where the tube holds."""
+        if self.holds:
+            return None
+        if self.largest_hump_radius is None:
+            return Finding(code="no_crest_holds")
+        # Rounded down to a tenth of a millimetre: a crest there holds.
+        crest = math.floor(1e4 * self.largest_hump_radius * (1 + 1e-12)) / 1e4
+        return Finding(
+            code="no_crest" if self.hump_radius is None else "crest_too_low",
+            values={"crest_radius": self.hump_radius, "largest_crest_radius": crest},
+            change={"tube.hump_radius": crest},
+        )

@@ -1,0 +1,278 @@
+"""Functions compiled to machine code by numba, kept between runs, compiled again when any of them changes.
+
+Numba looks only at a function's own file to see whether kept code is stale, though it holds the code of
+every compiled function that it calls.  The files that it is kept in are therefore named after all of their
+sources.
+
+Numba turns a result that is an array or a named tuple into a Python object by calling Python functions, and
+does not look whether such a call failed.  A signal that has arrived during the compiled call is handled in
+the first of them: when its handler raises, as that of Ctrl-C does, an array ends in an error of the
+interpreter, and a named tuple, with a null pointer in it, the process in a segmentation fault.  Handlers
+therefore only take note during the call, and act after it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache, cached_property
+from pathlib import Path
+from types import FrameType
+from typing import Any, Final, ParamSpec, TypeVar, cast
+
+import numba
+from numba.core import registry, sigutils, types
+from numba.core.compiler_lock import global_compiler_lock
+
+from ringbalance.scene.platform.kept_code import KeptCode
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_OPTIONS: Final[dict[str, Any]] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
+_PLAIN: Final = frozenset({"None", "bool", "int", "float", "complex", "tuple", "Pair"})
+"""Names in the annotation of a result that numba makes without calling a Python function."""
+_MARK: Final = f"from {__name__} import".encode()
+"""In each source that holds compiled functions."""
+
+# A private part of numba: without it, functions are compiled as numba does and signals are not deferred.
+_Dispatcher: Any = getattr(registry, "CPUDispatcher", object)
+_normalized: Any = sigutils.normalize_signature
+_unliteral: Any = types.unliteral
+_FINAL_STEPS: Final = (
+    "_optimize_final_module",
+    "_finalize_final_module",
+    "_finalize_dynamic_globals",
+    "_verify_declare_only_symbols",
+)
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function of numbers and arrays, in strict floating point and free of the interpreter's lock.
+
+    Compiled at the first call or taken from an earlier process; the plain function stays as `py_func`.
+    Ctrl-C during a call acts when the call has ended.
+    """
+    return _dispatcher(function)
+
+
+def in_place(function: Callable[P, R]) -> Callable[P, R]:
+    """The same, of a function that makes no array, so that it need not count references to those it is given.
+
+    A seventh of the time of a short function goes into such counts, each safe against other threads.
+    """
+    return _dispatcher(function, _nrt=False)
+
+
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """As `in_place`, within each compiled function that calls it: what that does not use costs nothing."""
+    return _dispatcher(function, _nrt=False, forceinline=True)
+
+
+def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
+    dispatcher = numba.njit(function, **_OPTIONS, **options)
+    if not hasattr(dispatcher, "py_func"):
+        # NUMBA_DISABLE_JIT is set: it is the function itself.
+        return cast(Callable[P, R], dispatcher)
+    if _Dispatcher is not object:
+        kind = _Guarded if _calls_python(function) else _Called
+        dispatcher = kind(py_func=function, locals=dispatcher.locals, targetoptions=dispatcher.targetoptions)
+    try:
+        dispatcher._cache = KeptCode(function, _digest())
+    except (AttributeError, TypeError, RuntimeError, OSError):
+        # A numba that keeps code in another way, or a function without a file: compile in every process.
+        return cast(Callable[P, R], dispatcher)
+    return cast(Callable[P, R], dispatcher)
+
+
+def _calls_python(function: Callable[..., Any]) -> bool:
+    """Whether the result may hold an array or a named tuple, as far as the annotation tells."""
+    told = str(function.__annotations__.get("return", "unknown"))
+    return not set(re.findall(r"\w+", told)) <= _PLAIN
+
+
+class _Called(_Dispatcher):  # type: ignore[misc]
+    """Numba's dispatcher of a function that Python calls; compiled code calls another one.
+
+    Most functions are called by compiled code alone, which needs neither a way in from Python nor a file of
+    its own: those of the outermost function hold them.  That saves a good part of the time.
+    """
+
+    @cached_property
+    def _inner(self) -> Any:
+        options = self.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        return _Inner(py_func=self.py_func, locals=self.locals, targetoptions=options)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """As numba's, of the inner one, and for the type of a constant argument, not for its value."""
+        return self._inner.get_call_template(tuple(_unliteral(one) for one in args), kws)
+
+    def get_overload(self, sig: Any) -> Any:
+        """As numba's, of the inner one."""
+        return self._inner.get_overload(sig)
+
+
+class _Inner(_Dispatcher):  # type: ignore[misc]
+    """Numba's dispatcher of a function that compiled code calls."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        self._compiler._customize_flags = _without_address
+
+    def compile(self, sig: Any) -> Any:
+        """Compile a signature for those that call it. Returns: what stands for its address."""
+        args, result = _normalized(sig)
+        if args not in self.overloads:
+            with global_compiler_lock, self._compiling_counter:
+                found = self._compiler.compile(args, result)._replace(entry_point=_NoAddress())
+                _link_alone(found.library)
+                self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+                self.overloads[args] = found
+        return self.overloads[args].entry_point
+
+
+def _link_alone(library: Any) -> None:
+    """Leave optimisation and machine code of a library to those that it is linked into, if numba lets us."""
+    if not all(hasattr(library, name) for name in _FINAL_STEPS):
+        return
+
+    def finalize() -> None:
+        library._finalize_dynamic_globals()
+        library._verify_declare_only_symbols()
+        library._finalized = True
+
+    library._finalize_final_module = finalize
+    library._optimize_final_module = _nothing
+
+
+def _nothing() -> None:
+    """Leaves a library as it is."""
+
+
+class _NoAddress:
+    """Tells compiled functions without an address apart."""
+
+
+def _without_address(flags: Any) -> Any:
+    flags.no_compile = True
+    return flags
+
+
+class _Guarded(_Called):
+    """Numba's dispatcher, with signals deferred while a call from Python runs, but not while it compiles."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call the compiled function."""
+        with _signals_deferred():
+            return super().__call__(*args, **kwargs)
+
+    def _compile_for_args(self, *args: Any, **kwargs: Any) -> Any:
+        with _signals_live():
+            return super()._compile_for_args(*args, **kwargs)
+
+
+@cache
+def _digest() -> str:
+    total = hashlib.sha256(numba.__version__.encode())
+    for path in compiled_sources():
+        total.update(path.read_bytes())
+    return total.hexdigest()[:16]
+
+
+_COMPILED: Final = ("controller", "reduced_model/injection")
+"""Folders whose functions are compiled, from the package's root."""
+
+
+def compiled_sources() -> tuple[Path, ...]:
+    """Every source that holds functions that are compiled, and the machinery's own."""
+    here, root = Path(__file__), Path(__file__).parents[2]
+    sources = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
+    marked = [path for path in sources if _MARK in path.read_bytes()]
+    return tuple(sorted([here, here.with_name("kept_code.py"), root / "physics/gas.py", *marked]))
+
+
+_Handler = Callable[[int, FrameType | None], Any]
+
+_NAMES: Final = (
+    "SIGINT",
+    "SIGTERM",
+    "SIGHUP",
+    "SIGBREAK",
+    "SIGALRM",
+    "SIGPROF",
+    "SIGVTALRM",
+    "SIGXCPU",
+    "SIGUSR1",
+    "SIGUSR2",
+)
+_SIGNALS: Final = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
+"""Whose handlers may raise: those that end a program or limit its time."""
+
+
+class _Deferred:
+    """A signal's handler that takes note; the one before it is called later."""
+
+    def __init__(self, before: _Handler) -> None:
+        self.before = before
+        self.arrived = False
+
+    def __call__(self, _number: int, _frame: FrameType | None) -> None:
+        """Take note."""
+        self.arrived = True
+
+
+@contextmanager
+def _signals_deferred() -> Iterator[None]:
+    """Let Python's signal handlers act at the end of the block, in the main thread; elsewhere none ever run.
+
+    _Handlers that are not Python functions, such as the system's own for SIGTERM, act at once as before.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    deferred: dict[int, _Deferred] = {}
+    try:
+        for number in _SIGNALS:
+            before = signal.getsignal(number)
+            if callable(before) and not isinstance(before, _Deferred):
+                deferred[number] = _Deferred(before)
+                signal.signal(number, deferred[number])
+        yield
+    finally:
+        _give_back(deferred)
+
+
+def _give_back(deferred: dict[int, _Deferred]) -> None:
+    """Put every handler back into its place, whatever those raise whose signal has arrived."""
+    if not deferred:
+        return
+    number, handler = deferred.popitem()
+    try:
+        signal.signal(number, handler.before)
+        if handler.arrived:
+            handler.before(number, None)
+    finally:
+        _give_back(deferred)
+
+
+@contextmanager
+def _signals_live() -> Iterator[None]:
+    """Within `_signals_deferred`: let handlers act at once again, for Python code that takes long."""
+    main = threading.current_thread() is threading.main_thread()
+    found = {number: signal.getsignal(number) for number in _SIGNALS} if main else {}
+    deferred = {number: held for number, held in found.items() if isinstance(held, _Deferred)}
+    try:
+        for number, handler in deferred.items():
+            signal.signal(number, handler.before)
+        for number, handler in deferred.items():
+            if handler.arrived:
+                handler.arrived = False
+                handler.before(number, None)
+        yield
+    finally:
+        for number, handler in deferred.items():
+            signal.signal(number, handler)

@@ -32,15 +32,17 @@ class UnknownCaseError(KeyError):
 
 
 def case_code(case_id: str) -> CaseCode:
-    """The `case.py` of a case, or the study that it shares with others.
+    """The function that a case's text names, with `<name>_ends` where there is one; else its `case.py`.
 
     Raises: UnknownCaseError: no such id; the text names the nearest one.
     """
     study = load_case(case_id).study
-    if study is not None:
-        shared = getattr(cases, study.of).study
-        return cast(CaseCode, SimpleNamespace(compute=partial(shared, **study.settings)))
-    return cast(CaseCode, getattr(cases, f"{case_id}_code"))
+    if study is None:
+        return cast(CaseCode, getattr(cases, f"cases.{case_id}.case"))
+    place, _, name = study.of.rpartition(".")
+    module = getattr(cases, place)
+    compute = partial(getattr(module, name), **study.settings)
+    return cast(CaseCode, SimpleNamespace(compute=compute, ends=getattr(module, f"{name}_ends", None)))
 
 
 @lru_cache(maxsize=64)

@@ -5,6 +5,7 @@ A folder holds `case.toml` and `case.py`.  What is wrong with one is a `CaseErro
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import sys
 import traceback
@@ -81,9 +82,9 @@ class _Code:
                 f"{self.path}: compute gives {_kind(found)}, not an Evidence or numbers by quantity"
             )
         self._check_names("compute", found.found, complete=True)
-        return found
+        return dataclasses.replace(found, reference={**found.reference, **self._reference(scene)})
 
-    def reference(self, scene: Any) -> Mapping[str, Reference]:
+    def _reference(self, scene: Any) -> Mapping[str, Reference]:
         """What judged quantities are compared with, by name; nothing where the case has none."""
         given = getattr(self.module, "reference", {})
         values = self._called(given, scene) if callable(given) else given

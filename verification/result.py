@@ -10,7 +10,7 @@ from typing import Any
 
 from ringbalance.verification.assumptions import Assumption, overridden
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Quantity, fill
-from ringbalance.verification.evidence import COVERAGE_FACTOR, CaseCode, Evidence, Found, Level, Reference
+from ringbalance.verification.evidence import COVERAGE_FACTOR, Evidence, Found, Level, Reference
 from ringbalance.verification.verdicts import Comparison, Verdict, judge_quantity
 
 
@@ -127,35 +127,21 @@ def _named_numbers(result: QuantityResult) -> dict[str, float]:
     return named
 
 
-def references(code: CaseCode, scene: Any) -> Mapping[str, Reference]:
-    """What the judged quantities are compared with, by name."""
-    given = getattr(code, "reference", {})
-    found: Mapping[str, Reference] = given(scene) if callable(given) else given
-    return found
-
-
 def widened(
-    evidence: Evidence,
-    code: CaseCode,
-    scene: Any,
-    assumptions: Sequence[Assumption],
-    *,
-    values: Callable[[Any], Mapping[str, float]],
+    evidence: Evidence, scene: Any, assumptions: Sequence[Assumption], *, at: Callable[[Any], Evidence]
 ) -> Evidence:
     """Evidence with the reach of its assumed inputs: the case computed at all corners of their ranges.
 
     What moves is the error, so an input that moves number and reference alike counts for nothing.
-    Args: `values`: the judged numbers on a scene.
+    Args: `at`: what is judged on another scene, or a part of it.
     """
     if not assumptions:
         return evidence
 
     def errors(of: Any) -> Mapping[str, float]:
-        against = references(code, of)
-        return {
-            name: value - (against[name].value if name in against else 0.0)
-            for name, value in values(of).items()
-        }
+        there = at(of)
+        exact = {name: reference.value for name, reference in there.reference.items()}
+        return {name: found.value - exact.get(name, 0.0) for name, found in there.found.items()}
 
     here = errors(scene)
     paths = [one.path for one in assumptions]
@@ -168,10 +154,9 @@ def widened(
     return dataclasses.replace(evidence, found=found)
 
 
-def judge(
-    definition: CaseDefinition, evidence: Evidence, against: Mapping[str, Reference]
-) -> tuple[QuantityResult, ...]:
+def judge(definition: CaseDefinition, evidence: Evidence) -> tuple[QuantityResult, ...]:
     """Every quantity of a case. Raises: ValueError: what was found is not what the case judges."""
+    against = evidence.reference
     names = {quantity.name for quantity in definition.quantity}
     if set(evidence.found) != names or not set(against) <= names:
         raise ValueError(

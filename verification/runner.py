@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import lru_cache, partial
@@ -23,7 +23,6 @@ from ringbalance.verification.result import (
     MutationResult,
     QuantityResult,
     judge,
-    references,
     widened,
 )
 from ringbalance.verification.verdicts import Verdict, combine
@@ -94,10 +93,10 @@ def run_definition(
         prescribed = {} if mutation is None else mutation.scene
         rests = [one for one in definition.rests_on if one.path not in prescribed]
         assumptions = assumptions_of(rests, mutated)
-        values = partial(_values, code, level, built_in, (mutated, evidence))
+        at = partial(_evidence_at, code, level, built_in, (mutated, evidence))
         by_corners = [one for one in assumptions if not one.covered]
-        evidence = widened(evidence, code, mutated, by_corners, values=values)
-        quantities = judge(definition, evidence, references(code, mutated))
+        evidence = widened(evidence, mutated, by_corners, at=at)
+        quantities = judge(definition, evidence)
     except NotRunError as error:
         return outcome(status=str(error))
     except (ValueError, ArithmeticError, RuntimeError) as error:
@@ -120,21 +119,20 @@ def run_definition(
     )
 
 
-def _values(
+def _evidence_at(
     code: CaseCode, level: Level, defect: str | None, known: tuple[Any, Evidence], scene: Any
-) -> Mapping[str, float]:
-    """Judged numbers on a scene, by the case's shorter way to them where it has one.
+) -> Evidence:
+    """What is judged on another scene, by the case's shorter way to it where it has one.
 
     Args: `known`: a scene with its evidence.
     """
-    shorter = getattr(code, "values", None)
-    if shorter is not None and defect is None:
-        return dict(shorter(scene))
+    shorter: Callable[[Any], Evidence] | None = getattr(code, "ends", None)
     try:
-        evidence = known[1] if scene == known[0] else code.compute(scene, level, defect)
+        if shorter is not None and defect is None:
+            return shorter(scene)
+        return known[1] if scene == known[0] else code.compute(scene, level, defect)
     except NotRunError as error:
         raise ValueError(f"not at every value of an assumed input: {error}") from error
-    return {name: one.value for name, one in evidence.found.items()}
 
 
 def _broken_down(definition: CaseDefinition) -> Verdict:

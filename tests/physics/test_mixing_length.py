@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
-from ringbalance.verification.cases.mixing_length.case import MixingLength, mixing_length, mixing_length_flow
+from ringbalance.verification.cases.friction import MixingLength, mixing_length, mixing_length_flow
 
 DATA = Path(__file__).parent / "data"
 

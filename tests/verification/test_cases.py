@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +19,6 @@ from ringbalance.mesh.geometry import chamber_volume, half_angle
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Scene
-from ringbalance.verification import cases
 from ringbalance.verification.case import placeholders
 from ringbalance.verification.catalogue import case_code, load_cases
 from ringbalance.verification.document import case_document
@@ -56,15 +55,9 @@ def test_other_cases_come_first_each_with_its_own_order() -> None:
     assert orders == sorted(set(orders), key=lambda order: order or 0)
 
 
-def test_a_case_s_code_is_a_module_that_other_processes_import_by_name() -> None:
+def test_every_case_has_a_computation() -> None:
     for case, definition in CASES.items():
-        name = f"ringbalance.verification.cases.{case}.case"
-        compute = case_code(case).compute
-        if definition.study is not None:
-            compute = cast(Any, compute).func
-            assert compute.__name__ == "study"
-            name = f"ringbalance.verification.{cases._STUDIES[definition.study.of]}"
-        assert compute.__module__ == name
+        assert callable(case_code(case).compute)
         assert (FOLDER / case / "case.py").is_file() != bool(definition.study)
 
 

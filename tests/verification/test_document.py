@@ -64,14 +64,12 @@ def test_a_bound_without_uncertainty_has_none(claim_text: str, made_up_code: Any
 
 def test_gaps_in_a_curve_become_null(claim: CaseDefinition, paper_scene: Scene) -> None:
     class Gappy:
-        def reference(self, scene: Scene) -> dict[str, Reference]:  # noqa: ARG002
-            return {"answer": Reference(value=10.0)}
-
         def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
             curve = Curve(name="c", unit="m", values=np.array([1.0, np.nan]), uncertainty=np.zeros(2))
             axis = Axis(name="x", unit="s", values=np.array([0.0, 1.0]))
             return Evidence(
                 found={"answer": Found(value=10.0)},
+                reference={"answer": Reference(value=10.0)},
                 numbers={"doubt": 1.0},
                 series=(Series(name="s", x=axis, y=(curve,)),),
             )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
@@ -107,13 +106,15 @@ def test_a_programming_error_is_not_swallowed(
 
 def test_a_solve_that_did_not_succeed_cannot_confirm(claim: CaseDefinition, paper_scene: Scene) -> None:
     class Unsolved:
-        def reference(self, scene: Scene) -> Mapping[str, Reference]:  # noqa: ARG002
-            return {"answer": Reference(value=10.0)}
-
         def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
             status = Status(code=StatusCode.NOT_CONVERGED, text="refine the mesh")
             value = 20.0 if defect else 10.0
-            return Evidence(found={"answer": Found(value=value)}, numbers={"doubt": 0.0}, status=status)
+            return Evidence(
+                found={"answer": Found(value=value)},
+                reference={"answer": Reference(value=10.0)},
+                numbers={"doubt": 0.0},
+                status=status,
+            )
 
     result = run_definition(claim, Unsolved(), scene=paper_scene)
     assert result.verdict is Verdict.INCONCLUSIVE
@@ -122,9 +123,6 @@ def test_a_solve_that_did_not_succeed_cannot_confirm(claim: CaseDefinition, pape
 
 def test_evidence_must_name_what_is_judged(claim: CaseDefinition, paper_scene: Scene) -> None:
     class Other:
-        def reference(self, scene: Scene) -> Mapping[str, Reference]:  # noqa: ARG002
-            return {}
-
         def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
             return Evidence(found={"another": Found(value=1.0)})
 

@@ -25,7 +25,6 @@ from ringbalance.verification.evidence import Level
 from ringbalance.verification.own_cases import OwnCase, own_cases
 from ringbalance.verification.result import CaseResult, QuantityResult
 from ringbalance.verification.runner import paper_scene, run_cases
-from ringbalance.verification.validation.comparison import data_document
 from ringbalance.verification.verdicts import Verdict
 
 DONE: Final = 0
@@ -159,6 +158,9 @@ def _run(
 
 
 def _judge_data(path: Path, *, json: bool) -> int:
+    # What predicts every kind of measurement loads a compiler.
+    from ringbalance.verification.validation.comparison import data_document  # noqa: PLC0415
+
     document = data_document(path)
     if json:
         print(dumps(document, allow_nan=False))

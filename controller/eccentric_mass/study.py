@@ -15,7 +15,7 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
@@ -25,7 +25,6 @@ from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.targets import target_angles
 from ringbalance.controller.eccentric_mass.tuning import (
     EccentricTuning,
-    eccentric_tuning_document,
     tune_eccentric,
 )
 from ringbalance.results.requirements import AT_LEAST, AT_MOST, Interval, Requirement
@@ -59,9 +58,9 @@ class _EccentricStudy:
     def document(self) -> dict[str, Any]:
         """Plain numbers in SI: both runs as `simulate --json` gives them, the loops as `tune --json` does."""
         return {
-            "run": eccentric_document(self.run),
-            "locked": eccentric_document(self.locked),
-            "tuning": eccentric_tuning_document(self.tuning),
+            "run": self.run.to_dict(),
+            "locked": self.locked.to_dict(),
+            "tuning": self.tuning.to_dict(),
             "requirements": [row.document() for row in self.requirements],
         }
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.eccentric_mass.run import locked_run
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reports.figures.eccentric import eccentric_figures
@@ -28,7 +28,7 @@ def _ring(_: SceneFile, run: Simulation) -> list[Drawing]:
 
 
 def _masses(scene: EccentricScene, run: EccentricRun) -> list[Drawing]:
-    return eccentric_figures(scene, eccentric_document(run), eccentric_document(locked_run(scene)))
+    return eccentric_figures(scene, run.to_dict(), locked_run(scene).to_dict())
 
 
 _OWN: Final[Mapping[str, Callable[..., list[Drawing]]]] = MappingProxyType(

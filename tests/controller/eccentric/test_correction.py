@@ -10,7 +10,7 @@ import pytest
 
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
     eccentric_drawn,
@@ -35,7 +35,7 @@ def built(scene: EccentricScene, number: int) -> EccentricRun:
 
 
 def names(run: EccentricRun) -> list[str]:
-    return [stage["name"] for stage in json.loads(json.dumps(eccentric_document(run)))["stages"]]
+    return [stage["name"] for stage in json.loads(json.dumps(run.to_dict()))["stages"]]
 
 
 @pytest.mark.parametrize("name", BUNDLED)

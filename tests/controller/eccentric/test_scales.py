@@ -12,7 +12,6 @@ from scipy.stats import binom, chi2
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import eccentric_document
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
@@ -71,7 +70,7 @@ def ellipse(scene: EccentricScene, number: int) -> tuple[float, float]:
     random = np.random.default_rng(np.random.SeedSequence(number, spawn_key=(1,)))
     plant = eccentric_drawn(scene, random)
     run = simulate_eccentric(plant, seed=number, settings=StrategySettings.of(scene))
-    told = eccentric_document(simulate_eccentric(scene))["estimates"]
+    told = simulate_eccentric(scene).to_dict()["estimates"]
     noise = np.asarray(told["imbalance_covariance"][-1])
     error = run.estimates.imbalance[-1] - true_imbalance(plant)
     # The scene's own imbalance is drawn as well; what is not known of the rotor is a share of it.
@@ -103,13 +102,13 @@ def test_95_per_cent_of_built_machines_lie_in_the_ellipse(name: str) -> None:
 
 def test_half_widths_are_in_the_document() -> None:
     scene = estimating("washing_machine")
-    told = eccentric_document(simulate_eccentric(scene))["estimates"]
+    told = simulate_eccentric(scene).to_dict()["estimates"]
     whole = np.asarray(told["imbalance_covariance"][-1]) + np.asarray(told["imbalance_rotor_covariance"])
     np.testing.assert_allclose(told["imbalance_half_width_kg_m"], 1.96 * np.sqrt(np.diag(whole)), rtol=1e-4)
     # Stiffness known to 3 %, mass to 2 %, damping to 20 %: one to six per cent of the imbalance.
     size = PlantParameters.of(scene).unbalance
     assert 0.01 * size < np.max(told["imbalance_half_width_kg_m"]) < 0.06 * size
-    certain = eccentric_document(simulate_eccentric(replace(scene, uncertainty=())))["estimates"]
+    certain = simulate_eccentric(replace(scene, uncertainty=())).to_dict()["estimates"]
     assert np.all(np.asarray(certain["imbalance_rotor_covariance"]) == 0)
 
 
@@ -163,4 +162,4 @@ def test_a_coarse_euler_transition_is_named_before_the_stiffness() -> None:
     assert run.innovation > 1.5
     assert any("imbalance_filter.discretisation" in text for text in run.warnings)
     assert not any("assumed_stiffness" in text for text in run.warnings)
-    assert ("imbalance_filter.discretisation", "exact") in run.remedies[0].changes
+    assert run.remedies[0].change == {"imbalance_filter.discretisation": "exact"}

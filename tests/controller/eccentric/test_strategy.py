@@ -14,14 +14,13 @@ import pytest
 from rich.console import Console
 
 import ringbalance
-from ringbalance.controller.eccentric_mass.advice import expected_deviation
 from ringbalance.controller.eccentric_mass.plan import EccentricMeasurement
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
+from ringbalance.controller.eccentric_mass.resolution import expected_deviation
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import (
     EccentricOutcome,
     EccentricRun,
-    eccentric_document,
 )
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
@@ -127,7 +126,7 @@ def test_plain_python_gives_the_compiled_steps_numbers(scene: EccentricScene) ->
 
 
 def test_document_has_the_promised_keys(run: EccentricRun) -> None:
-    found = json.loads(json.dumps(eccentric_document(run), allow_nan=False))
+    found = json.loads(json.dumps(run.to_dict(), allow_nan=False))
     promised = {"balancer", "settled", "settling_time_s", "status", "time_s", "amplitude_m", "phase_rad"}
     assert promised | {"mass_angle_rad", "estimates", "stages", "residual_ratio"} <= found.keys()
     assert found["balancer"] == "eccentric_mass"
@@ -297,7 +296,7 @@ def test_the_documented_keys_are_there(run: EccentricRun) -> None:
     section = page.split("## `simulate --json` of eccentric masses\n")[1].split("\n## ")[0]
     cells = [line.split("|")[1] for line in section.splitlines() if line.startswith("|")]
     told = {word for cell in cells for word in re.findall(r"`([a-zA-Z_]+)`", cell)}
-    assert told == eccentric_document(run).keys()
+    assert told == run.to_dict().keys()
 
 
 def test_the_table_for_people_reads_well(run: EccentricRun) -> None:

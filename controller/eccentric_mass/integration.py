@@ -185,7 +185,7 @@ def _advance(
 
 
 @compiled
-def fastest_rate(parameters: PlantParameters, speed: float) -> float:
+def _fastest_rate(parameters: PlantParameters, speed: float) -> float:
     """Bound on any rate, rad/s: |W| + sqrt(K_B/M) + C_B/M + C_add/(J + J_add - 2 b^2/M)."""
     least = parameters.inertia + parameters.drive_inertia - 2 * parameters.moment**2 / parameters.mass
     rotor = math.sqrt(parameters.stiffness / parameters.mass) + parameters.damping / parameters.mass
@@ -195,7 +195,7 @@ def fastest_rate(parameters: PlantParameters, speed: float) -> float:
 @compiled
 def substeps(parameters: PlantParameters, speed: float, rate: float, step: float) -> int:
     """Number of substeps that keeps each short against every rate of the plant. Returns: At least 1."""
-    fastest = fastest_rate(parameters, max(abs(speed), abs(speed + rate * step)))
+    fastest = _fastest_rate(parameters, max(abs(speed), abs(speed + rate * step)))
     return max(1, math.ceil(fastest * step / LONGEST))
 
 
@@ -347,7 +347,7 @@ def _substeps(scene: EccentricScene) -> float:
     samples = scene.samples
     # Not at every sample: close enough for a limit, and cheap.
     at = np.linspace(0.0, scene.run.time_limit, min(samples, 10_000))
-    rates = np.abs(np.interp(at, times, speeds)) + fastest_rate(parameters, 0.0)
+    rates = np.abs(np.interp(at, times, speeds)) + _fastest_rate(parameters, 0.0)
     return samples * float(np.mean(np.maximum(np.ceil(rates * step / LONGEST), 1.0)))
 
 

@@ -12,11 +12,12 @@ from __future__ import annotations
 import cmath
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from ringbalance.controller.balancer import Progress
 from ringbalance.controller.eccentric_mass.plant import (
     HELD,
     LOCKED,
@@ -382,9 +383,6 @@ _SHORT: Final = 0.05
 """A piece that took less is followed by one of twice the samples, s."""
 _LONG: Final = 0.2
 """A piece that took more is followed by one of half the samples, s."""
-
-Progress = Callable[[float, float], None]
-"""Called with the simulated time and the time limit, s."""
 
 
 class _PlantRun(NamedTuple):

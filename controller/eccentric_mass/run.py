@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ringbalance.controller.balancer import Progress
 from ringbalance.controller.eccentric_mass.advice import (
     RunFacts,
     found_beforehand,
     remedies_of,
 )
 from ringbalance.controller.eccentric_mass.integration import (
-    Progress,
     check_substeps,
     plant_step,
     run_plant,

@@ -10,17 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ringbalance.controller.balancer import Progress
-from ringbalance.controller.eccentric_mass.advice import (
-    RunFacts,
-    found_beforehand,
-    remedies_of,
-)
-from ringbalance.controller.eccentric_mass.integration import (
-    check_substeps,
-    plant_step,
-    run_plant,
-    stretches,
-)
+from ringbalance.controller.eccentric_mass.advice import RunFacts, found_beforehand, remedies_of
+from ringbalance.controller.eccentric_mass.integration import check_substeps, plant_step, run_plant, stretches
 from ringbalance.controller.eccentric_mass.plan import (
     RELEASED,
     STAGE_NAMES,
@@ -40,11 +31,7 @@ from ringbalance.controller.eccentric_mass.plant import (
     turned,
 )
 from ringbalance.controller.eccentric_mass.resolution import expected_deviation, rotor_covariance
-from ringbalance.controller.eccentric_mass.run_record import (
-    EccentricRun,
-    Record,
-    StageSpan,
-)
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, Record, StageSpan
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings, believed_whirl
 from ringbalance.controller.eccentric_mass.step import strategy_start, strategy_step

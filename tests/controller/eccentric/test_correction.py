@@ -11,10 +11,7 @@ from eccentric_runs import bundled, stage_names
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
-from ringbalance.controller.eccentric_mass.scene_records import (
-    EccentricScene,
-    eccentric_drawn,
-)
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.verification.eccentric_scenes import at_constant_speed, changed
 

@@ -13,11 +13,7 @@ import pytest
 from eccentric_runs import bundled, stage_of, true_imbalance
 from scipy.stats import chi2
 
-from ringbalance.controller.eccentric_mass.advice import (
-    _of_time,
-    _slower_walks,
-    found_beforehand,
-)
+from ringbalance.controller.eccentric_mass.advice import _of_time, _slower_walks, found_beforehand
 from ringbalance.controller.eccentric_mass.integration import check_substeps, longest_run
 from ringbalance.controller.eccentric_mass.plan import Stage
 from ringbalance.controller.eccentric_mass.resolution import friction_floor

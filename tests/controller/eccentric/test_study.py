@@ -12,12 +12,7 @@ from eccentric_runs import bundled
 
 from ringbalance.controller.eccentric_mass import study as study_module
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.study import (
-    DRAWS,
-    _EccentricStudy,
-    eccentric_study,
-    interval,
-)
+from ringbalance.controller.eccentric_mass.study import DRAWS, _EccentricStudy, eccentric_study, interval
 from ringbalance.results.requirements import Requirement
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.eccentric_scenes import changed

@@ -309,15 +309,3 @@ def test_the_printed_process_noise_is_no_covariance() -> None:
         if not np.all(np.isfinite(estimate.covariance)):
             break
     assert lowest < -1e-8
-
-
-def test_the_printed_damping_matrix_is_no_whirl() -> None:
-    """Eq. 12 adds 2 W M on the diagonal: a damping that the speed makes, and no gyroscopic coupling."""
-    generator = whirl_generator(model=MODEL, angular_velocity=SPEED)
-    printed = generator.copy()
-    printed[2, 2:4] = [-(MODEL.damping / MODEL.mass + 2 * SPEED), 0.0]
-    printed[3, 2:4] = [0.0, -(MODEL.damping / MODEL.mass + 2 * SPEED)]
-    right = np.max(np.linalg.eigvals(generator[:4, :4]).real)
-    wrong = np.max(np.linalg.eigvals(printed[:4, :4]).real)
-    assert right == pytest.approx(-MODEL.damping / (2 * MODEL.mass))
-    assert abs(wrong - right) > 1.0

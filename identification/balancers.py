@@ -22,8 +22,7 @@ from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.loss import BUILT_CAUSES, MODEL_CAUSES
-from ringbalance.scene.joint import with_model_error
-from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
+from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
@@ -34,6 +33,7 @@ from ringbalance.scene.uncertain import (
     half_widths,
     nominal_value,
     shifted,
+    with_model_error,
 )
 
 _LITTLE: Final = 1e-4

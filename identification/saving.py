@@ -25,7 +25,7 @@ from ringbalance.scene.loader import scene_from
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import MeasuredFile, MeasuredFinding
 from ringbalance.scene.platform.files import write_whole
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.scene.uncertain import SHAPE
 
 _RISE_DIGITS: Final = 4

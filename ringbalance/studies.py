@@ -25,7 +25,7 @@ from ringbalance.results.result import Result, Rows
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.changes import checked_scene, document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.verification.extremes.cli import base_of
 from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
 from ringbalance.verification.result import CaseResult

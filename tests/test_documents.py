@@ -19,7 +19,7 @@ from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.controller.eccentric_mass.tuning import tune_eccentric
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.verification.extremes.cli import base_of
 from ringbalance.verification.extremes.study import Size, find_extremes
 

@@ -34,11 +34,11 @@ from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Quantity
 from ringbalance.scene import load_scene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.joint import without_fitted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import Models, liquid_ring_scene, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.uncertain import without_fitted
 from ringbalance.verification.evidence import Level
 
 Record = dict[str, Any]

@@ -45,11 +45,19 @@ from ringbalance.scene.keys.fields import (
     quantity,
 )
 from ringbalance.scene.keys.schema import ORIGIN, Schema, Table
-from ringbalance.scene.kinds import SceneKind
+from ringbalance.scene.kinds import (
+    Check,
+    Finding,
+    Rule,
+    SceneKind,
+    check,
+    limit_above_noise,
+    reader_of,
+    written,
+)
 from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.origins import InputUncertainty, SceneFile
 from ringbalance.scene.paths import moved_at
-from ringbalance.scene.rules.check import Check, Finding, Rule, check, limit_above_noise, reader_of, written
 from ringbalance.scene.uncertain import NORMAL_95
 
 Frame = Literal["rotor", "laboratory"]

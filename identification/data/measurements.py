@@ -27,7 +27,8 @@ from ringbalance.identification.data.tables import (
     split_head,
 )
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, StringArray
-from ringbalance.scene.faults import Fault, toml_text
+from ringbalance.scene.faults import Fault
+from ringbalance.scene.toml import toml_text
 from ringbalance.scene.uncertain import NORMAL_95
 
 _MOST_SHOWN: Final = 20

@@ -27,9 +27,10 @@ from ringbalance.identification.data.tables import (
     split_head,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.faults import Fault, SceneError, did_you_mean, toml_text
+from ringbalance.scene.faults import Fault, SceneError, did_you_mean
 from ringbalance.scene.keys.fields import LETTERS, half_width
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
+from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import FieldError, parse_quantity
 
 AMPLITUDE: Final = "amplitude"

@@ -17,8 +17,8 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, StringArray
-from ringbalance.scene.faults import Fault, did_you_mean, toml_text
-from ringbalance.scene.toml_reading import read_toml
+from ringbalance.scene.faults import Fault, did_you_mean
+from ringbalance.scene.toml import read_toml, toml_text
 from ringbalance.scene.units import DIMENSIONS, FieldError, parse_number, parse_quantity
 
 LARGEST_FILE: Final = 8 * 2**20

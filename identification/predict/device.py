@@ -27,7 +27,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.model_errors import START_ERROR
+from ringbalance.scene.fitted import START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
 

@@ -25,10 +25,9 @@ from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.scene.joint import with_model_error
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value, shifted
+from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value, shifted, with_model_error
 
 SCENES: Final = ("liquid_ring_paper", "six_chamber", "perfluorinated_oil")
 FITTED: Final = ("influence_coefficient", "lag_angle", "bore", "lambda_factor")

@@ -20,10 +20,9 @@ from ringbalance.identification.predict.device import Models
 from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.scene.joint import with_model_error
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.scene.uncertain import with_value
+from ringbalance.scene.uncertain import with_model_error, with_value
 
 UNBALANCE = 1e-4 * np.array([0, 1, 1, 2, 2, 1, 0, 2])
 ANGLE = np.array([0, 0.3, 2.5, 4.0, 1.0, 5.5, 0, 3.0])

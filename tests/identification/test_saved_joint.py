@@ -26,9 +26,9 @@ from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.values import measured_closed_forms
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR, ModelError
+from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR, ModelError
 from ringbalance.scene.models import Scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 
 PAPER = str(bundled_scene("liquid_ring_paper"))
 INJECTIONS = str(example_measurements.FOLDER / "injection.csv")

@@ -16,7 +16,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.verification.extremes import design as extremes_design
 from ringbalance.verification.extremes import point as extremes_point
 from ringbalance.verification.extremes.axes import AXES, fitted, varied

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Final
 
 from ringbalance.scene.changes import document_of
-from ringbalance.scene.faults import Fault, SceneError, toml_text
+from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.processes import checked_workers
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.toml import toml_text
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.design import Base
 from ringbalance.verification.extremes.study import SIZES, find_extremes

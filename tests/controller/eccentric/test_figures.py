@@ -16,16 +16,15 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import DriveLaw
 from ringbalance.controller.eccentric_mass.step import friction_torque
 from ringbalance.controller.eccentric_mass.targets import target_angles
-from ringbalance.verification.cases.driven_bound.case import motion_bound
-from ringbalance.verification.cases.driven_fig4_imbalance.case import (
+from ringbalance.verification.cases.driven_balancing import BalancingFigure, motion_bound, run_up
+from ringbalance.verification.cases.driven_estimation import (
     estimate_imbalance,
     figure_four,
+    friction_runs,
+    friction_time,
     imbalance_record,
 )
-from ringbalance.verification.cases.driven_fig5_friction.case import friction_runs, friction_time
-from ringbalance.verification.cases.driven_fig6_effort.case import efforts, growth, printed_compensation
-from ringbalance.verification.cases.driven_fig7_positioning.case import BalancingFigure
-from ringbalance.verification.cases.driven_fig9_run_up.case import compute as run_up
+from ringbalance.verification.cases.driven_positioning import efforts, growth, printed_compensation
 from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 
 

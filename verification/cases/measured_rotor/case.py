@@ -39,6 +39,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             f"washers_{count}": Found(value=float(predicted[count]), input=spread * count / math.sqrt(2))
             for count in _PREDICTED
         },
+        reference=_reference(),
         numbers={
             "points": float(sum(_chosen(run, "plain", count).size for count in _PREDICTED)),
             "taught_points": float(sum(_chosen(run, "plain", count).size for count in _TAUGHT)),
@@ -60,7 +61,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
 
 
-def reference(scene: Scene) -> dict[str, Reference]:
+def _reference() -> dict[str, Reference]:
     """The measured amplitudes; u_D of their scatter over the speeds and of the washers on the disc."""
     run = measurements("rodrigues_2011")
     found = {}

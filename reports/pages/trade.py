@@ -5,11 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Final
 
-import numpy as np
-from matplotlib.axes import Axes
-
-from ringbalance.reports.figures import style
-from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.figure import FOUND, PAPER, Drawing, curve, draw, level, logarithmic
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.result import Table
 from ringbalance.scene.models import Scene
@@ -52,33 +48,25 @@ def _quantity(quantity: Record, times: Record) -> Record:
         "title": title,
         "status": table.note,
         "models": table,
-        "figure": _figure(quantity, speed, title),
+        "figure": _figure(quantity, speed),
     }
 
 
-def _figure(quantity: Record, speed: Record, title: str) -> Drawing:
+def _figure(quantity: Record, speed: Record) -> Drawing:
     """Error against designs a second of every model that was timed."""
     models = [model for model in quantity["models"] if model["model"] in speed]
-    rates = np.array([speed[model["model"]] for model in models])
-    errors = np.array([max(model["error"], _LEAST) for model in models])
-    known = quantity["uncertainty"]
-
-    def paint(axes: Axes) -> None:
-        axes.plot(rates, errors, "o", color=style.FOUND, markersize=5, label="models")
-        axes.axhline(max(known, _LEAST), color=style.PAPER, linewidth=1, linestyle=":", label="known to")
-        style.logarithmic(axes, "x")
-        style.logarithmic(axes, "y")
-
+    rates = [speed[model["model"]] for model in models]
+    errors = [max(model["error"], _LEAST) for model in models]
     return draw(
+        f"trade-{quantity['quantity'].replace('_', '-')}",
+        curve(rates, errors, "models", color=FOUND, linestyle="", marker="o", markersize=5),
+        level(max(quantity["uncertainty"], _LEAST), "known to", color=PAPER, linewidth=1, linestyle=":"),
+        logarithmic("x"),
+        logarithmic("y"),
+        x=("designs a second", "1"),
+        y=("error against the finest", "1"),
         columns=4,
-        x="designs a second",
-        y="error against the finest",
-        name=f"trade-{quantity['quantity'].replace('_', '-')}",
-        paint=paint,
         height=2.9,
-        alt=f"Error of {len(models)} models for {quantity['title']} against the designs that each answers in "
-        "a second.",
-        caption=f"{title}. The finest model is drawn at 10⁻¹²; dotted: what it is itself known to.",
     )
 
 

@@ -14,6 +14,7 @@ from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
+from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -68,8 +69,6 @@ class Draws:
         return cls(numbers=tuple(range(count)), devices=devices)
 
 
-CALIBRATED: Final = "calibrated"
-"""The law of a liquid ring where no other is asked for."""
 AS_GIVEN: Final = Draws.first(1, devices=False)
 """The scene as it says, with its own seed."""
 
@@ -119,7 +118,7 @@ class Outcomes:
     traced: tuple[TracedRun, ...] = ()
 
 
-class Recommendation(Protocol):
+class _Recommendation(Protocol):
     """What `tune` answers with."""
 
     @property
@@ -210,7 +209,7 @@ class Balancer(Protocol):
         """With the settings that its formulas recommend, and those that this changed, SI; no run is made."""
         ...
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> Recommendation:
+    def recommend(self, *, progress: Callable[[str], None] | None = None) -> _Recommendation:
         """Settings, judged by runs over the draws."""
         ...
 

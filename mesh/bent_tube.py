@@ -40,8 +40,6 @@ class SweptTube:
 
     mesh: Any
     """`skfem.MeshHex2` with boundaries inlet, outlet and those of the section."""
-    slab: IntArray
-    """Number of the slab along the path, by element."""
     section_node: IntArray
     """Node of the section that each node stands on."""
     half_station: IntArray
@@ -148,7 +146,6 @@ def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
     mesh = MeshHex2(np.ascontiguousarray(points), prism.t)
     return SweptTube(
         mesh=mesh.with_boundaries(_boundaries(section, prism, slabs)),
-        slab=np.repeat(np.arange(slabs), section.t.shape[1]).astype(np.int64),
         section_node=np.asarray(node, dtype=np.int64),
         half_station=half,
         arc_length=at,

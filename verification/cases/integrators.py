@@ -38,13 +38,13 @@ from ringbalance.verification.evidence import (
     from_half_width,
 )
 from ringbalance.verification.orders import OrderStudy
-from ringbalance.verification.reference.marched import marched
 from ringbalance.verification.reference.transfers import (
     Drive,
     Integrator,
     adaptive_ode,
     closed_form,
     explicit_segments,
+    marched,
     paper_drive,
 )
 

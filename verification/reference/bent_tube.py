@@ -29,11 +29,15 @@ from ringbalance.physics.results import Statistics, Status
 from ringbalance.physics.tube.local_losses import MOMENTUM_FACTOR
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.continuation import StepRule, follow
-from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.newton import (
+    FlowSolution,
+    NewtonSettings,
+    StepRule,
+    follow,
+    solve_flow,
+)
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, developed_section
-from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 Progress = Callable[[str], None]
 _NEWTON = NewtonSettings(tolerance=1e-7, max_iterations=10)
@@ -96,7 +100,7 @@ class BentTubeFlow:
         developed = developed_section(system=section, kl=kl, s=s)
         tube = swept_tube(section=cells.mesh(), segments=segments)
         system = _system(tube, section, developed, reynolds)
-        say(f"{system.free.size} unknowns in {int(tube.slab.max()) + 1} slabs")
+        say(f"{system.free.size} unknowns in {tube.arc_length.size // 2} slabs")
         rotation = 2 * rotation_reynolds * coriolis_factor
 
         def solve(share: float, start: FlowSolution) -> FlowSolution:
@@ -171,7 +175,7 @@ def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reyno
     conditions = [Dirichlet(boundary="symmetry", component=2)]
     conditions += [Dirichlet(boundary=name, component=c) for name in ("inlet", "wall") for c in range(3)]
     space = FlowSpace.taylor_hood(mesh=tube.mesh)
-    system = FlowSystem.of(space=space, conditions=conditions, coriolis=CORIOLIS, slab=tube.slab)
+    system = FlowSystem.of(space=space, conditions=conditions, coriolis=CORIOLIS)
     velocity = _swept_velocity(tube, developed, reynolds)
     velocity[:, space.boundary_nodes("wall")] = 0.0
     fixed = np.concatenate([velocity.ravel(), np.zeros(space.pressure_nodes)])

@@ -14,6 +14,7 @@ from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
+from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -68,8 +69,6 @@ class Draws:
         return cls(numbers=tuple(range(count)), devices=devices)
 
 
-CALIBRATED: Final = "calibrated"
-"""The law of a liquid ring where no other is asked for."""
 AS_GIVEN: Final = Draws.first(1, devices=False)
 """The scene as it says, with its own seed."""
 

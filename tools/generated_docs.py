@@ -28,7 +28,7 @@ from ringbalance.reports.saved import saved_cases
 from ringbalance.results.rows import sentences
 from ringbalance.scene import write_whole
 from ringbalance.verification.catalogue import load_cases
-from ringbalance.verification.document import case_document, definition_document
+from ringbalance.verification.result import definition_document
 from ringbalance.verification.runner import paper_scene, run_case
 from ringbalance.verification.standing import HEADS, standing_rows
 from ringbalance.verification.validation.kinds import KINDS
@@ -151,9 +151,7 @@ def _documents() -> list[dict[str, Any]]:
     """Cases that compare with measurements, run; of the others their text."""
     scene = paper_scene()
     return [
-        case_document(run_case(case.id, scene=scene))
-        if case.kind == "validation"
-        else definition_document(case)
+        run_case(case.id, scene=scene).to_dict() if case.kind == "validation" else definition_document(case)
         for case in load_cases()
     ]
 

@@ -28,7 +28,13 @@ from ringbalance.reduced_model.operating_point import priming_pressure
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.path import crest_span
-from ringbalance.reduced_model.tube.regime import TubeEnds, can_flow
+from ringbalance.reduced_model.tube.regime import (
+    TubeEnds,
+    can_flow,
+    cavity_bounds,
+    crest_margins,
+    driving_pressure,
+)
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.liquids import known_liquids, liquid_at
@@ -104,13 +110,13 @@ class DragPoint:
         level = chamber_pressure(scene=varied, fill_ratio=varied.disc.max_fill_ratio / 2) * np.ones(
             designs.size
         )
-        ends, crest = tube.ends(level, level), tube.path.crest
+        ends, path = tube.ends(level, level), tube.path
         column = tube.flow(ends, primed=True)
-        runs = np.asarray(can_flow(ends=ends, crest=crest, primed=True))
-        starts = np.asarray(can_flow(ends=ends, crest=crest, primed=False))
+        runs = np.asarray(can_flow(path, ends, True))
+        starts = np.asarray(can_flow(path, ends, False))
         u = np.where(runs, column.velocity, 1.0)
         excess = np.full(designs.size, -1.0)
-        if crest is not None:
+        if path.crest:
             both = (np.where(runs, v, 1.0) for v in (column.siphon_velocity, column.separation_velocity))
             excess = np.log(next(both)) - np.log(next(both))
         separated = runs & (excess > 0)
@@ -173,7 +179,7 @@ def _width(
 def _drive_width(
     law: CalibratedLaw,
     tube: TubeFlow,
-    ends: TubeEnds[FloatArray],
+    ends: TubeEnds,
     separated: BoolArray,
     density: FloatArray | float,
 ) -> FloatArray:
@@ -183,20 +189,20 @@ def _drive_width(
     levels = ratio * np.sqrt(2) * float(law.hydrostatic_pressure_uncertainty(law.max_fill_ratio / 2))
     of_gas = np.hypot(density, inputs.relative_gas_pressure) * gas
     siphon = np.hypot(levels, of_gas) / np.maximum(np.abs(gas), 1e-100)
-    crest = tube.path.crest
-    if crest is None:
+    path = tube.path
+    if not path.crest:
         return np.asarray(siphon)
-    low, high = crest.cavity_bounds(ends)
+    low, high = cavity_bounds(path, ends)
     squares = (
         levels**2
-        + (density * (gas - crest.vapour_pressure)) ** 2
+        + (density * (gas - path.vapour_pressure)) ** 2
         + (inputs.relative_gas_pressure * gas) ** 2
-        + (2 * inputs.relative_speed * (level - crest.column_pressure)) ** 2
+        + (2 * inputs.relative_speed * (level - path.column_pressure)) ** 2
         + (ratio * inputs.hump_pressure) ** 2
         + inputs.vapour_pressure**2
-        + (max(crest.released, 1 - crest.released) * (high - low)) ** 2
+        + (max(path.released, 1 - path.released) * (high - low)) ** 2
     )
-    over = np.sqrt(squares) / np.maximum(crest.separation_margin(ends), 1e-100)
+    over = np.sqrt(squares) / np.maximum(crest_margins(path, ends)[0], 1e-100)
     return np.asarray(np.where(separated, over, siphon), dtype=np.float64)
 
 
@@ -496,14 +502,14 @@ class ApparentDrag:
         Raises: ValueError: a law without a crest, or a velocity that is not positive and finite.
         Source: Eq. 18 of the liquid-ring paper and the crest's energy balance.
         """
-        crest, crest_head = law.path.crest, law.heads.hump_head
-        if crest is None or crest_head is None:
+        crest_head = law.heads.hump_head
+        if crest_head is None:
             raise ValueError("a tube without a siphon crest does not separate: give tube.hump_radius")
         u = np.asarray(velocity, dtype=np.float64)
         if not np.all(np.isfinite(u) & (u > 0)):
             raise ValueError("velocity must be positive and finite")
         ends = law.ends(fill_ratio=0.0, opposite_fill_ratio=opposite_fill_ratio)
-        excess = float(ends.driving_pressure() - crest.separation_margin(ends)) / law.density
+        excess = float(driving_pressure(law.path, ends) - crest_margins(law.path, ends)[0]) / law.density
         siphon, lower_bound = (
             2 * np.exp(table(np.log(u))) / u**2 - 1 for table in (law.heads.head, crest_head)
         )

@@ -70,7 +70,7 @@ def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.
     """
     flow = law.evaluate(fill_ratio=fill, gas_pressure=pressure)
     ends = law.ends(fill_ratio=fill, gas_pressure=pressure)
-    covered = ends.downstream_hydrostatic >= ends.port_pressure
+    covered = ends.downstream_hydrostatic >= law.path.port_pressure
     spills = (flow.regime == Regime.SEPARATED) & ~flow.primed & covered
     return np.asarray(np.where(spills, _NAMES.index(_SPILLING), flow.regime), dtype=np.int64)
 

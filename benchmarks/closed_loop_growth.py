@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from rich.console import Console
 
 from ringbalance.reduced_model.calibration import calibrate
-from ringbalance.reports.studies.consequences import find_consequences
+from ringbalance.reports.pages.consequences import find_consequences
 from ringbalance.scene.models import Scene
 
 FIRST_CALL = """

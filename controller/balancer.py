@@ -14,6 +14,7 @@ from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
+from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -22,7 +23,7 @@ from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.registry import balancer_class
+from ringbalance.scene.registry import registered
 from ringbalance.scene.units import DIMENSIONS
 
 Progress = Callable[[float, float], None]
@@ -68,8 +69,6 @@ class Draws:
         return cls(numbers=tuple(range(count)), devices=devices)
 
 
-CALIBRATED: Final = "calibrated"
-"""The law of a liquid ring where no other is asked for."""
 AS_GIVEN: Final = Draws.first(1, devices=False)
 """The scene as it says, with its own seed."""
 
@@ -119,7 +118,7 @@ class Outcomes:
     traced: tuple[TracedRun, ...] = ()
 
 
-class Recommendation(Protocol):
+class _Recommendation(Protocol):
     """What `tune` answers with."""
 
     @property
@@ -210,7 +209,7 @@ class Balancer(Protocol):
         """With the settings that its formulas recommend, and those that this changed, SI; no run is made."""
         ...
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> Recommendation:
+    def recommend(self, *, progress: Callable[[str], None] | None = None) -> _Recommendation:
         """Settings, judged by runs over the draws."""
         ...
 
@@ -241,7 +240,7 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
     Args: `options`: of its class, such as `flow_law` of a liquid ring; None counts as not given.
     Raises: ValueError: an option that this balancer does not have.
     """
-    made = balancer_class(scene.balancer)
+    made = registered("balancer", scene.balancer)
     given = {name: value for name, value in options.items() if value is not None}
     if foreign := sorted(set(given) - made.options):
         raise ValueError(f"the balancer {scene.balancer} has no {', '.join(foreign)}: leave that out")
@@ -251,7 +250,7 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
 
 def takes(scene: SceneFile, option: str) -> bool:
     """Whether the balancer of a scene has an option, such as "flow_law"."""
-    return option in balancer_class(scene.balancer).options
+    return option in registered("balancer", scene.balancer).options
 
 
 def balancer_under(law: str, scene: SceneFile) -> Balancer:

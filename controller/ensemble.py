@@ -19,8 +19,7 @@ from ringbalance.controller.terms import check_fit, dynamics_of, run_models, ter
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
-from ringbalance.reduced_model.residual_liquid import Drawing
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, FlowLaw
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
@@ -97,8 +96,8 @@ class EnsemblePlan:
     rotor: Rotor
     assumed_lag: float
     """rad."""
-    drawing: Drawing
-    """From which the residual fill of each member follows."""
+    scene: Scene
+    law: FlowLaw
 
     @classmethod
     def of(
@@ -119,7 +118,8 @@ class EnsemblePlan:
             loop=loop_factor(scene, model, algorithm),
             rotor=scene.rotor,
             assumed_lag=scene.controller.assumed_lag_angle,
-            drawing=Drawing.of(scene, law=model.flow),
+            scene=scene,
+            law=model.flow,
         )
 
     def run(self, members: Members, *, seed: int, number: int = 0) -> MemberRuns:
@@ -132,7 +132,7 @@ class EnsemblePlan:
         runs = self.plan.runs(members.proportional.size)
         runs["speed"], runs["proportional"] = members.velocity_factor, members.proportional
         runs["gain"] = members.moment_factor * members.influence_coefficient * np.exp(-1j * members.lag_angle)
-        runs["residual_fill"] = members.residual_fill(self.drawing)
+        runs["residual_fill"] = members.residual_fill(self.scene, law=self.law)
         runs["stays"] = self._stay(members)
         if members.gas_line is not None:
             runs["gas_line"] *= members.gas_line.T

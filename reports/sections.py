@@ -13,21 +13,21 @@ from itertools import count
 from types import MappingProxyType
 from typing import Any, Final
 
-from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.pages import drag_coefficient as fifty
+from ringbalance.reports.figure import Drawing
 from ringbalance.reports.pages import (
+    chamber,
+    drag_coefficient,
     eccentric,
-    extremes,
     first_page,
+    loop,
     measured,
     operation,
-    sloshing,
-    trade,
+    paper_figures,
+    plain,
+    studies,
+    tube,
+    tube_flow,
 )
-from ringbalance.reports.pages import paper_figures as paper_again
-from ringbalance.reports.pages import siphon_crest as hump
-from ringbalance.reports.pages import tube_flow as inside
-from ringbalance.reports.pages.loop import CONSEQUENCES, LOOP
 from ringbalance.reports.pages.standing import CONDITIONS, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Place, Record, Section, Work
 from ringbalance.scene import Scene
@@ -39,32 +39,36 @@ SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
     CONDITIONS,
     operation.SECTION,
-    LOOP,
+    loop.LOOP,
     Section(name="claims", title="Claims of the liquid-ring paper", place="report"),
     CREDIBILITY,
     Section(name="parameters", title="Parameters and their origin", place="report"),
     DOCUMENT,
-    Section(name="disc", title="The disc and its liquid"),
-    Section(name="pressure", title="Pressure of the liquid"),
-    Section(name="moment", title="Balancing moment and λ"),
-    sloshing.SECTION,
-    Section(name="tube", title="The connecting tube"),
-    inside.SECTION,
-    Section(name="law", title="The flow law"),
-    hump.SECTION,
-    fifty.SECTION,
-    Section(name="injections", title="The closed loop, injection by injection"),
-    paper_again.SECTION,
-    CONSEQUENCES,
+    chamber.DISC,
+    chamber.PRESSURE,
+    chamber.MOMENT,
+    chamber.WAVES,
+    tube.TUBE,
+    tube_flow.SECTION,
+    tube.LAW,
+    tube.CREST,
+    drag_coefficient.SECTION,
+    loop.INJECTIONS,
+    paper_figures.SECTION,
+    loop.CONSEQUENCES,
     Section(name="cases", title="Claims: evidence and doubts"),
     eccentric.SECOND_BALANCER,
     Section(name="numerics", title="Numerical verification"),
-    extremes.SECTION,
-    trade.SECTION,
+    studies.EXTREMES,
+    studies.TRADE,
     Section(name="models", title="Models used, and why"),
     measured.SECTION,
     Section(name="scene", title="Scene file, mesh and versions"),
 )
+_BY_BALANCER: Final[Mapping[str, tuple[Section, ...]]] = MappingProxyType(
+    {"liquid_ring": SECTIONS, eccentric.BALANCER: eccentric.SECTIONS}
+)
+"""Of those balancers that have pages of their own."""
 Begun = dict[str, Future[Record | None]]
 PREFIXES: Final[Mapping[Place, str]] = MappingProxyType({"report": "", "annex": "A"})
 """Before the number of every section, figure, table and equation of a document."""
@@ -101,7 +105,8 @@ def completed(found: Record, apart: Begun, work: Work, pool: Workers | None) -> 
 
 def sections_of(evidence: Record) -> tuple[Section, ...]:
     """The sections of a report on the evidence's kind of balancer."""
-    return eccentric.SECTIONS if evidence.get("balancer") == eccentric.BALANCER else SECTIONS
+    balancer = evidence.get("balancer", "liquid_ring")
+    return _BY_BALANCER.get(balancer, plain.SECTIONS)
 
 
 def section_view(name: str, text: str) -> Record | None:

@@ -95,8 +95,8 @@ def _with_seed(scene: AnyScene, seed: int | None) -> AnyScene:
 
 def _sheet(scene: AnyScene, run: Run) -> str:
     # Loading what draws takes as long as a short run.
-    from ringbalance.reports.figures.runs import figures_of  # noqa: PLC0415
-    from ringbalance.reports.figures.style import sheet  # noqa: PLC0415
+    from ringbalance.reports.figure import sheet  # noqa: PLC0415
+    from ringbalance.reports.run_figures import figures_of  # noqa: PLC0415
 
     return sheet(figures_of(scene, run))
 

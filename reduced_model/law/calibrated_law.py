@@ -6,10 +6,9 @@ Beside it the moment of a pair of chambers, from the same chamber.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,14 +16,20 @@ import numpy.typing as npt
 from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_table
-from ringbalance.reduced_model.chamber.contributions import mean_gravity
+from ringbalance.reduced_model.chamber.contributions import gravity_shares
 from ringbalance.reduced_model.chamber.values import RingValues, share_across
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, law_text, save_record
+from ringbalance.reduced_model.law.flow_law import CALIBRATED, Conditions, Flow, Regime, law_text, save_record
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
 from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty, siphon_margin
 from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
-from ringbalance.reduced_model.tube.regime import TubeEnds, TubePath
+from ringbalance.reduced_model.tube.regime import (
+    TubeEnds,
+    TubePath,
+    crest_margins,
+    driving_pressure,
+    possible_cavity,
+)
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import FITTED, direction_sides, independent_half_widths
@@ -58,11 +63,6 @@ class CalibratedLaw:
 
     The velocity is continuous in fills and pressure, except where the physics jumps: when a column separates
     at rest, and when a chamber's liquid leaves the port open.
-
-    `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
-    (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `hydrostatic_pressure` (Pa), and, of shape
-    (1,), `density`, `port_pressure`, `hump_pressure` (only with a crest), `vapour_pressure` (gauge, Pa), and
-    `released` and `froude_velocity` (m/s) of `SiphonCrest`.
     """
 
     name: str
@@ -129,7 +129,7 @@ class CalibratedLaw:
         fill_ratio: npt.ArrayLike,
         opposite_fill_ratio: npt.ArrayLike | None = None,
         gas_pressure: npt.ArrayLike = 0.0,
-    ) -> TubeEnds[FloatArray]:
+    ) -> TubeEnds:
         """Pressures at the tube's ends for flow out of the driven chamber; not checked."""
         x = np.asarray(fill_ratio, dtype=np.float64)
         y = self.max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
@@ -143,7 +143,6 @@ class CalibratedLaw:
             downstream_gas=np.zeros_like(gas),
             upstream_hydrostatic=own,
             downstream_hydrostatic=other,
-            port_pressure=self.path.port_pressure,
         )
 
     def holds(self, fill_ratio: float) -> bool:
@@ -174,34 +173,6 @@ class CalibratedLaw:
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)
-
-    def table(self) -> Mapping[str, FloatArray]:
-        """Plain arrays for compiled code, named in the class's docstring.
-
-        Returns: Copies, so that nothing can change the law.
-        """
-        heads = {
-            "log_head": self.heads.head,
-            "log_hump_head": self.heads.hump_head,
-            "log_return_hump_head": self.heads.return_hump_head,
-        }
-        scalars = {
-            "density": self.path.density,
-            "port_pressure": self.path.port_pressure,
-            "hump_pressure": self.path.hump_pressure,
-            "vapour_pressure": self.path.vapour_pressure,
-            "released": self.path.released,
-            "froude_velocity": self.path.froude_velocity,
-        }
-        return (
-            {"log_velocity": self.heads.head.nodes}
-            | {name: table.value.copy() for name, table in heads.items() if table is not None}
-            | {
-                "fill_ratio": self.hydrostatic_pressure.nodes,
-                "hydrostatic_pressure": self.hydrostatic_pressure.value.copy(),
-            }
-            | {name: np.array([value]) for name, value in scalars.items() if value is not None}
-        )
 
 
 def _joined(forward: DirectedFlow, backward: DirectedFlow, reverse: BoolArray) -> Flow:
@@ -243,7 +214,7 @@ class DirectedState:
         return cls(reverse=reverse, conditions=asked, drive=law.drive(asked, reverse=reverse))
 
     @property
-    def ends(self) -> TubeEnds[Any]:
+    def ends(self) -> TubeEnds:
         """Pressures at the tube's ends."""
         return self.drive.ends
 
@@ -252,18 +223,18 @@ class DirectedState:
 
         The state is that in the direction of the driving pressure.
         """
-        crest, head = law.path.crest, law.heads.to_crest(reverse=self.reverse)
-        if crest is None or head is None:
+        path, head = law.path, law.heads.to_crest(reverse=self.reverse)
+        if head is None:
             return None, None
-        driving, (low, high) = np.asarray(self.ends.driving_pressure()), crest.possible_cavity(self.ends)
+        driving, (low, high) = driving_pressure(path, self.ends), possible_cavity(path, self.ends)
         margin, width = siphon_margin(
             path=law.path,
             heads=law.heads,
             hump_head=head,
             inputs=law.inputs,
             drive=self.drive,
-            at_rest=np.asarray(crest.separation_margin(self.ends)),
-            spread=np.asarray(max(crest.released, 1 - crest.released) * (high - low)),
+            at_rest=np.asarray(crest_margins(path, self.ends)[0]),
+            spread=np.asarray(max(path.released, 1 - path.released) * (high - low)),
             velocity=velocity_of(table=law.heads.head, head=driving / law.density, where=driving > 0),
         )
         sides = [
@@ -318,7 +289,7 @@ def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
 
     The directions are turned to the singular vectors of the velocity's changes over fills and pressures.
     """
-    gravity = mean_gravity(scene) > scene.tolerance
+    gravity = gravity_shares(scene).mean > scene.tolerance
 
     def laws(turned: FloatArray | None = None) -> tuple[CalibratedLaw, ...]:
         sides = direction_sides(scene, turned=turned).values()
@@ -377,7 +348,7 @@ def _put_together(
     moment: CalibratedMoment,
 ) -> CalibratedLaw:
     return CalibratedLaw(
-        name="calibrated",
+        name=CALIBRATED,
         max_fill_ratio=scene.disc.max_fill_ratio,
         ambient_pressure=scene.gas.ambient_pressure,
         chamber_volume=chamber_volume(disc=scene.disc),

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -20,6 +19,8 @@ from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArr
 from ringbalance.scene.origins import summary_text
 from ringbalance.scene.platform.files import write_whole
 
+CALIBRATED: Final = "calibrated"
+"""Name of the law that `calibrate` makes, which is used where no other is asked for."""
 _FILL_SLACK: Final = 1e-9
 """Fill ratios this far outside the range are taken as its end: integrators land there by round-off."""
 
@@ -85,10 +86,6 @@ class FlowLaw(Protocol):
         Returns: Flow, of the broadcast shape of the arguments.
         Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
         """
-        ...
-
-    def table(self) -> Mapping[str, FloatArray]:
-        """Plain arrays for compiled code, named in the implementing law's docstring."""
         ...
 
 
@@ -271,9 +268,6 @@ class _Velocities:
     def evaluate(self, **conditions: Any) -> Flow:
         flow: Flow = self.law.evaluate(**conditions)
         return flow
-
-    def table(self) -> Mapping[str, FloatArray]:
-        return {}
 
 
 def lacking(law: object) -> tuple[str, ...]:

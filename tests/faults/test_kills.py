@@ -46,20 +46,6 @@ if __name__ == "__main__":
     except KeyboardInterrupt:
         sys.exit(130)
 """
-SPREAD = """
-import multiprocessing, threading, time
-from ringbalance.verification.runner import paper_scene, run_cases
-
-def end_the_worker():
-    while not (workers := multiprocessing.active_children()):
-        time.sleep(0.01)
-    workers[0].kill()
-
-if __name__ == "__main__":
-    threading.Thread(target=end_the_worker).start()
-    for result in run_cases(["claim_01_volume", "gci_celik2008"], scene=paper_scene(), workers=2):
-        print(result.definition.id, result.verdict)
-"""
 CODES = {signal.SIGKILL: -signal.SIGKILL, signal.SIGTERM: 130, signal.SIGINT: 130}
 
 
@@ -111,15 +97,6 @@ def test_a_worker_ends_with_its_parent(ending: signal.Signals, group: bool, tmp_
         assert time.monotonic() - start < 10
 
 
-def test_a_worker_that_the_system_ends_loses_no_case(tmp_path: Path) -> None:
-    (tmp_path / "spread.py").write_text(SPREAD)
-    command = [sys.executable, str(tmp_path / "spread.py")]
-    child = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
-    assert child.returncode == 0, child.stderr
-    assert child.stdout.split() == ["claim_01_volume", "confirmed", "gci_celik2008", "passed"]
-    assert "Traceback" not in child.stderr
-
-
 @pytest.mark.parametrize("number", range(6))
 def test_a_killed_run_leaves_nothing(number: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     """At any time, by any signal, to the process or to its group; all of them write to one folder."""
@@ -149,25 +126,3 @@ def test_a_killed_run_leaves_nothing(number: int, tmp_path_factory: pytest.TempP
     assert "resource_tracker" not in told
     assert wait_until(lambda: not living(mark), limit=5), living(mark)
     assert [path.name for path in out.iterdir() if not path.name.startswith(".ringbalance-")] == ["mine"]
-
-
-def test_the_next_run_removes_what_a_killed_one_left(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    command = [sys.executable, "-c", READY, "plot", PAPER, "--out", str(out)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
-        assert wait_until(lambda: any(out.glob(".ringbalance-*/files/fields/*.vtu")), limit=60)
-        child.kill()
-    left = set(out.iterdir())
-    assert left
-    time.sleep(1.1)
-
-    def written() -> list[Path]:
-        found = out.glob(".ringbalance-*/files/fields/*.vtu")
-        # The killed one may have written both files before the signal reached it.
-        return [path for path in found if not left & set(path.parents)]
-
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
-        assert wait_until(lambda: len(written()) == 2, limit=60)
-        child.send_signal(signal.SIGTERM)
-    assert list(out.iterdir()) == []

@@ -8,7 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from ringbalance.reports.pages import extremes, sloshing
+from ringbalance.reports.pages import chamber
+from ringbalance.reports.pages.studies import EXTREMES
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene
 
@@ -19,7 +20,7 @@ def meeting(first: list[float], third: list[float], met: list[int]) -> Record:
     """Fills at which mode 3 meets the speed, of three modes at three fills."""
     ratios = np.array([first, [0.8, 1.2, 1.5], third])
     fills = np.array([0.1, 0.3, 0.5])
-    avoided = {each["mode"]: each for each in sloshing.to_avoid(ratios, fills, met, imported=False)}
+    avoided = {each["mode"]: each for each in chamber._to_avoid(ratios, fills, met, imported=False)}
     assert 2 not in avoided
     return avoided.get(3, {})
 
@@ -37,14 +38,14 @@ def test_a_mode_that_only_may_meet_the_speed_is_named() -> None:
 
 def test_the_fill_at_which_the_swing_doubles_is_found() -> None:
     fills = np.array([0.1, 0.3, 0.5])
-    assert sloshing.nearing(fills, np.array([0.2, 1.0, 4.0])) == 0.5
-    assert sloshing.nearing(fills, np.array([3.0, 3.0, 4.0])) == 0.1
+    assert chamber._nearing(fills, np.array([0.2, 1.0, 4.0])) == 0.5
+    assert chamber._nearing(fills, np.array([3.0, 3.0, 4.0])) == 0.1
 
 
 def test_no_gravity_no_waves(vertical_scene: Scene) -> None:
     work = Work(scene=vertical_scene, calibration=cast(Any, None), level="light")
-    assert sloshing.SECTION.collect(work) is None
-    assert sloshing.SECTION.view({}) is None
+    assert chamber.WAVES.collect(work) is None
+    assert chamber.WAVES.view({}) is None
 
 
 @pytest.fixture
@@ -73,7 +74,7 @@ def evidence() -> Record:
 
 
 def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
-    view = extremes.SECTION.view(evidence())
+    view = EXTREMES.view(evidence())
     assert view is not None
     slow, fast, fill = view["table"].rows
     assert slow[:3] == ("speed", "1.00 to 160 rpm", "refused")
@@ -84,4 +85,4 @@ def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
 
 
 def test_extremes_that_were_not_run_say_so() -> None:
-    assert extremes.SECTION.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}
+    assert EXTREMES.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}

@@ -74,7 +74,7 @@ def _driving_heads(scene: Scene, shares: npt.ArrayLike) -> tuple[float, ...]:
 def _running(scene: Scene, heads: tuple[float, ...]) -> TubeLoss:
     """A full tube at the velocities with (k(u) + 1) u^2/2 = head, m^2/s^2, above zero."""
     head = np.array(heads)
-    return tube_loss(scene, velocity_of(table=TubeHeads.exact(scene).head, head=head, where=head > 0))
+    return tube_loss(scene, velocity_of(table=TubeHeads.of(scene).head, head=head, where=head > 0))
 
 
 def _under_gas(scene: Scene) -> TubeLoss:

@@ -1,4 +1,4 @@
-"""How every figure looks: one axis, few colours, and colours that follow the page between light and dark.
+"""How every figure looks, and the frame that each fills: axes, units, bands and legend, from values in SI.
 
 Figures are drawn in sentinel colours, which the SVG text then exchanges for CSS variables.  Nothing random,
 no date and no fixed colour remains, so the same data gives the same bytes.
@@ -7,22 +7,22 @@ no date and no fixed colour remains, so the same data gives the same bytes.
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from html import escape
-from typing import Any, Final, cast
+from typing import Any, Final, Literal, cast
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullLocator
+from matplotlib.ticker import AutoLocator, FuncFormatter, NullLocator
 from numpy.typing import ArrayLike
 
 from ringbalance.results.numbers import MINUS, display_unit, number, power_of_ten
-from ringbalance.scene.arrays import FloatArray
 
 INK: Final = "#010101"
 MUTED: Final = "#020202"
@@ -141,7 +141,10 @@ _RC: Final = {
     "text.parse_math": False,
 }
 
-Draw = Callable[[Axes], None]
+Paint = Callable[[Axes], object]
+"""What draws a part of a figure: on its axes, SI."""
+Axis = tuple[str, str]
+"""Name and SI unit of what an axis shows."""
 
 
 def line(index: int, *, size: float | None = None) -> dict[str, Any]:
@@ -152,10 +155,6 @@ def line(index: int, *, size: float | None = None) -> dict[str, Any]:
     return {"color": _LINE_COLOURS[place], "marker": _MARKERS[place], "markersize": size}
 
 
-Curve = tuple[ArrayLike, FloatArray, dict[str, Any]]
-"""Time, s, amplitude, m, and the line's properties."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Drawing:
     """A finished figure."""
@@ -164,10 +163,6 @@ class Drawing:
     """Of the file, and the prefix of every id in it."""
     svg: str
     """For an HTML page that defines the colour variables."""
-    alt: str
-    """What the figure shows, in a sentence, for those who cannot see it."""
-    caption: str = ""
-    """Where the template has none."""
     wide: bool = False
     """Whether it takes the page's whole width."""
 
@@ -233,39 +228,85 @@ def decade(value: float, _position: object = None) -> str:
 
 
 def logarithmic(
-    axes: Axes, axis: str, *, ticks: list[float] | None = None, within: tuple[float, float] | None = None
-) -> None:
+    axis: Literal["x", "y"], *, ticks: list[float] | None = None, within: tuple[float, float] | None = None
+) -> Paint:
     """Makes one axis logarithmic, labels in plain text: at ticks, at 1, 2, 5 within limits, or decades."""
-    getattr(axes, f"set_{axis}scale")("log")
-    target = getattr(axes, f"{axis}axis")
     if within is not None:
         fine = (1, 2, 5) if within[1] > _DECADE * within[0] else (1, 1.5, 2, 2.5, 3, 4, 5, 6, 7, 8)
-        steps = (step * 10.0**exponent for exponent in range(-9, 10) for step in fine)
+        steps = (step * 10.0**exponent for exponent in range(-12, 10) for step in fine)
         ticks = [step for step in steps if within[0] <= step <= within[1]]
-    if ticks is not None:
-        target.set_ticks(ticks)
-    target.set_major_formatter(FuncFormatter(decade if ticks is None else plain_number))
-    target.set_minor_locator(NullLocator())
+
+    def paint(axes: Axes) -> None:
+        axes.set(**{f"{axis}scale": "log"})
+        target = axes.xaxis if axis == "x" else axes.yaxis
+        if ticks is not None:
+            target.set_ticks(ticks)
+        target.set_major_formatter(FuncFormatter(decade if ticks is None else plain_number))
+        target.set_minor_locator(NullLocator())
+
+    return paint
 
 
-def amplitudes(
-    axes: Axes, curves: Iterable[tuple[ArrayLike, FloatArray, dict[str, Any]]], limit: float
-) -> None:
-    """Vibration amplitudes over time and the limit, m, on a logarithmic axis in the unit that suits them."""
-    told = list(curves)
-    unit = display_unit("m", limit, *(float(amplitude.max()) for _, amplitude, _ in told))
-    drawn = [(time, unit.factor * amplitude, drawn_as) for time, amplitude, drawn_as in told]
-    for time, values, drawn_as in drawn:
-        axes.plot(time, values, **drawn_as)
-    axes.axhline(limit * unit.factor, color=MUTED, linewidth=1, linestyle=":", label="limit")
-    every = np.append(np.concatenate([values for _, values, _ in drawn]), limit * unit.factor)
+def curve(
+    x: ArrayLike,
+    y: ArrayLike,
+    label: str | None = None,
+    *,
+    band: ArrayLike | None = None,
+    **look: Any,
+) -> Paint:
+    """A line or markers, and the half-width about them shaded where there is one."""
+
+    def paint(axes: Axes) -> None:
+        if band is not None:
+            values, width = np.asarray(y), np.asarray(band)
+            axes.fill_between(
+                np.asarray(x), values - width, values + width, color=look["color"], alpha=0.2, linewidth=0
+            )
+        axes.plot(np.asarray(x), np.asarray(y), label=label, **look)
+
+    return paint
+
+
+def level(value: float, label: str | None = None, **look: Any) -> Paint:
+    """A line across the whole figure."""
+    return lambda axes: axes.axhline(value, label=label, **look)
+
+
+def upright(value: float, label: str | None = None, **look: Any) -> Paint:
+    """A line from the bottom to the top."""
+    return lambda axes: axes.axvline(value, label=label, **look)
+
+
+def note(text: str, place: tuple[float, float], shift: tuple[float, float], **look: Any) -> Paint:
+    """A text beside a place, shifted by so many points."""
+    shifted = {"xytext": shift, "textcoords": "offset points", "color": MUTED}
+    return lambda axes: axes.annotate(text, place, **{**shifted, **look})
+
+
+AMPLITUDE: Final[Axis] = ("amplitude, zero to peak,", "m")
+TIME: Final[Axis] = ("time", "s")
+Curve = tuple[ArrayLike, ArrayLike, dict[str, Any]]
+"""Time, s, or speed; amplitude, m; and the line's properties."""
+
+
+def amplitudes(curves: Iterable[Curve], limit: float) -> Paint:
+    """Vibration amplitudes and the limit, m, on a logarithmic axis."""
+    drawn = list(curves)
+    every = np.append(np.concatenate([np.asarray(values) for _, values, _ in drawn]), limit)
     low, high = 0.7 * every[every > 0].min(), 1.4 * every.max()
-    logarithmic(axes, "y", within=(low, high) if high < _MANY * low else None)
-    axes.set_ylim(low, high)
-    axes.set(xlabel="time in s", ylabel=f"amplitude in {unit.symbol}, zero to peak", xlim=(0, None))
+
+    def paint(axes: Axes) -> None:
+        for time, values, look in drawn:
+            curve(time, values, **look)(axes)
+        level(limit, "limit", color=MUTED, linewidth=1, linestyle=":")(axes)
+        logarithmic("y", within=(low, high) if high < _MANY * low else None)(axes)
+        axes.set(xlim=(0, None), ylim=(low, high))
+
+    return paint
 
 
-def _to_page(text: str, name: str, alt: str) -> str:
+def _to_page(text: str, name: str) -> str:
     """Bare svg element: variables for colours and font, ids of its own, no fixed size."""
     body = text[text.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
@@ -278,7 +319,8 @@ def _to_page(text: str, name: str, alt: str) -> str:
     body = re.sub(r"font-family: [^;\"]*", "font-family: var(--fig-font)", body)
     for sentinel, variable in _VARIABLES.items():
         body = body.replace(sentinel, f"var({variable})")
-    body = body.replace("<svg ", f'<svg role="img" aria-label="{escape(alt, quote=True)}" ', 1)
+    # The frame around it on the page is what is read aloud, by the figure's caption.
+    body = body.replace("<svg ", '<svg aria-hidden="true" ', 1)
     # A tenth of a point is finer than the eye; what is small, as a marker, keeps another digit.
     parts = re.split(r'( (?:d|x|y|transform)="[^"]*")', body)
     parts[1::2] = _rounded("\0".join(parts[1::2])).split("\0")
@@ -292,20 +334,20 @@ def _rounded(attributes: str) -> str:
 
 
 def draw(
-    *,
     name: str,
-    paint: Draw,
-    alt: str,
-    caption: str = "",
-    x: str = "",
-    y: str = "",
+    *paints: Paint,
+    x: Axis = ("", "1"),
+    y: Axis = ("", "1"),
+    xlim: tuple[float | None, float | None] | None = None,
+    ylim: tuple[float | None, float | None] | None = None,
     columns: int = 2,
     wide: bool = False,
     height: float = 2.7,
 ) -> Drawing:
-    """Draws one figure with one axis, its labels, and the legend of what is labelled above it.
+    """Draws one figure: its paints one after the other, its axes in the units that suit, and above it the
+    legend of what is labelled.
 
-    Args: `columns`: of the legend; 0: none. `height`: inches of 72 units.
+    Args: `name`: of the file. `columns`: of the legend; 0: none. `height`: inches of 72 units.
     """
     settings: Any = dict(_RC)
     with matplotlib.rc_context(settings):
@@ -316,18 +358,50 @@ def draw(
         axes = figure.add_axes((_LEFT / width, _BOTTOM / height, *sizes))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(plain_number))
-        axes.set(xlabel=x, ylabel=y)
-        paint(axes)
+        for paint in paints:
+            paint(axes)
+        axes.set(xlim=xlim, ylim=ylim)
+        _in_unit(axes.xaxis, axes.get_xlim(), x)
+        _in_unit(axes.yaxis, axes.get_ylim(), y)
         if columns:
             legend_above(axes, columns=columns)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return Drawing(name=name, svg=_to_page(buffer.getvalue(), name, alt), alt=alt, caption=caption, wide=wide)
+    return Drawing(name=name, svg=_to_page(buffer.getvalue(), name), wide=wide)
 
 
-def band(axes: Axes, x: ArrayLike, y: FloatArray, width: FloatArray | float, colour: str) -> None:
-    """Shades a value's half-width, in the value's unit, about its line."""
-    axes.fill_between(x, y - width, y + width, color=colour, alpha=0.2, linewidth=0)
+def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], shown: Axis) -> None:
+    """Labels an axis, with its ticks in the unit that suits its ends."""
+    name, unit = shown
+    display = display_unit(unit, *limits)
+    axis.set_label_text(f"{name} in {display.symbol}" if name and display.symbol else name or display.symbol)
+    if display.factor == 1:
+        return
+    if not math.log10(display.factor).is_integer() and axis.get_scale() == "linear":
+        # Round in this unit they are not in the other.
+        low, high = sorted(end * display.factor for end in limits)
+        ticks = AutoLocator().tick_values(low, high)
+        axis.set_ticks([tick / display.factor for tick in ticks if low <= tick <= high])
+    text = axis.get_major_formatter()
+    axis.set_major_formatter(FuncFormatter(lambda value, place: text(value * display.factor, place)))
+
+
+def panels(axes: Axes, *boxes: tuple[float, float, float, float]) -> list[Axes]:
+    """Axes of their own in place of a figure's, each by left, bottom, width and height over the figure's."""
+    axes.set_axis_off()
+    return [figure_of(axes).add_axes(box) for box in boxes]
+
+
+def nice_span(span: float) -> list[float]:
+    """Two to five round ticks on either side of zero, and zero, within plus and minus a span."""
+    step = next(
+        step * 10.0**exponent
+        for exponent in range(math.floor(math.log10(span)) - 1, 99)
+        for step in (1, 2, 5)
+        if span / (step * 10.0**exponent) < 3
+    )
+    count = int(span / step)
+    return [step * place for place in range(-count, count + 1)]
 
 
 def figure_of(axes: Axes) -> Figure:
@@ -373,6 +447,7 @@ def sheet(drawings: Sequence[Drawing]) -> str:
             x, y, row = _MARGIN, y + row + _MARGIN, 0.0
         height = drawing.size[1]
         place = f'<svg x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" overflow="visible" '
-        placed.append(drawing.svg.replace("<svg ", place, 1))
+        told = f'role="img" aria-label="{drawing.name.replace("-", " ")}"'
+        placed.append(drawing.svg.replace("<svg ", place, 1).replace('aria-hidden="true"', told, 1))
         x, row = x + width + _MARGIN, max(row, height)
     return as_file("\n".join(placed), edge + _MARGIN, y + row + _MARGIN)

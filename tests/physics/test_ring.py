@@ -18,16 +18,11 @@ from ringbalance.physics.pressure.ring_samples import QUANTITIES, liquid_integra
 from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.models import Disc
 from ringbalance.verification.rings import mutated_force
 
 RHO, OMEGA = 1000.0, 10_000 * np.pi / 30
 FILLS = np.linspace(0.0, 0.5, 11)
-
-
-@pytest.fixture(scope="module")
-def disc(paper_scene: Scene) -> Disc:
-    return paper_scene.disc
 
 
 @pytest.fixture(scope="module")

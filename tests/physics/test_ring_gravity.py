@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 
 from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
+from ringbalance.physics.pressure.loads import liquid_integrals
 from ringbalance.physics.pressure.ring import ring_quantities
-from ringbalance.physics.pressure.ring_samples import liquid_integrals
 from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray

@@ -90,6 +90,12 @@ def a_run_answers_what_its_row_says(balancer: Balancer) -> None:
     assert "time_s" in columns
 
 
+def a_row_does_not_depend_on_the_trace(balancer: Balancer) -> None:
+    plain, traced = (balancer.run({}, Draws.first(2, devices=False), trace=kept) for kept in (False, True))
+    np.testing.assert_array_equal(plain.settled, traced.settled)
+    np.testing.assert_allclose(plain.settling_time, traced.settling_time, rtol=1e-4)
+
+
 def its_own_rotor_is_the_common_one(balancer: Balancer) -> None:
     rotor = balancer.rotor()
     again = balancer.on_rotor(rotor).rotor()
@@ -136,6 +142,7 @@ CHECKS: tuple[Check, ...] = (
     devices_differ,
     a_time_is_finite_where_it_settled,
     a_run_answers_what_its_row_says,
+    a_row_does_not_depend_on_the_trace,
     its_own_rotor_is_the_common_one,
     a_span_is_what_was_asked_for,
     it_survives_a_pickle,

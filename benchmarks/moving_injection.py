@@ -33,6 +33,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
 from ringbalance.reduced_model.tube.path import crest_span
+from ringbalance.reduced_model.tube.regime import cleared, resting_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
@@ -57,10 +58,9 @@ class Rival:
 
     def __init__(self, scene: Scene, model: BalancerModel) -> None:
         assert isinstance(model.flow, CalibratedLaw)
-        assert model.flow.path.crest is not None
         assert model.flow.heads.hump_head is not None
         self.scene, self.model, self.law = scene, model, model.flow
-        self.crest, self.hump_head = model.flow.path.crest, model.flow.heads.hump_head
+        self.crest, self.hump_head = model.flow.path, model.flow.heads.hump_head
         self.ambient = scene.gas.ambient_pressure
         self.upstream = crest_span(scene.tube)[1] * scene.tube.length
         lift = Lift.of(scene, law=model.flow)
@@ -80,7 +80,7 @@ class Rival:
             fill_ratio=y[0], opposite_fill_ratio=0.5 - y[0], gas_pressure=y[2] - self.ambient
         )
         gas = float(y[3]) - self.ambient
-        resting = float(self.crest.resting_pressure(ends))
+        resting = float(resting_pressure(self.crest, ends))
         low = self.crest.vapour_pressure
         cavity = low + self.crest.released * (max(gas, low) - low)
         return resting - cavity, resting - max(gas, cavity)
@@ -89,7 +89,7 @@ class Rival:
         return math.exp(float(self.hump_head.inverse(math.log(max(margin, 1e-9) / self.law.density))))
 
     def cleared(self, y: Y) -> float:
-        return float(self.crest.cleared(np.float64(self.spill(self.margins(y)[1]))))
+        return float(cleared(self.crest, self.spill(self.margins(y)[1])))
 
     def push(self, y: Y, speed: float, primed: bool) -> float:
         full_margin, gas_margin = self.margins(y)

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final, Protocol, Self, TypeVar
+from dataclasses import dataclass
+from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
+from ringbalance.reduced_model.law.flow_law import CALIBRATED
+from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
 from ringbalance.results.result import Rows
+from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.keys.fields import Reader
@@ -25,7 +28,6 @@ from ringbalance.scene.units import DIMENSIONS
 
 Progress = Callable[[float, float], None]
 """Called with the simulated time and the time limit, s."""
-SomeScene = TypeVar("SomeScene", bound=SceneFile)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,8 +69,6 @@ class Draws:
         return cls(numbers=tuple(range(count)), devices=devices)
 
 
-CALIBRATED: Final = "calibrated"
-"""The law of a liquid ring where no other is asked for."""
 AS_GIVEN: Final = Draws.first(1, devices=False)
 """The scene as it says, with its own seed."""
 
@@ -91,6 +91,21 @@ class Run(Protocol):
         ...
 
 
+@dataclass(frozen=True, kw_only=True)
+class TracedRun:
+    """One run and what it comes to."""
+
+    run: Run
+    settling_time: float | None
+    """s, from the start of balancing; None: not settled."""
+    final_amplitude: float
+    """m zero-to-peak."""
+    energy: float
+    """That it took, J."""
+    worst_amplitude: float
+    """Largest while balancing, m zero-to-peak."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcomes:
     """Of runs, in the order of the draws; arrays of shape (n,)."""
@@ -100,8 +115,7 @@ class Outcomes:
     """s, from the start of balancing; infinite where not settled."""
     final_amplitude: FloatArray
     """m zero-to-peak."""
-    runs: tuple[tuple[Run, float, float], ...] = ()
-    """Traced: each with the energy that it took, J, and its largest amplitude while balancing, m."""
+    traced: tuple[TracedRun, ...] = ()
 
 
 class Recommendation(Protocol):
@@ -199,8 +213,20 @@ class Balancer(Protocol):
         """Settings, judged by runs over the draws."""
         ...
 
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What is known of it without a run; among them "reach", the largest unbalance, kg m, that it cancels
+        wherever that lies."""
+        ...
+
+    def requirements(self) -> tuple[Requirement, ...]:
+        """What the scene demands of it, and what its runs come to."""
+        ...
+
     def rows(self, run: Any) -> Rows:
-        """One of its traced runs as `simulate` prints it."""
+        """One of its traced runs as `simulate` prints it.
+
+        A finding has the changes of the scene that would mend it (`Finding.changes`).
+        """
         ...
 
     def history(self, run: Any) -> Mapping[str, Sequence[Any]]:
@@ -242,8 +268,17 @@ def balancer_under(law: str, scene: SceneFile) -> Balancer:
     return balancer_of(scene, flow_law=law)
 
 
-def inputs_of(scene: SceneFile, half_widths: Mapping[str, float]) -> tuple[Input, ...]:
-    """Every value of a scene that its schema lets be uncertain. Args: `half_widths`: by path, SI."""
+def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = None) -> tuple[Input, ...]:
+    """Every value of a scene that its schema lets be uncertain.
+
+    Args: `width`: half-width, SI, by path and value; default what the scene states by path.
+    """
+    stated = {each.quantity: each for each in scene.uncertainty}
+
+    def of_scene(path: str, value: float) -> float:
+        uncertain = stated.get(path.split("[")[0])
+        return 0.0 if uncertain is None else uncertain.absolute(value)
+
     found = []
     for table, content in scene_kind(scene.balancer).schema.tables.items():
         for key, declared in content.keys.items():
@@ -255,29 +290,35 @@ def inputs_of(scene: SceneFile, half_widths: Mapping[str, float]) -> tuple[Input
             for entry, each in several:
                 path = f"{table}.{key}" if entry is None else f"{table}.{key}[{entry}]"
                 if each is not None:
-                    width = half_widths.get(path, half_widths.get(f"{table}.{key}", 0.0))
-                    found.append(Input(path=path, value=float(each), half_width=width, unit=unit))
+                    half = (width or of_scene)(path, float(each))
+                    found.append(Input(path=path, value=float(each), half_width=half, unit=unit))
     return tuple(found)
 
 
-def with_settings(scene: SomeScene, settings: Mapping[str, float]) -> SomeScene:
-    """A scene with values in place of its own, by path, SI; nothing is checked again."""
-    for path, value in settings.items():
-        table, _, key = path.partition(".")
-        changed: dict[str, Any] = {table: replace(getattr(scene, table), **{key: value})}
-        scene = replace(scene, **changed)
-    return scene
-
-
-def outcomes_of(rows: Sequence[tuple[Run, float | None, float, float, float]]) -> Outcomes:
-    """Of traced runs: each with its settling time from the start of balancing, its amplitude at the end, its
-    energy and its largest amplitude."""
-    times = [math.inf if time is None else time for _, time, *_ in rows]
+def outcomes_of(runs: Sequence[TracedRun], *, trace: bool) -> Outcomes:
+    """Of runs one by one. Args: `trace`: whether they are kept."""
+    times = [math.inf if each.settling_time is None else each.settling_time for each in runs]
     return Outcomes(
         settled=np.isfinite(times),
         settling_time=np.array(times),
-        final_amplitude=np.array([final for _, _, final, _, _ in rows]),
-        runs=tuple((run, energy, worst) for run, _, _, energy, worst in rows),
+        final_amplitude=np.array([each.final_amplitude for each in runs]),
+        traced=tuple(runs) if trace else (),
+    )
+
+
+def requirements_of(
+    balancer: Balancer, *, unbalance: float, reach: float, residual: float, settling_time: float
+) -> tuple[Requirement, ...]:
+    """What one run of the scene as it says comes to, of what any balancer is asked for; SI.
+
+    Args: `unbalance`: to be cancelled. `reach`: largest that can be, wherever it lies. `residual`: amplitude
+        that may be left. `settling_time`: within which the run must settle.
+    """
+    (done,) = balancer.run({}, AS_GIVEN, trace=True).traced
+    return (
+        Requirement("balancing moment", "kg m", AT_LEAST, unbalance, "the unbalance to cancel", reach),
+        Requirement("amplitude at the end", "m", AT_MOST, residual, "the limit", done.final_amplitude),
+        Requirement("settling time", "s", AT_MOST, settling_time, "the time allowed", done.settling_time),
     )
 
 

@@ -221,15 +221,13 @@ def _side(rotor: CommonRotor, balancer: Balancer, *, span: float, runs: int) -> 
     found = ready.run({}, Draws.first(runs, devices=False), trace=True)
     results = tuple(
         RunResult(
-            time=float(time),
-            residual_ratio=float(final) / rotor.amplitude,
-            energy=energy,
-            worst_amplitude=worst,
-            status=run.status,
+            time=math.inf if each.settling_time is None else each.settling_time,
+            residual_ratio=each.final_amplitude / rotor.amplitude,
+            energy=each.energy,
+            worst_amplitude=each.worst_amplitude,
+            status=each.run.status,
         )
-        for (run, energy, worst), time, final in zip(
-            found.runs, found.settling_time, found.final_amplitude, strict=True
-        )
+        for each in found.traced
     )
     return Side(scene=ready.scene, tuned=changes, results=results, models_used=ready.models_used)
 
@@ -247,7 +245,6 @@ _WORDS: Final = {
     "energy": ("energy", "J"),
     "worst_amplitude": ("largest amplitude on the way", "m"),
 }
-_NOTE: Final = "medians of the runs; -/+: to the smallest and the largest"
 _OFFSETS: Final = "controller.gas_time_offset."
 _UNITS: Final = {
     "controller.proportional": ("s/um", 1e-6),

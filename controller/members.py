@@ -18,9 +18,8 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.residual_liquid import FACTOR, Drawing
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, in_batches
-from ringbalance.scene.joint import direction_sides
 from ringbalance.scene.models import Gas, Scene
-from ringbalance.scene.uncertain import NORMAL_95, half_widths, nominal_value
+from ringbalance.scene.uncertain import NORMAL_95, direction_sides, half_widths, nominal_value
 
 BLOCK: Final = 8192
 """Members that are drawn and carried together."""

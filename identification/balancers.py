@@ -15,28 +15,25 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.eccentric_mass.scene_records import (
-    EccentricScene,
-    eccentric_value,
-    eccentric_with,
-)
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.identification.device import Models
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.parameters import FitError, Parameter
-from ringbalance.identification.predict.device import Models
-from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.loss import BUILT_CAUSES, MODEL_CAUSES
-from ringbalance.scene.joint import with_model_error
-from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
+from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.paths import value_at, with_values_at
 from ringbalance.scene.uncertain import (
     NORMAL_95,
     UNCERTAIN_QUANTITIES,
     half_widths,
     nominal_value,
     shifted,
+    with_model_error,
 )
 
 _LITTLE: Final = 1e-4
@@ -149,7 +146,7 @@ class _EccentricMasses:
             highest=high,
             prior=width / NORMAL_95 if width else None,
             scale=1.0 if is_angle else None,
-            change=partial(eccentric_with, name=name),
+            change=partial(_with_value, name),
         )
 
     def widths(self, scene: EccentricScene) -> Mapping[str, float]:
@@ -160,12 +157,16 @@ class _EccentricMasses:
         return {each.path: each.value for each in balancer_of(scene).inputs()}
 
     def moved(self, scene: EccentricScene, name: str, change: float) -> EccentricScene:
-        value = eccentric_value(scene, name)
+        value = value_at(scene, name)
         moved = value + change if name == _PHASE else max(value + change, 0.1 * value)
-        return eccentric_with(scene, moved, name=name)
+        return with_values_at(scene, {name: moved})
 
     def errors(self, _: EccentricScene) -> tuple[str, ...]:
         return ()
+
+
+def _with_value(path: str, scene: EccentricScene, value: float) -> EccentricScene:
+    return with_values_at(scene, {path: value})
 
 
 _SIDES: Final[Mapping[str, _Side]] = MappingProxyType(
@@ -193,7 +194,7 @@ def parameters_for(scene: SceneFile, names: Sequence[str]) -> tuple[Parameter, .
 
 def informed(scene: SceneFile, data: Sequence[Observations]) -> list[str]:
     """Parameters that data inform."""
-    names = dict.fromkeys(name for each in data for name in PREDICTED[each.kind].informs(each))
+    names = dict.fromkeys(name for each in data for name in KINDS[each.kind].informs(each))
     instead = _side(scene).instead(scene)
     return [instead.get(name, name) for name in names]
 

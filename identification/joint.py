@@ -21,7 +21,7 @@ from ringbalance.identification.likelihood import Problem
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.result import Joint
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.model_errors import LARGEST_ERROR
+from ringbalance.scene.fitted import LARGEST_ERROR
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.uncertain import NORMAL_95
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
-from ringbalance.identification.predict.device import Device, Models
+from ringbalance.identification.device import Device, Models
+from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import (
@@ -179,10 +180,9 @@ def _loss_scale(scene: Scene, name: str) -> tuple[float, float]:
 def _driving_head(scene: Scene) -> float:
     """H at equal fills, m^2/s^2."""
     fill = scene.disc.initial_fill
-    ends = Device.of(scene, Models.of(scene)).law.ends(
-        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure
-    )
-    return float(ends.driving_pressure()) / scene.liquid.density
+    law = Device.of(scene, Models.of(scene)).law
+    ends = law.ends(fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure)
+    return float(driving_pressure(law.path, ends)) / scene.liquid.density
 
 
 def _scale(scene: Scene, name: str) -> float | None:

@@ -13,11 +13,10 @@ from ringbalance.identification.balancers import value_of
 from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, path_of
 from ringbalance.scene.describe import usual_unit
-from ringbalance.scene.fitted import MODEL, NO_UNIT
+from ringbalance.scene.fitted import ERROR_NAME, MODEL, NO_UNIT, ModelError
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import scene_kind
-from ringbalance.scene.model_errors import ERROR_NAME, ModelError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.registry import balancers

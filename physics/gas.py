@@ -28,7 +28,7 @@ import numpy.typing as npt
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.models import Gas, GasProcess, Scene
-from ringbalance.scene.rules.validity import AIR_CONSTANT
+from ringbalance.scene.rules.working import AIR_CONSTANT
 
 REFERENCE_PRESSURE: Final = 1e5
 """Of the reference atmosphere of ISO 6358, Pa."""
@@ -168,7 +168,7 @@ def pressure_factor(scene: Scene) -> float:
     Measured on the shaft's axis it is the ratio of an isothermal column that turns with the disc up to the
     surface at equal fills, exp(omega^2 a^2/(2 R T)), for the driven chamber and, because it vents to the same
     place, for the opposite one: p_abs f - p_a f = p f.
-    Range: an exponent up to 1/4, `scene.rules.validity`; a scene beyond is refused.
+    Range: an exponent up to 1/4, `scene.rules.working`; a scene beyond is refused.
     Source: dp/dr = rho omega^2 r with rho = p/(R T).
     """
     if scene.gas.measured_at == "chamber":

@@ -17,7 +17,7 @@ from ringbalance.reduced_model.gas_line import line_answers
 from ringbalance.reduced_model.instability import AsynchronousInstability
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law
 from ringbalance.reduced_model.law.files import load_law
-from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.law.flow_law import CALIBRATED, BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.reduced_model.operating_point import OperatingPoint, TubeLiquid
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid
@@ -81,7 +81,7 @@ def law_by_name(scene: Scene, law: str) -> BalancerModel:
 
     Raises: SceneError: a scene that cannot be calibrated, or a file that holds no law.
     """
-    if law == "calibrated":
+    if law == CALIBRATED:
         return calibrated_model(scene)
     return paper_model(scene) if law == "paper" else BalancerModel.of(load_law(Path(law)))
 

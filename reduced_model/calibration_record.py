@@ -23,6 +23,7 @@ from ringbalance.reduced_model.operating_point import OperatingPoint, TubeLiquid
 from ringbalance.reduced_model.residual_liquid import Holding, ResidualLiquid
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
+from ringbalance.reduced_model.tube.regime import gas_over_crest, possible_cavity
 from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
@@ -179,11 +180,10 @@ def _level_parts(calibration: Calibration) -> dict[str, _Parts]:
 
 def _crest_part(law: CalibratedLaw, point: OperatingPoint, state: DirectedState, margin: float) -> float:
     """Model part of the crest's pressure, the larger of a cavity's, which has bounds, and a full siphon's."""
-    crest = law.path.crest
-    if crest is None or point.cavitation_margin is None or point.cavity_pressure is None:
+    if point.cavitation_margin is None or point.cavity_pressure is None:
         return 0.0
-    low, high = (float(bound) for bound in crest.possible_cavity(state.ends))
-    gas = max(float(crest.gas_pressure(state.ends)), high)
+    low, high = (float(bound) for bound in possible_cavity(law.path, state.ends))
+    gas = max(float(gas_over_crest(law.path, state.ends)), high)
     pressure = point.hump_pressure or 0.0
     full = point.cavity_pressure + point.cavitation_margin
     highest = max(gas if pressure > high else high, full + margin)

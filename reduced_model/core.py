@@ -16,7 +16,15 @@ from ringbalance.physics.tube.draw_down import port_depth
 from ringbalance.reduced_model.chamber.values import chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.flow import TubeFlow
-from ringbalance.reduced_model.tube.regime import ColumnFlow, TubeEnds, can_flow
+from ringbalance.reduced_model.tube.regime import (
+    ColumnFlow,
+    TubeEnds,
+    can_flow,
+    cavity_pressure,
+    priming_pressure,
+    resting_pressure,
+    stall_pressure,
+)
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.models import Scene
@@ -124,17 +132,17 @@ class Answers:
         _, ends, _ = measured_closed_forms(scene=scene, fill_ratio=np.array([least, top - least]))
         usable = ends[1] - ends[0]
         holds = np.zeros(designs.size, dtype=np.bool_)
-        if tube.path.crest is not None:
+        if tube.path.crest:
             holds = chamber_pressure(scene=scene, fill_ratio=top - least) <= tube.path.return_pressure
         rate = scene.rotor.influence_coefficient * ratio[0] * rho * scene.tube.area * running
         crest, nothing = tube.path.crest, np.full(designs.size, np.nan)
         separated = np.where(flow.separated, Regime.SEPARATED, Regime.SIPHON)
         share = 1 / np.tan(np.pi / np.asarray(scene.disc.chambers))
-        lowest = (nothing, nothing) if crest is None else _lowest(tube, flow, equal)
+        lowest = _lowest(tube, flow, equal) if crest else (nothing, nothing)
         priming = (nothing, nothing)
-        if crest is not None:
-            vented, trapped = (replace(crest, trapped=kept) for kept in (False, True))
-            priming = vented.priming_pressure(uneven), trapped.priming_pressure(equal)
+        if crest:
+            vented, trapped = (replace(tube.path, trapped=kept) for kept in (False, True))
+            priming = priming_pressure(vented, uneven), priming_pressure(trapped, equal)
         return cls(
             chamber_volume=chamber_volume(disc=scene.disc) * np.ones(designs.size),
             wall_pressure=wall[1],
@@ -146,7 +154,7 @@ class Answers:
             drag_coefficient=tube.drag_coefficient(at),
             crest_pressure=lowest[0],
             cavitation_margin=lowest[1],
-            stall_pressure=np.maximum(uneven.stall_pressure(), 0.0) / tube.gas_factor,
+            stall_pressure=np.maximum(stall_pressure(tube.path, uneven), 0.0) / tube.gas_factor,
             priming_pressure_vented=priming[0] / tube.gas_factor,
             priming_pressure_trapped=priming[1] / tube.gas_factor,
             residual_fill_ratio=residual,
@@ -160,19 +168,16 @@ class Answers:
         )
 
 
-def _lowest(
-    tube: TubeFlow, flow: ColumnFlow[FloatArray], ends: TubeEnds[FloatArray]
-) -> tuple[FloatArray, FloatArray]:
+def _lowest(tube: TubeFlow, flow: ColumnFlow[FloatArray], ends: TubeEnds) -> tuple[FloatArray, FloatArray]:
     """Pressure at the end of the crest's arc, and the margin of a full siphon, where something flows, Pa."""
-    crest, rows = tube.path.crest, np.arange(tube.designs.size)
-    assert crest is not None
+    path, rows = tube.path, np.arange(tube.designs.size)
     flows = flow.velocity > 0
     heads = (
         np.exp(tube.log_head(rows, to_crest=True, lowest=lowest)(np.log(np.where(flows, u, 1.0))))
         for u, lowest in ((flow.velocity, False), (flow.siphon_velocity, True))
     )
-    at_end, full = (crest.resting_pressure(ends) - tube.path.density * head for head in heads)
-    return np.where(flows, at_end, np.nan), np.where(flows, full - crest.cavity_pressure(ends), np.nan)
+    at_end, full = (resting_pressure(path, ends) - path.density * head for head in heads)
+    return np.where(flows, at_end, np.nan), np.where(flows, full - cavity_pressure(path, ends), np.nan)
 
 
 def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
@@ -262,16 +267,13 @@ def _stalled_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
 
 def _moves(tube: TubeFlow, start: FloatArray, end: FloatArray) -> BoolArray:
     """Whether liquid moves at fills from `start` to `end`, shape (fills, n)."""
-    scene, crest = tube.designs.scene, tube.path.crest
+    scene, path = tube.designs.scene, tube.path
     fills = start + np.linspace(0.0, 1.0, _SCAN)[:, None] * (end - start)
     own, other = chamber_pressure(
         scene=scene, fill_ratio=np.array([fills, scene.disc.max_fill_ratio - fills])
     )
     rest, held = tube.ends(own, other, driven=False), np.zeros(fills.shape, dtype=np.bool_)
-    if crest is not None:
+    if path.crest:
         # Only over a crest may a column be held while the gas is off.
-        held = np.asarray(
-            can_flow(ends=rest, crest=crest, primed=True)
-            | can_flow(ends=rest.reversed(), crest=crest, primed=True)
-        )
-    return np.asarray(can_flow(ends=tube.ends(own, other), crest=crest, primed=held))
+        held = np.asarray(can_flow(path, rest, True) | can_flow(path, rest.reversed(), True))
+    return np.asarray(can_flow(path, tube.ends(own, other), held))

@@ -23,7 +23,7 @@ from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.rules.validity import LARGEST_COMPRESSION
+from ringbalance.scene.rules.working import LARGEST_COMPRESSION
 
 PRESSURE_FACTORS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 """Gas pressures of the law's table, over the scene's own."""

@@ -45,11 +45,12 @@ from ringbalance.reduced_model.chamber.contributions import (
 from ringbalance.reduced_model.chamber.values import by_closed_form, chamber_pressure
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
-from ringbalance.reduced_model.tube.flow import tube_path
-from ringbalance.reduced_model.tube.heads import TubeHeads, crest_head, velocity_of
+from ringbalance.reduced_model.tube.flow import TubeFlow
+from ringbalance.reduced_model.tube.heads import crest_head
 from ringbalance.reduced_model.tube.path import crest_middle, share_at_radius
-from ringbalance.reduced_model.tube.regime import SiphonCrest, TubeEnds, can_flow, column_flow
+from ringbalance.reduced_model.tube.regime import can_flow, driving_pressure, gas_over_crest, resting_pressure
 from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.designs import Designs
 from ringbalance.scene.loop_models import Sensor
 from ringbalance.scene.models import Scene
 
@@ -151,13 +152,15 @@ def steady(scene: Scene) -> Scene:
 class RangeFlow:
     """The tube's flow over the fills of `SHARES`, the opposite chamber with the rest of the pair's liquid."""
 
-    ends: TubeEnds[FloatArray]
-    """By the closed form."""
+    driving: FloatArray
+    """Pressure that drives a full siphon, Pa."""
     siphon: FloatArray
     """Velocity of a full siphon, m/s; zero without a driving pressure."""
     separated: FloatArray
     """Velocity of a column separated at the crest, m/s, of one that spills where gas stays there; infinite
     without a crest, zero where it blocks."""
+    primes: BoolArray
+    """Whether the gas lifts liquid over the crest of an unprimed tube."""
     starts: BoolArray
     """Whether the gas starts a flow in an unprimed tube."""
     equal: float
@@ -182,36 +185,20 @@ def range_flow(scene: Scene) -> RangeFlow:
 @lru_cache(maxsize=8)
 def _range_flow(scene: Scene) -> RangeFlow:
     own = chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio * np.array(SHARES))
-    path, heads, gas = tube_path(scene), TubeHeads.nominal(scene), pressure_factor(scene) * scene.gas.pressure
-    ends = TubeEnds(
-        upstream_gas=np.full_like(own, gas),
-        downstream_gas=np.zeros_like(own),
-        upstream_hydrostatic=own,
-        downstream_hydrostatic=own[::-1],
-        port_pressure=path.port_pressure,
-    )
-
-    def siphon(pressure: FloatArray, where: BoolArray | bool) -> FloatArray:
-        return velocity_of(table=heads.head, head=pressure / path.density, where=np.asarray(where))
-
-    def separation(pressure: FloatArray, where: BoolArray | bool) -> FloatArray:
-        table = heads.hump_head or heads.head
-        return velocity_of(
-            table=table, head=pressure / path.density, where=np.asarray(where & (pressure > 0))
-        )
-
-    driving, separated = ends.driving_pressure(), np.full(own.shape, np.inf)
-    if path.crest is not None:
-        separated = column_flow(
-            ends=ends, crest=path.crest, primed=False, siphon=siphon, separation=separation
-        ).separation_velocity
-    can = can_flow(ends=ends, crest=path.crest, primed=False)
+    tube = TubeFlow.of(Designs(scene=scene, size=own.size))
+    ends, gas = tube.ends(own, own[::-1]), np.full_like(own, pressure_factor(scene) * scene.gas.pressure)
+    driving = driving_pressure(tube.path, ends)
+    separated = np.full_like(own, np.inf)
+    if tube.path.crest:
+        separated = tube.flow(ends, primed=False).separation_velocity
+    primes = resting_pressure(tube.path, ends) > gas_over_crest(tube.path, ends)
     return RangeFlow(
-        ends=ends,
-        siphon=siphon(driving, driving > 0),
+        driving=driving,
+        siphon=tube.velocity(driving, driving > 0, to_crest=False),
         separated=separated,
-        starts=np.asarray(can & (scene.gas.pressure > _NO_PRESSURE)),
-        equal=float(siphon(np.array(gas), gas > 0)),
+        primes=primes,
+        starts=can_flow(tube.path, ends, False) & (scene.gas.pressure > _NO_PRESSURE),
+        equal=float(tube.velocity(gas, gas > 0, to_crest=False)[0]),
     )
 
 
@@ -277,18 +264,17 @@ def _fills(scene: Scene) -> FloatArray:
 
 def crest(scene: Scene) -> Contribution:
     """A full siphon in place of the regimes over the crest, relative to the velocity."""
-    highest = tube_path(scene).crest
-    if highest is None:
+    if scene.tube.hump_radius is None:
         return Contribution(value=None, formula="the scene gives no hump_radius")
     return Contribution(
-        value=_lost_at_crest(range_flow(scene), highest),
+        value=_lost_at_crest(range_flow(scene)),
         formula="1 - u_separated/u_siphon, or 1 where the column to the siphon crest outweighs the gas",
     )
 
 
-def _lost_at_crest(flow: RangeFlow, highest: SiphonCrest[FloatArray]) -> float:
+def _lost_at_crest(flow: RangeFlow) -> float:
     driven = flow.siphon > 0
-    if np.any(driven & ~np.asarray(highest.primes(flow.ends))):
+    if np.any(driven & ~flow.primes):
         return 1.0
     lost = 1 - flow.separated[driven] / flow.siphon[driven]
     return float(np.max(np.maximum(lost, 0.0), initial=0.0))
@@ -371,7 +357,7 @@ def inertia(scene: Scene) -> Contribution:
         density=scene.liquid.density,
         length=scene.tube.length,
         velocity=flow.velocity[flow.starts],
-        driving_pressure=flow.ends.driving_pressure()[flow.starts],
+        driving_pressure=flow.driving[flow.starts],
     )
     # A column that never moves costs nothing to start.
     slowest = max(float(np.max(times)), 1e-12)

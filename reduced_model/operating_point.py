@@ -14,6 +14,7 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.pressure_profile import HumpProfile
+from ringbalance.reduced_model.tube import regime
 from ringbalance.reduced_model.tube.path import crest_middle, path_angle
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import HumpGas, Scene
@@ -84,7 +85,7 @@ class OperatingPoint:
             k_model_uncertainty=None if loss is None else _model_part(loss.uncertainty_parts),
             priming_vented=None if vented is None else float(vented),
             priming_trapped=None if trapped is None else float(trapped),
-            stall=max(float(law.ends(fill_ratio=0.0).stall_pressure()) / law.gas_factor, 0.0),
+            stall=max(float(regime.stall_pressure(law.path, law.ends(fill_ratio=0.0))) / law.gas_factor, 0.0),
             stall_paper=paper.stall_pressure(
                 disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
             ),
@@ -113,11 +114,11 @@ def priming_pressure(
         31.5 mm gives its 0.54 MPa, vented with the driven chamber nearly empty or trapped at equal fills: an
         inference, because the paper does not say what its figure means.
     """
-    crest = law.path.crest
-    if crest is None:
+    if not law.path.crest:
         return None
+    path = replace(law.path, trapped=hump_gas == "trapped")
     ends = law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
-    return np.asarray(replace(crest, trapped=hump_gas == "trapped").priming_pressure(ends)) / law.gas_factor
+    return np.asarray(regime.priming_pressure(path, ends)) / law.gas_factor
 
 
 def _model_part(parts: Mapping[str, FloatArray]) -> float:

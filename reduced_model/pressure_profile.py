@@ -26,7 +26,16 @@ from ringbalance.reduced_model.tube.path import (
     reversed_tube,
     share_at_radius,
 )
-from ringbalance.reduced_model.tube.regime import TubeEnds
+from ringbalance.reduced_model.tube.regime import (
+    TubeEnds,
+    TubePath,
+    back_pressure,
+    cavity_pressure,
+    covered,
+    discharges_openly,
+    driving_pressure,
+    resting_pressure,
+)
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.models import Scene, Tube
 
@@ -103,14 +112,14 @@ class HumpProfile:
             DirectedState.of(law=law, fills=(fill_ratio, other), gas_pressure=gas, reverse=r)
             for r in (False, True)
         )
-        state = backward if forward.ends.driving_pressure() < 0 else forward
+        state = backward if driving_pressure(law.path, forward.ends) < 0 else forward
         tube = reversed_tube(scene.tube) if state.reverse else scene.tube
         margin = state.margin(law=law)
         if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
             line = _blocked(scene, law, forward, primed, points)
         else:
             cavity = _pressure_over_crest(law, state, abs(float(flow.velocity)))
-            line = _flowing(scene, tube, abs(float(flow.velocity)), state.ends, cavity, points)
+            line = _flowing(scene, law.path, tube, abs(float(flow.velocity)), state.ends, cavity, points)
             if state.reverse:
                 line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
         return _profile(scene, law, flow, state, margin, line)
@@ -154,28 +163,33 @@ def _profile(
 
 def _pressure_over_crest(law: CalibratedLaw, state: DirectedState, velocity: float) -> float | None:
     """Of the cavity or gas that the column spills into at a velocity; None where it is full, or at rest."""
-    crest, head = law.path.crest, law.heads.to_crest(reverse=state.reverse)
-    if crest is None or head is None or velocity == 0:
+    head = law.heads.to_crest(reverse=state.reverse)
+    if head is None or velocity == 0:
         return None
-    log_u, driving = np.log(velocity), state.ends.driving_pressure()
+    log_u, driving = np.log(velocity), driving_pressure(law.path, state.ends)
     if law.density * float(np.exp(law.heads.head(log_u))) > driving * (1 - 1e-9):
         return None
-    return float(crest.resting_pressure(state.ends) - law.density * np.exp(head(log_u)))
+    return float(resting_pressure(law.path, state.ends) - law.density * np.exp(head(log_u)))
 
 
 def _cavity_pressure(law: CalibratedLaw, state: DirectedState) -> float | None:
-    crest = law.path.crest
-    return None if crest is None else float(crest.cavity_pressure(state.ends))
+    return float(cavity_pressure(law.path, state.ends)) if law.path.crest else None
 
 
 def _flowing(
-    scene: Scene, tube: Tube, velocity: float, ends: TubeEnds[float], cavity: float | None, points: int
+    scene: Scene,
+    path: TubePath,
+    tube: Tube,
+    velocity: float,
+    ends: TubeEnds,
+    cavity: float | None,
+    points: int,
 ) -> _Line:
     """Along a tube in which liquid flows or a column rests, from its upstream end."""
     terms = corrected_state(replace(scene, tube=tube), velocity) if velocity else None
     head = scene.liquid.density * velocity**2 / 2
     if cavity is not None and terms is not None:
-        return _separated(scene, tube, terms, ends, cavity, head, points)
+        return _separated(scene, path, tube, terms, ends, cavity, head, points)
     at = Places.along(tube=tube, points=points)
     lost = 0.0 if terms is None else head * at.loss_before(tube=tube, state=terms)
     hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=tube, share=at.share))
@@ -188,15 +202,16 @@ def _flowing(
 
 def _separated(
     scene: Scene,
+    path: TubePath,
     tube: Tube,
     terms: TubeState,
-    ends: TubeEnds[float],
+    ends: TubeEnds,
     cavity: float,
     head: float,
     points: int,
 ) -> _Line:
     """Full up to the crest, then a cavity, then the column that the downstream chamber supports."""
-    top = ends.downstream_gas + ends.back_pressure()
+    top = ends.downstream_gas + back_pressure(path, ends)
 
     def behind(at: Places) -> FloatArray:
         """Pressure of a full tube seen from its downstream end."""
@@ -207,7 +222,7 @@ def _separated(
 
     first = Places.along(tube=tube, points=points)
     crest = lowest_place(tube, float(terms.along) * head / scene.liquid.density, scene.rotor.speed**2)
-    again = 1.0 if ends.downstream_open() else _full_again(first, behind, cavity, crest)
+    again = 1.0 if discharges_openly(path, ends) else _full_again(first, behind, cavity, crest)
     at = Places.along(tube=tube, points=points, doubled=(crest, again))
     from_top = ends.upstream_pressure() - column_pressure(
         scene=scene, radius=path_radius(tube=tube, share=at.share)
@@ -241,22 +256,23 @@ def _full_again(at: Places, behind: Callable[[Places], FloatArray], cavity: floa
 def _blocked(scene: Scene, law: CalibratedLaw, state: DirectedState, primed: bool, points: int) -> _Line:
     """Two columns at rest and what lies between; without a crest, each chamber's pressure up to the
     middle."""
-    ends, crest = state.ends, law.path.crest
+    ends, path, is_covered = state.ends, law.path, bool(covered(law.path, state.ends))
     near, far = ends.upstream_pressure(), ends.downstream_pressure()
-    if crest is None:
+    is_open = discharges_openly(path, ends)
+    if not path.crest:
         at = Places.along(tube=scene.tube, points=points, doubled=(0.5,))
         first = (at.share < 0.5) | ((at.share == 0.5) & ~at.after)
-        pressure = np.where(first, near, far) - ends.port_pressure
+        pressure = np.where(first, near, far) - path.port_pressure
         return _Line(share=at.share, pressure=pressure, full=np.ones(first.shape, dtype=np.bool_))
-    cavity = crest.cavity_pressure(ends) if primed and ends.upstream_covered() else None
-    stop = _rest(scene=scene, ends=ends, cavity=cavity, crest_pressure=crest.column_pressure)
+    cavity = float(cavity_pressure(path, ends)) if primed and is_covered else None
+    stop = _rest(scene=scene, path=path, ends=ends, cavity=cavity)
     at = Places.along(tube=scene.tube, points=points, doubled=(stop.near, stop.far))
     hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=scene.tube, share=at.share))
-    in_near = ((at.share < stop.near) | ((at.share == stop.near) & ~at.after)) & ends.upstream_covered()
-    in_far = ((at.share > stop.far) | ((at.share == stop.far) & at.after)) & (not ends.downstream_open())
+    in_near = ((at.share < stop.near) | ((at.share == stop.near) & ~at.after)) & is_covered
+    in_far = ((at.share > stop.far) | ((at.share == stop.far) & at.after)) & (not is_open)
     pressure = np.where(in_near, near - hydrostatic, np.where(in_far, far - hydrostatic, stop.between))
     # A chamber that leaves its port open shows its own gas there.
-    pressure[0] = pressure[0] if ends.upstream_covered() else max(pressure[0], ends.upstream_gas)
+    pressure[0] = pressure[0] if is_covered else max(pressure[0], ends.upstream_gas)
     return _Line(share=at.share, pressure=pressure, full=in_near | in_far)
 
 
@@ -272,7 +288,7 @@ class _Rest:
     """Pressure of what lies between, gauge, Pa."""
 
 
-def _rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pressure: float) -> _Rest:
+def _rest(*, scene: Scene, path: TubePath, ends: TubeEnds, cavity: float | None) -> _Rest:
     """Find the two columns of a tube at rest.
 
     A separated column leaves a cavity at a given pressure.  An unprimed tube holds gas: vented, it is at the
@@ -280,10 +296,9 @@ def _rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pr
     until it leaves at the opposite port, and at least to what keeps the driven column below the crest.
     Args: `ends`: pressures at the tube's ends, the driven chamber upstream; one that leaves its port open
         supports no column. `cavity`: pressure of the cavity of a separated column, gauge, Pa; None for gas.
-        `crest_pressure`: D_m, column from the crest to the outer wall, Pa.
     Source: hydrostatics in the rotating frame; Boyle's law.
     """
-    outer, covered = scene.disc.outer_radius, ends.upstream_covered()
+    outer, is_covered, is_open = scene.disc.outer_radius, covered(path, ends), discharges_openly(path, ends)
     near, far = ends.upstream_pressure(), ends.downstream_pressure()
 
     def leg(pressure: float, *, far_leg: bool) -> float:
@@ -298,27 +313,25 @@ def _rest(*, scene: Scene, ends: TubeEnds[float], cavity: float | None, crest_pr
 
     def filled(pressure: float, near: float) -> tuple[float, float]:
         """Fractions of the path where the two columns end, under a pressure between them."""
-        first = leg(near - pressure, far_leg=False) if covered else 0.0
-        return first, 1.0 if ends.downstream_open() else leg(far - pressure, far_leg=True)
+        first = leg(near - pressure, far_leg=False) if is_covered else 0.0
+        return first, 1.0 if is_open else leg(far - pressure, far_leg=True)
 
     if cavity is not None:
         between = cavity
-    elif not covered:
-        between = float(np.clip(ends.upstream_gas, 0.0, max(far - ends.port_pressure, 0.0)))
+    elif not is_covered:
+        between = float(np.clip(ends.upstream_gas, 0.0, max(far - path.port_pressure, 0.0)))
     elif scene.tube.hump_gas == "vented":
         between = 0.0
     else:
-        between = _trapped(vented_pressure(scene), ends, filled, crest_pressure)
+        between = _trapped(vented_pressure(scene), path, ends, filled)
     first, last = filled(between, near)
     return _Rest(near=first, far=last, between=between)
 
 
-def _trapped(ambient: float, ends: TubeEnds[float], filled: _Filled, crest_pressure: float) -> float:
+def _trapped(ambient: float, path: TubePath, ends: TubeEnds, filled: _Filled) -> float:
     """Pressure of the trapped gas, gauge; the gas that fills the tube between the columns is kept."""
-    near_pressure, largest = (
-        ends.upstream_pressure(),
-        max(ends.downstream_pressure() - ends.port_pressure, 0.0),
-    )
+    near_pressure = ends.upstream_pressure()
+    largest = max(ends.downstream_pressure() - path.port_pressure, 0.0)
     first, last = filled(0.0, ends.upstream_hydrostatic)
 
     def excess(pressure: float) -> float:
@@ -328,4 +341,4 @@ def _trapped(ambient: float, ends: TubeEnds[float], filled: _Filled, crest_press
     if largest <= 0:
         return 0.0
     root = largest if excess(largest) < 0 else 0.0 if excess(0.0) >= 0 else brentq(excess, 0.0, largest)
-    return float(np.clip(max(root, near_pressure - crest_pressure), 0.0, largest))
+    return float(np.clip(max(root, near_pressure - path.column_pressure), 0.0, largest))

@@ -1,20 +1,16 @@
-"""A smooth table: quintic Hermite pieces on a uniform grid, evaluated and inverted without any other library.
+"""A smooth table: quintic Hermite pieces on a uniform grid, which can be inverted.
 
 The nodes hold value, slope and curvature, so a saved table gives the same bits wherever it is read again, and
-compiled code needs nothing but the three arrays.  Another table goes here when a calibration or compiled code
-reads it: scipy.interpolate alone takes longer to import than these take to make.
+compiled code needs nothing but the three arrays.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, make_interp_spline
 
 from ringbalance.scene.arrays import FloatArray, clipped
 
@@ -98,16 +94,6 @@ class HermiteTable:
         return np.asarray(self.start + self.step * (cell + t) + (wanted - found) / slope, dtype=np.float64)
 
 
-def _quintic(
-    rise: FloatArray, turn: FloatArray, bend: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Third to fifth coefficient of a piece from 0 to 1.
-
-    By what its lower ones leave of value, slope and curvature at its end.
-    """
-    return 10 * rise - 4 * turn + bend / 2, -15 * rise + 7 * turn - bend, 6 * rise - 3 * turn + bend / 2
-
-
 def _polynomials(table: HermiteTable) -> FloatArray:
     """Coefficients of every piece in t from 0 to 1, of the value from t^0 up and of its slope from t^1 up."""
     h = table.step
@@ -115,12 +101,12 @@ def _polynomials(table: HermiteTable) -> FloatArray:
     rise = table.value[1:] - y0 - d0 - c0
     turn = h * table.slope[1:] - d0 - 2 * c0
     bend = h * h * table.curvature[1:] - 2 * c0
-    a3, a4, a5 = _quintic(rise, turn, bend)
+    a3 = 10 * rise - 4 * turn + bend / 2
+    a4 = -15 * rise + 7 * turn - bend
+    a5 = 6 * rise - 3 * turn + bend / 2
     return np.array([y0, d0, c0, a3, a4, a5, 2 * c0, 3 * a3, 4 * a4, 5 * a5])
 
 
-_REACH: Final = 50
-"""Samples after which a quintic spline's response has fallen by 0.43^50."""
 _STEEPEST = 2.5
 """Slope at a sample over the smaller of its two chords up to which quintic pieces without curvature rise."""
 
@@ -131,54 +117,11 @@ def table_from_samples(*, start: float, stop: float, value: npt.ArrayLike) -> He
     Source: not-a-knot spline; error O(step^6).
     """
     y = np.asarray(value, dtype=np.float64)
-    step = (stop - start) / (y.size - 1)
-    slope, curvature = _spline_derivatives(y)
+    step, places = (stop - start) / (y.size - 1), np.arange(y.size)
+    # A large common value would cost digits.
+    spline = make_interp_spline(places, y - y[0], k=min(5, y.size - 1))
+    slope, curvature = (spline(places, nu=order) for order in (1, 2))
     return HermiteTable(start=start, step=step, value=y, slope=slope / step, curvature=curvature / step**2)
-
-
-def _spline_derivatives(y: FloatArray) -> FloatArray:
-    """First and second derivatives at samples a unit apart, shape (2, n).
-
-    Those of a sample reach no farther than `_REACH` neighbours, beyond which the spline has forgotten it.
-    """
-    shift = y[0]  # a large common value would cost digits
-    if y.size <= 2 * _REACH + 1:
-        return np.asarray(_derivative_rows(y.size) @ (y - shift))
-    rows = _derivative_rows(2 * _REACH + 1)
-    near = rows[:, :_REACH] @ (y[: 2 * _REACH + 1] - shift)
-    far = rows[:, _REACH + 1 :] @ (y[-2 * _REACH - 1 :] - y[-1])
-    middle = np.array([np.correlate(y - shift, row[_REACH], mode="valid") for row in rows])
-    return np.concatenate([near, middle, far], axis=1)
-
-
-@lru_cache(maxsize=64)
-def _derivative_rows(count: int) -> FloatArray:
-    """Matrices that take samples a unit apart to slopes and curvatures, shape (2, n, n)."""
-    if count < 6:
-        powers = np.arange(count)
-        places = powers[:, None].astype(np.float64)
-        slope = powers * places ** np.maximum(powers - 1, 0)
-        curvature = powers * (powers - 1) * places ** np.maximum(powers - 2, 0)
-        return np.asarray(np.array([slope, curvature]) @ np.linalg.inv(places**powers))
-    samples, derivatives = _joints(count)
-    solved = -np.linalg.solve(derivatives, samples)
-    return np.array([solved[:count], solved[count:]])
-
-
-def _joints(count: int) -> tuple[FloatArray, FloatArray]:
-    """Conditions on a quintic spline's samples, slopes and curvatures; the columns of its derivatives apart.
-
-    Third and fourth derivative are continuous, and the fifth at the two joints next to either end.
-    """
-    identity = np.eye(3 * count)
-    y, d, c = identity[:count], identity[count : 2 * count], identity[2 * count :] / 2
-    rise, turn, bend = y[1:] - y[:-1] - d[:-1] - c[:-1], d[1:] - d[:-1] - 2 * c[:-1], 2 * (c[1:] - c[:-1])
-    a3, a4, a5 = _quintic(rise, turn, bend)
-    third = (a3 + 4 * a4 + 10 * a5)[:-1] - a3[1:]
-    fourth = (a4 + 5 * a5)[:-1] - a4[1:]
-    fifth = (a5[:-1] - a5[1:])[[0, 1, -2, -1]]
-    conditions = np.concatenate([third, fourth, fifth])
-    return conditions[:, :count], conditions[:, count:]
 
 
 def level_table(*, start: float, stop: float, value: npt.ArrayLike) -> HermiteTable:
@@ -200,29 +143,3 @@ def flat_table(*, start: float, stop: float, value: float = 0.0) -> HermiteTable
     """One value everywhere, such as an uncertainty that is left out."""
     level, none = np.full(2, value), np.zeros(2)
     return HermiteTable(start=start, step=stop - start, value=level, slope=none, curvature=none)
-
-
-def refined_table(
-    *,
-    function: Callable[[FloatArray], FloatArray],
-    start: float,
-    stop: float,
-    tolerance: float,
-    first: int = 129,
-    last: int = 4097,
-) -> tuple[HermiteTable, float]:
-    """Tabulate a function, doubling the samples until the error between the nodes is small enough.
-
-    Args: `function`: y(x), vectorised. `start`: first x. `stop`: last x. `tolerance`: error aimed at, in
-        units of y. `first`: samples to begin with. `last`: samples at which to stop.
-    Returns: The table, and its largest error found halfway between the nodes.
-    """
-    value = function(np.linspace(start, stop, first))
-    while True:
-        table = table_from_samples(start=start, stop=stop, value=value)
-        middle = table.nodes[:-1] + table.step / 2
-        between = function(middle)
-        error = float(np.max(np.abs(table(middle) - between)))
-        if error <= tolerance or 2 * value.size - 1 > last:
-            return table, error
-        value = np.insert(value, np.arange(1, value.size), between)

@@ -19,6 +19,7 @@ from ringbalance.physics.gas import HEAT_CAPACITY_RATIO
 from ringbalance.reduced_model import estimates, paper
 from ringbalance.reduced_model.chamber.contributions import Contribution, percent
 from ringbalance.reduced_model.chamber.values import chamber_pressure
+from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.scene.models import Scene
 
 INERTIA: Final = "tube inertia"
@@ -27,8 +28,6 @@ LAG: Final = "valve lag"
 HELD: Final = "liquid held in the tube"
 LEFT_OUT: Final = "left out"
 NOT_MODELLED: Final = "not modelled in this version"
-CALIBRATED: Final = "calibrated"
-"""Name of the law that is made of these models."""
 
 
 def _counts(_: Scene, estimate: Contribution) -> bool:

@@ -30,10 +30,9 @@ from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.catalogue import load_cases
-from ringbalance.verification.document import merge_saved, results_document
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
-from ringbalance.verification.result import CaseResult
+from ringbalance.verification.result import CaseResult, merge_saved
 from ringbalance.verification.runner import DRIVEN, cases_under_way
 
 Progress = Callable[[str], None]
@@ -175,7 +174,7 @@ def _finished(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:
     for result in under_way:
         tell(f"verification: {result.definition.title}")
         results.append(result)
-    return [_without_time(case) for case in results_document(results)]
+    return [_without_time(case) for case in [each.to_dict() for each in results]]
 
 
 def _keep(ran: Mapping[str, Record], kept: Mapping[str, Record]) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from ringbalance.identification.against_fit import against_fit
 from ringbalance.identification.cli import DONE, FitRequest, keep_inputs, run_fit
-from ringbalance.identification.data.kinds import template as template_of
 from ringbalance.identification.fitting import Loss
+from ringbalance.identification.kinds.registry import template as template_of
 from ringbalance.reports.simulate_cli import check_output
 from ringbalance.scene.platform.files import write_whole
 
@@ -55,8 +55,8 @@ def fit(
     code, result = run_fit(scene, data, asked)
     if plot is not None:
         # Loading what draws takes as long as a short fit.
-        from ringbalance.reports.figures.fit import fit_figures  # noqa: PLC0415
-        from ringbalance.reports.figures.style import sheet  # noqa: PLC0415
+        from ringbalance.reports.figure import sheet  # noqa: PLC0415
+        from ringbalance.reports.pages.measured import fit_figures  # noqa: PLC0415
 
         write_whole(plot, sheet(fit_figures(against_fit(result))))
     return code

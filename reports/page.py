@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,9 +17,7 @@ from PIL import Image
 from ringbalance.reduced_model.calibration_record import UNSTATED
 from ringbalance.reports import summary
 from ringbalance.reports.equations import equation_svg, equations
-from ringbalance.reports.figures.calibration import chamber_figures, tube_figures
-from ringbalance.reports.figures.loop import loop_figures
-from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.figure import Drawing
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.eccentric import BALANCER
 from ringbalance.reports.prose import named_with_origin, states_uncertainty
@@ -56,13 +53,6 @@ _PICTURE_WIDTH: Final = 1000
 _PICTURE_QUALITY: Final = 80
 _PICTURE_EFFORT: Final = 2
 """Of 6; more saves a twentieth of the bytes in twice the time."""
-
-
-def _nearest(tube: Record, point: Record) -> int:
-    """Place of the tabulated velocity that is nearest to the operating point's."""
-    velocity = point["k_at_velocity_m_s"] or tube["velocity_m_s"][-1]
-    places = range(len(tube["k"]))
-    return min(places, key=lambda place: abs(math.log(tube["velocity_m_s"][place] / velocity)))
 
 
 def _scene_groups(rows: list[Record]) -> list[tuple[str, list[Record]]]:
@@ -116,7 +106,6 @@ def page_content(
         claims = [{**case_view(case), "elsewhere": False} for case in cases]
         context = {**_frame(evidence, sections), "claims": claims}
         return PageContent(context=context, drawings=tuple(drawings_in([sections, claims])))
-    figures = chamber_figures(evidence) | tube_figures(evidence) | loop_figures(evidence)
     sections = viewed(evidence, sections_by(evidence))
     views = views_of(evidence["verification"])
     claims = [
@@ -124,21 +113,17 @@ def page_content(
         for case in summary.claims(evidence)
     ]
     checks = [views[case["id"]] for case in summary.checks(evidence)]
-    calibration = evidence["calibration"]
     context = {
         **_frame(evidence, sections),
         "tallies": _tallies(evidence),
         "causes": summary.common_causes(summary.claims(evidence)),
         "equations": _equations(),
-        "figures": figures,
         "pictures": _pictures(evidence["pictures"], pictures or {}),
-        "drag_at": _nearest(calibration["tube"], evidence["operating_point"]),
         "claims": claims,
         "checks": checks,
-        "order_plots": [case["order_plot"] for case in checks if case["order_plot"]],
     }
     own = [[case["order_plot"], *case["drawings"]] for case in (*claims, *checks)]
-    drawings = drawings_in([figures, sections, *own])
+    drawings = drawings_in([sections, *own])
     return PageContent(context=context, drawings=tuple(drawings))
 
 

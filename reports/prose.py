@@ -10,7 +10,7 @@ from typing import Any, Final
 from markupsafe import Markup, escape
 
 from ringbalance.results.numbers import believed, shown
-from ringbalance.scene.joint import FITTED
+from ringbalance.scene.uncertain import FITTED
 
 _GREEK: Final = {
     "alpha": "α",

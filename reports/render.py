@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 
 from ringbalance.reports import summary
 from ringbalance.reports.equations import GLYPHS, share_glyphs
-from ringbalance.reports.figures.style import DARK, LIGHT
+from ringbalance.reports.figure import DARK, LIGHT
 from ringbalance.reports.page import ANNEX, DOCUMENTS, PageContent, page_content
 from ringbalance.reports.prose import input_name, key_words, series
 from ringbalance.reports.section import Record

@@ -18,7 +18,6 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ringbalance.reports.provenance import versions
-from ringbalance.scene.faults import toml_text
 from ringbalance.scene.platform.kept_code import (
     OTHER,
     checked_content,
@@ -27,6 +26,7 @@ from ringbalance.scene.platform.kept_code import (
     trusted,
     write_checked,
 )
+from ringbalance.scene.toml import toml_text
 
 Record = dict[str, Any]
 

@@ -13,21 +13,21 @@ from itertools import count
 from types import MappingProxyType
 from typing import Any, Final
 
-from ringbalance.reports.figures.style import Drawing
-from ringbalance.reports.pages import drag_coefficient as fifty
+from ringbalance.reports.figure import Drawing
 from ringbalance.reports.pages import (
+    chamber,
+    drag_coefficient,
     eccentric,
     extremes,
     first_page,
+    loop,
     measured,
     operation,
-    sloshing,
+    paper_figures,
     trade,
+    tube,
+    tube_flow,
 )
-from ringbalance.reports.pages import paper_figures as paper_again
-from ringbalance.reports.pages import siphon_crest as hump
-from ringbalance.reports.pages import tube_flow as inside
-from ringbalance.reports.pages.loop import CONSEQUENCES, LOOP
 from ringbalance.reports.pages.standing import CONDITIONS, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Place, Record, Section, Work
 from ringbalance.scene import Scene
@@ -39,23 +39,23 @@ SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
     CONDITIONS,
     operation.SECTION,
-    LOOP,
+    loop.LOOP,
     Section(name="claims", title="Claims of the liquid-ring paper", place="report"),
     CREDIBILITY,
     Section(name="parameters", title="Parameters and their origin", place="report"),
     DOCUMENT,
-    Section(name="disc", title="The disc and its liquid"),
-    Section(name="pressure", title="Pressure of the liquid"),
-    Section(name="moment", title="Balancing moment and λ"),
-    sloshing.SECTION,
-    Section(name="tube", title="The connecting tube"),
-    inside.SECTION,
-    Section(name="law", title="The flow law"),
-    hump.SECTION,
-    fifty.SECTION,
-    Section(name="injections", title="The closed loop, injection by injection"),
-    paper_again.SECTION,
-    CONSEQUENCES,
+    chamber.DISC,
+    chamber.PRESSURE,
+    chamber.MOMENT,
+    chamber.WAVES,
+    tube.TUBE,
+    tube_flow.SECTION,
+    tube.LAW,
+    tube.CREST,
+    drag_coefficient.SECTION,
+    loop.INJECTIONS,
+    paper_figures.SECTION,
+    loop.CONSEQUENCES,
     Section(name="cases", title="Claims: evidence and doubts"),
     eccentric.SECOND_BALANCER,
     Section(name="numerics", title="Numerical verification"),

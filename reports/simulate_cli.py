@@ -57,7 +57,7 @@ def simulate(
     balancer = balancer_under(law, told)
     # The first run on a machine compiles for about half a minute; later ones take the code that is kept.
     with activity("simulate", "closed loop (the first run compiles) ...") as shown:
-        run = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown)).runs[0][0]
+        run = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown)).traced[0].run
         document = run.to_dict() if json else {}
         drawing = None if plot is None else _sheet(told, run)
     if csv is not None:
@@ -95,8 +95,8 @@ def _with_seed(scene: AnyScene, seed: int | None) -> AnyScene:
 
 def _sheet(scene: AnyScene, run: Run) -> str:
     # Loading what draws takes as long as a short run.
-    from ringbalance.reports.figures.runs import figures_of  # noqa: PLC0415
-    from ringbalance.reports.figures.style import sheet  # noqa: PLC0415
+    from ringbalance.reports.figure import sheet  # noqa: PLC0415
+    from ringbalance.reports.run_figures import figures_of  # noqa: PLC0415
 
     return sheet(figures_of(scene, run))
 

@@ -10,6 +10,7 @@ from typing import Final
 from ringbalance.reports.prose import series
 from ringbalance.reports.section import Record
 from ringbalance.results.numbers import percent
+from ringbalance.results.requirements import MET, MISSED, OPEN, UNASKED
 
 CLAIM_VERDICTS: Final = ("confirmed", "confirmed with correction", "refuted", "inconclusive", "not run")
 CHECK_VERDICTS: Final = ("passed", "failed", "inconclusive", "not run")
@@ -21,16 +22,11 @@ _TONES: Final = {
     "failed": "bad",
     "inconclusive": "open",
     "not run": "idle",
-    "met": "good",
-    "not met": "bad",
-    "cannot be told": "open",
-    "none stated": "idle",
+    MET: "good",
+    MISSED: "bad",
+    OPEN: "open",
+    UNASKED: "idle",
 }
-MET: Final = "met"
-MISSED: Final = "not met"
-OPEN: Final = "cannot be told"
-UNASKED: Final = "none stated"
-"""Verdicts on a requirement."""
 LIKELY: Final = 0.95
 """Fraction of runs that must settle in time, the confidence of every interval in the report."""
 

@@ -256,19 +256,3 @@ class PresentedResult(Result):
     def rows(self) -> Rows:
         """Quantities, findings and tables."""
         return self.presentation.rows(self)
-
-
-class CommandResult:
-    """Base of results that have no rows yet."""
-
-    @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """The document that the command of the result prints with `--json`."""
-
-    @abstractmethod
-    def lines(self) -> Iterable[str]:
-        """About five lines."""
-
-    def __repr__(self) -> str:
-        """The same as one text."""
-        return summary_text(self.lines())

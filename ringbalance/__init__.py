@@ -54,93 +54,69 @@ __version__ = "0.1.0"
 # The balancers, each one line; a third is one more.
 register(
     "liquid_ring",
-    scene="ringbalance.scene.liquid_ring:KIND",
+    scene="ringbalance.scene.rules.liquid_ring:KIND",
     balancer="ringbalance.controller.liquid_ring.balancer:LiquidRingBalancer",
 )
 register(
     "eccentric_mass",
-    scene="ringbalance.controller.eccentric_mass.scene_rules:KIND",
+    scene="ringbalance.controller.eccentric_mass.scene_records:KIND",
     balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
 )
 register_function("with_values", place="ringbalance.scene.changes:with_values")
 register_function("scene_lines", place="ringbalance.scene.describe:scene_lines")
 
-_HOME = {
-    "Calibration": "ringbalance.reduced_model.calibration_record",
-    "Command": "ringbalance.controller.algorithms.algorithm",
-    "Comparison": "ringbalance.controller.compare",
-    "CompleteLaw": "ringbalance.reduced_model.law.flow_law",
-    "Controller": "ringbalance.controller.algorithms.algorithm",
-    "EccentricRun": "ringbalance.controller.eccentric_mass.run_record",
-    "EccentricScene": "ringbalance.controller.eccentric_mass.scene_records",
-    "EccentricTuning": "ringbalance.controller.eccentric_mass.tuning",
-    "Extremes": "ringbalance.verification.extremes.study",
-    "Fit": "ringbalance.studies",
-    "Flow": "ringbalance.reduced_model.law.flow_law",
-    "FlowLaw": "ringbalance.reduced_model.law.flow_law",
-    "Measurement": "ringbalance.controller.algorithms.algorithm",
-    "MomentCurve": "ringbalance.reduced_model.law.flow_law",
-    "Regime": "ringbalance.reduced_model.law.flow_law",
-    "Scene": "ringbalance.scene",
-    "SceneError": "ringbalance.scene",
-    "Sensor": "ringbalance.controller.rotor",
-    "Simulation": "ringbalance.controller.simulation",
-    "TradeStudy": "ringbalance.verification.trade",
-    "Tuning": "ringbalance.controller.tuning.result",
-    "ValveCommand": "ringbalance.controller.algorithms.algorithm",
-    "bundled_scene": "ringbalance.scene",
-    "calibrate": "ringbalance.calibration",
-    "compare": "ringbalance.face",
-    "extremes": "ringbalance.studies",
-    "fit": "ringbalance.studies",
-    "load_law": "ringbalance.reduced_model.law.files",
-    "load_scene": "ringbalance.scene",
-    "paper_law": "ringbalance.calibration",
-    "plot": "ringbalance.studies",
-    "run_cases": "ringbalance.studies",
-    "simulate": "ringbalance.face",
-    "trade": "ringbalance.studies",
-    "tune": "ringbalance.face",
-    "write_report": "ringbalance.studies",
+_NAMES = {
+    "calibration": (
+        "calibrate",
+        "paper_law",
+    ),
+    "controller.algorithms.algorithm": (
+        "Command",
+        "Controller",
+        "Measurement",
+        "ValveCommand",
+    ),
+    "controller.compare": ("Comparison",),
+    "controller.eccentric_mass.run_record": ("EccentricRun",),
+    "controller.eccentric_mass.scene_records": ("EccentricScene",),
+    "controller.eccentric_mass.tuning": ("EccentricTuning",),
+    "controller.rotor": ("Sensor",),
+    "controller.simulation": ("Simulation",),
+    "controller.tuning.result": ("Tuning",),
+    "face": (
+        "compare",
+        "simulate",
+        "tune",
+    ),
+    "reduced_model.calibration_record": ("Calibration",),
+    "reduced_model.law.files": ("load_law",),
+    "reduced_model.law.flow_law": (
+        "CompleteLaw",
+        "Flow",
+        "FlowLaw",
+        "MomentCurve",
+        "Regime",
+    ),
+    "scene": (
+        "Scene",
+        "SceneError",
+        "bundled_scene",
+        "load_scene",
+    ),
+    "studies": (
+        "Fit",
+        "extremes",
+        "fit",
+        "plot",
+        "run_cases",
+        "trade",
+        "write_report",
+    ),
+    "verification.extremes.study": ("Extremes",),
+    "verification.trade": ("TradeStudy",),
 }
-__all__ = [
-    "Calibration",
-    "Command",
-    "Comparison",
-    "CompleteLaw",
-    "Controller",
-    "EccentricRun",
-    "EccentricScene",
-    "EccentricTuning",
-    "Extremes",
-    "Fit",
-    "Flow",
-    "FlowLaw",
-    "Measurement",
-    "MomentCurve",
-    "Regime",
-    "Scene",
-    "SceneError",
-    "Sensor",
-    "Simulation",
-    "TradeStudy",
-    "Tuning",
-    "ValveCommand",
-    "bundled_scene",
-    "calibrate",
-    "compare",
-    "extremes",
-    "fit",
-    "load_law",
-    "load_scene",
-    "paper_law",
-    "plot",
-    "run_cases",
-    "simulate",
-    "trade",
-    "tune",
-    "write_report",
-]
+_HOME = {name: f"ringbalance.{module}" for module, names in _NAMES.items() for name in names}
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> object:
@@ -150,4 +126,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return __all__

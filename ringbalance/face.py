@@ -93,7 +93,7 @@ def simulate(
     balancer = balancer_of(
         checked_scene(scene), flow_law=flow_law, controller=controller, sensor=sensor, modelled=modelled
     )
-    run = balancer.run({}, AS_GIVEN, trace=True, progress=progress).runs[0][0]
+    run = balancer.run({}, AS_GIVEN, trace=True, progress=progress).traced[0].run
     return cast("Simulation | EccentricRun", run)
 
 

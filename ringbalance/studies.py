@@ -10,23 +10,23 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.data.reading import read_observations
 from ringbalance.identification.documents import fit_document, fit_rows
 from ringbalance.identification.fitting import Loss
 from ringbalance.identification.fitting import fit as fit_scene
+from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.next_measurement import NextMeasurement, next_measurement
 from ringbalance.identification.parameters import FitError
+from ringbalance.identification.reading import read_observations
 from ringbalance.identification.result import FitResult, FittedParameter
 from ringbalance.reports.cli import draw_pictures
-from ringbalance.reports.extremes_cli import base_of
 from ringbalance.reports.report import Report
 from ringbalance.reports.report import write_report as write_scene_report
 from ringbalance.results.result import Result, Rows
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.changes import checked_scene, document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
+from ringbalance.verification.extremes.cli import base_of
 from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases as run_scene_cases

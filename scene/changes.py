@@ -13,7 +13,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, Final
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
-from ringbalance.scene.faults import Fault, SceneError, toml_text
+from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import ORIGIN, Schema
@@ -21,7 +21,7 @@ from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.loader import CHANGED, scene_of
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes, toml_text
 from ringbalance.scene.units import DIMENSIONS
 
 _OF_MESH: Final = ("disc", "accuracy.tolerance")

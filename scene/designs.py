@@ -15,9 +15,8 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
-from ringbalance.scene.joint import combined, input_sides
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, combined, input_sides
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

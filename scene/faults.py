@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import difflib
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+
+from ringbalance.scene.toml import toml_text
 
 MISSING = "missing"
 MOST_SHOWN = 50
 """Errors that the message of a `SceneError` lists; more are counted."""
 _LONGEST_VALUE = 60
-_LONGEST_LIST = 10
-_DEEPEST = 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,41 +87,3 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     """' (did you mean "x"?)' with the known word that is closest; empty when none is close."""
     found = closest(word, known)
     return f' (did you mean "{found}"?)' if found else ""
-
-
-def toml_text(value: object) -> str:
-    """A value as it would stand in a TOML file, printable and shortened to fit a line."""
-    text = _toml_text(value, depth=0)
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
-
-
-def _toml_text(value: object, *, depth: int) -> str:
-    if isinstance(value, str):
-        return _quoted(value[: 2 * _LONGEST_VALUE])
-    if isinstance(value, Mapping | Sequence):
-        return _nested(value, depth=depth + 1)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int) and abs(value) >= 10**30:
-        return f"a whole number of {value.bit_length()} bits"
-    return str(value)
-
-
-def _nested(value: Mapping[Any, Any] | Sequence[Any], *, depth: int) -> str:
-    if depth > _DEEPEST:
-        return "..."
-    if isinstance(value, Mapping):
-        few = list(value.items())[:_LONGEST_LIST]
-        pairs = (f"{toml_key(str(key))} = {_toml_text(item, depth=depth)}" for key, item in few)
-        return "{ " + ", ".join(pairs) + " }"
-    return "[" + ", ".join(_toml_text(item, depth=depth) for item in value[:_LONGEST_LIST]) + "]"
-
-
-def toml_key(key: str) -> str:
-    """A key as it would stand in a TOML file: bare where it can be, else quoted; printable, on one line."""
-    bare = key.isascii() and key.replace("_", "a").replace("-", "a").isalnum()
-    return key if bare and len(key) <= _LONGEST_VALUE else _quoted(key[:_LONGEST_VALUE])
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=not text.isprintable())

@@ -1,16 +1,17 @@
-"""What reading and describing a kind of scene needs."""
+"""What a kind of scene file is: its keys, the rules that values meet, and how it is read and described."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
 from ringbalance.scene.faults import Fault
-from ringbalance.scene.keys.reading import Reading
+from ringbalance.scene.keys.reading import Reading, read_document
 from ringbalance.scene.keys.schema import Schema
 from ringbalance.scene.registry import registered_scene
+from ringbalance.scene.units import format_quantity
 
 
 class _Reads(Protocol):
@@ -37,3 +38,79 @@ def scene_kind(name: str) -> SceneKind:
     """The kind of scene of a registered balancer. Raises: KeyError: none of that name is registered."""
     kind: SceneKind = registered_scene(name)
     return kind
+
+
+_DIMENSIONS = {"mm": "length", "um": "length", "deg": "angle", "kPa": "pressure", "s": "time", "kg": "mass"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """What is wrong with a combination of values."""
+
+    problem: str
+    allowed: str
+
+
+Rule = Callable[..., Finding | None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """A rule and the values that it needs; it is left out while one of them is unknown."""
+
+    rule: Rule
+    needs: tuple[str, ...]
+    """Paths of the rule's arguments; the first is the one to be changed."""
+    when: Callable[[Reading], bool]
+    """Whether the rule applies to a scene."""
+    moot: tuple[Rule, ...]
+    """Rules before it whose failure makes this one pointless, so that one error does not raise others."""
+
+
+def check(
+    rule: Rule, *needs: str, when: Callable[[Reading], bool] = lambda _: True, moot: tuple[Rule, ...] = ()
+) -> Check:
+    """Bind a rule to paths "table.key"."""
+    return Check(rule=rule, needs=needs, when=when, moot=moot)
+
+
+def failed_checks(reading: Reading, checks: tuple[Check, ...]) -> Iterator[Fault]:
+    """One error for each check that fails; `checks` in order, each after those that make it pointless."""
+    failed: set[Rule] = set()
+    for each in checks:
+        if not reading.known(*each.needs) or not each.when(reading) or failed & set(each.moot):
+            continue
+        finding = each.rule(*(reading.values[path] for path in each.needs))
+        if finding is not None:
+            failed.add(each.rule)
+            yield reading.fault(each.needs[0], problem=finding.problem, allowed=finding.allowed)
+
+
+def reader_of(schema: Schema, checks: tuple[Check, ...]) -> Callable[..., tuple[Reading, tuple[Fault, ...]]]:
+    """How a kind of scene is read that consists of its keys and rules alone; see `SceneKind.read`."""
+
+    def read(document: Mapping[str, Any], *, file: str, **_: object) -> tuple[Reading, tuple[Fault, ...]]:
+        reading, faults = read_document(document, file=file, schema=schema)
+        reading = reading.completed()
+        return reading, (*faults, *reading.missing_faults(), *failed_checks(reading, checks))
+
+    return read
+
+
+def written(value: float, unit: str) -> str:
+    """An SI value in a unit, such as "44.5 mm"."""
+    return format_quantity(value, _DIMENSIONS[unit], unit)
+
+
+def limit_above_noise(noise_key: str, unit: str) -> Rule:
+    """The rule that a limit is above the standard deviation of what is measured."""
+
+    def above(limit: float, noise: float) -> Finding | None:
+        if limit > noise:
+            return None
+        least = written(noise, unit)
+        return Finding(
+            problem=f"the limit is below the sensor noise ({noise_key} {least})", allowed=f"above {least}"
+        )
+
+    return above

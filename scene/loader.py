@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path, PurePath
 from typing import Any, Final
 
-from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean, toml_text
+from ringbalance.scene.faults import Fault, SceneError, closest, did_you_mean
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
@@ -18,7 +18,7 @@ from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import CheckedValues, InputUncertainty, ShownOrigin
 from ringbalance.scene.registry import balancers
 from ringbalance.scene.rules.fitted import fitted_faults
-from ringbalance.scene.toml_reading import read_toml
+from ringbalance.scene.toml import read_toml, toml_text
 
 _LARGEST_FILE = 2**20
 _DECIDE_NOTHING = ("requirement.", "measured.", "rotor.mass", "liquid.source")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
-from ringbalance.scene.fitted import GaugeCorrection
+from ringbalance.scene.fitted import DrawDownFactor, ExtraLoss, GaugeCorrection, ModelErrors
 from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, Shown, derived, needed, standard, unused
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.fields import (
@@ -31,7 +31,6 @@ from ringbalance.scene.keys.fields import (
     quantity,
 )
 from ringbalance.scene.loop_models import ControllerSettings, Environment, RequirementSettings, Rotor, Sensor
-from ringbalance.scene.model_errors import DrawDownFactor, ExtraLoss, ModelErrors
 from ringbalance.scene.origins import SceneFile
 
 HumpGas = Literal["vented", "trapped"]

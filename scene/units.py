@@ -15,7 +15,8 @@ from fractions import Fraction
 from importlib import resources
 from types import MappingProxyType
 
-from ringbalance.scene.faults import did_you_mean, toml_text
+from ringbalance.scene.faults import did_you_mean
+from ringbalance.scene.toml import toml_text
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,10 +17,10 @@ import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.controller.eccentric_mass.tuning import eccentric_tuning_document, tune_eccentric
-from ringbalance.reports.extremes_cli import base_of
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
+from ringbalance.verification.extremes.cli import base_of
 from ringbalance.verification.extremes.study import Size, find_extremes
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "commands.md"
@@ -163,7 +163,7 @@ def test_keys_of_verify(printed: Any) -> None:
 def test_keys_of_extremes() -> None:
     base = base_of(liquid_ring_scene(rb.load_scene(PAPER)))
     found = find_extremes(base, size=Size(points=1, sweep=2, fineness=1.0))
-    violated = found.document() | {"violations": [{"point": {"speed": 1.0}, "violations": []}]}
+    violated = found.to_dict() | {"violations": [{"point": {"speed": 1.0}, "violations": []}]}
     compare("`extremes --json`", [violated])
 
 

@@ -12,8 +12,8 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reports.pages.drag_coefficient import SECTION
+from ringbalance.reports.pages.drag_map import DragMap
 from ringbalance.reports.section import Record, Work
-from ringbalance.reports.studies.drag_map import DragMap
 from ringbalance.results.numbers import MISSING, given, measured, number, percent, shown
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.runner import paper_scene

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from ringbalance.controller.eccentric_mass.scene_records import ECCENTRIC_MASS
 from ringbalance.scene import known_liquids
-from ringbalance.scene.faults import toml_text
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.schema import LIQUID_RING, ORIGIN, Schema
+from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import DIMENSIONS
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "scene-file.md"

@@ -153,11 +153,11 @@ class Mutation:
 
 @dataclass(frozen=True, kw_only=True)
 class _Study:
-    """A computation that several cases share, in place of a `case.py`."""
+    """The function that computes a case, in place of a `case.py`."""
 
-    of: Literal["pressure under gravity", "manufactured pressure", "measurements"]
-    settings: Mapping[str, Any]
-    """Arguments of its function, by name."""
+    of: Annotated[str, Pattern(r"[a-z0-9_]+(\.[a-z0-9_]+){2,}", "folder.module.function")]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Further arguments by name, where several cases share it."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -190,6 +190,8 @@ class Evidence:
 
     found: Mapping[str, Found]
     """By the names of the case's quantities."""
+    reference: Mapping[str, Reference] = field(default_factory=dict)
+    """What they are compared with, by the same names; a quantity that is not named has none."""
     numbers: Mapping[str, float] = field(default_factory=dict)
     """Further numbers, SI, for the placeholders of the case's text."""
     series: Sequence[Series] = ()
@@ -199,12 +201,10 @@ class Evidence:
 
 
 class CaseCode(Protocol):
-    """A case's `case.py`.
+    """A case's computation.
 
-    Beside `compute` it may have `reference`: what the judged quantities are compared with, by their names, or
-    a function of the scene that gives this. A quantity that is not named has none. `values(scene)`, where it
-    has that, is a shorter way to the judged numbers; it is asked for them at the ends of the assumed inputs'
-    ranges.
+    Beside `compute` it may have `ends(scene)`: a shorter way to what is judged, or to the part that assumed
+    inputs move, which is asked for at the ends of their ranges.
     """
 
     def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
 from functools import lru_cache
@@ -82,15 +83,22 @@ def flow_law_of(scene: Scene) -> CalibratedLaw:
     return chamber_and_law(scene)[1]
 
 
-def runs_with(scene: Scene, *, amplitudes: Sequence[float] = (LARGEST,), **settings: Any) -> list[Simulation]:
-    """Runs of the target-vector algorithm at each of `PERIODS` from each amplitude, m.
+def runs_with(
+    scene: Scene,
+    *,
+    kind: ControllerKind = "target_vector",
+    amplitudes: Sequence[float] = (LARGEST,),
+    phases: Sequence[float] = PHASES[:1],
+    periods: Sequence[float] = PERIODS,
+    **settings: Any,
+) -> list[Simulation]:
+    """Runs at each period, s, from each amplitude, m, and phase, rad, in this order.
 
     Args: `settings`: of the controller, SI.
     """
     return [
-        run_loop(loop_scene(scene, kind="target_vector", amplitude=amplitude, period=period, **settings))
-        for period in PERIODS
-        for amplitude in amplitudes
+        run_loop(loop_scene(scene, kind=kind, amplitude=amplitude, phase=phase, period=period, **settings))
+        for period, amplitude, phase in itertools.product(periods, amplitudes, phases)
     ]
 
 

@@ -9,17 +9,13 @@ from __future__ import annotations
 import json as json_format
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from rich.console import Group, RenderableType
-from rich.padding import Padding
-from rich.table import Table
-from rich.text import Text
 
 from ringbalance.mesh.chamber import default_cells
 from ringbalance.physics.results import Status
@@ -33,14 +29,16 @@ from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.terms import TERMS, models_used
-from ringbalance.results.result import CommandResult
+from ringbalance.results.numbers import MISSING, number, percent
+from ringbalance.results.result import Result, Rows, Table
+from ringbalance.results.rows import Quantity
 from ringbalance.scene import load_scene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.joint import without_fitted
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import Models, liquid_ring_scene, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.uncertain import without_fitted
 from ringbalance.verification.evidence import Level
 
 Record = dict[str, Any]
@@ -85,29 +83,42 @@ class MeasuredQuantity:
     status: Status
     models: tuple[MeasuredModel, ...]
 
+    def good_enough(self) -> list[MeasuredModel]:
+        """Models whose error is below what the finest is known to; the finest always is."""
+        return [model for model in self.models if model.error <= self.uncertainty]
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class TradeStudy(CommandResult):
+class TradeStudy(Result):
     """Speed against accuracy of one scene."""
 
     scene: Scene
     quantities: tuple[MeasuredQuantity, ...]
 
-    def lines(self) -> Iterator[str]:
-        """For a terminal: the fastest model of each quantity that is no worse than the finest is known."""
-        yield f"Speed against accuracy of {self.scene.name} ({self.scene.source})"
-        for quantity in self.quantities:
-            best = max(_enough(quantity), key=lambda model: model.designs_per_second)
-            yield (
-                f"{quantity.title}: {best.name}, {best.designs_per_second:.2g} designs a second, is off by "
-                f"{best.error:.0e}, known to {quantity.uncertainty:.0e}"
-            )
+    def rows(self) -> Rows:
+        """Of each quantity the fastest model that is no worse than the finest is known, and all models."""
+        document = self.to_dict()
+        fastest = [
+            (quantity, min(quantity.good_enough(), key=lambda model: model.seconds))
+            for quantity in self.quantities
+            if quantity.models
+        ]
+        return Rows(
+            title=f"Speed against accuracy of {self.scene.name} ({self.scene.source})",
+            quantities=tuple(
+                Quantity(
+                    key=f"{quantity.name}_designs_per_second",
+                    name=f"{quantity.title}, by {model.name}",
+                    value=model.designs_per_second,
+                    unit="designs a second",
+                    digits=2,
+                )
+                for quantity, model in fastest
+            ),
+            tables=tuple(models_table(each, document["times"]) for each in document["quantities"]),
+        )
 
-    def to_dict(self) -> dict[str, Any]:
-        """See `document`."""
-        return self.document()
-
-    def document(self) -> Record:
+    def to_dict(self) -> Record:
         """Plain numbers and texts; all but `times` is the same on every machine."""
         scene = self.scene
         estimates = [(term, term.estimate(scene)) for term in TERMS]
@@ -124,7 +135,20 @@ class TradeStudy(CommandResult):
                 for term, estimate in estimates
             ],
             "models_used": [asdict(used) for used in models_used(scene)],
-            "quantities": [_quantity_document(quantity) for quantity in self.quantities],
+            "quantities": [
+                {
+                    "quantity": quantity.name,
+                    "title": quantity.title,
+                    "points": list(quantity.points),
+                    "uncertainty": quantity.uncertainty,
+                    "status": {"code": str(quantity.status.code), "text": quantity.status.text},
+                    "models": [
+                        {"model": model.name, "values": list(model.values), "error": model.error}
+                        for model in quantity.models
+                    ],
+                }
+                for quantity in self.quantities
+            ],
             "times": {
                 quantity.name: [
                     {
@@ -139,23 +163,30 @@ class TradeStudy(CommandResult):
         }
 
 
-def _quantity_document(quantity: MeasuredQuantity) -> Record:
-    return {
-        "quantity": quantity.name,
-        "title": quantity.title,
-        "points": list(quantity.points),
-        "uncertainty": quantity.uncertainty,
-        "status": {"code": str(quantity.status.code), "text": quantity.status.text},
-        "models": [
-            {"model": model.name, "values": list(model.values), "error": model.error}
-            for model in quantity.models
-        ],
-    }
+def models_table(quantity: Record, times: Mapping[str, Sequence[Record]]) -> Table:
+    """The models of a quantity, both as `TradeStudy.to_dict` has them; times may be missing."""
+    speed = {each["model"]: each["designs_per_second"] for each in times.get(quantity["quantity"], ())}
+    models, title = quantity["models"], quantity["title"][0].upper() + quantity["title"][1:]
+    rows = [
+        (
+            model["model"],
+            MISSING if model is models[-1] else error_text(model["error"]),
+            number(speed.get(model["model"]), digits=2),
+        )
+        for model in models
+    ]
+    return Table(
+        caption=f"{title}. The last model is the finest, known to {error_text(quantity['uncertainty'])}.",
+        heads=("Model", "Error", "Designs a second"),
+        rows=rows,
+        note="" if quantity["status"]["code"] == "ok" else quantity["status"]["text"],
+        style="",
+    )
 
 
-def _enough(quantity: MeasuredQuantity) -> list[MeasuredModel]:
-    """Models whose error is below what the finest is known to; the finest always is."""
-    return [model for model in quantity.models if model.error <= quantity.uncertainty]
+def error_text(value: float | None) -> str:
+    """A relative error, as a percentage where it is large enough."""
+    return percent(value, digits=2) if value is None or value >= 1e-3 else number(value, digits=2)
 
 
 def trade_study(
@@ -330,34 +361,12 @@ def trade(
         check_file(out / _FILE)
     with activity("trade", "models ...") as shown:
         study = trade_study(asked, level=level, progress=lambda title: shown.show(f"{title} ..."))
-    text = json_format.dumps(study.document(), allow_nan=False)
+    text = json_format.dumps(study.to_dict(), allow_nan=False)
     if json:
         print(text)
     else:
-        results_console().print(_view(study))
+        results_console().print(study.rows().view(headline=False))
     if out is not None:
         write_whole(out / _FILE, text + "\n")
         messages_console().print(f"written to {out / _FILE}", highlight=False)
     return 0
-
-
-def _view(study: TradeStudy) -> RenderableType:
-    """A study for people. Returns: What rich prints."""
-    parts: list[RenderableType] = [Text(study.scene.name, style="bold")]
-    for quantity in study.quantities:
-        parts.append(Text(f"\n{quantity.title}", style="bold"))
-        if not quantity.status.ok:
-            parts.append(Padding(Text(quantity.status.text, style="yellow"), (0, 0, 0, 2)))
-        table = Table(box=None, header_style="dim", padding=(0, 1, 0, 2))
-        table.add_column("model")
-        for head in ("error", "designs a second", "time of one"):
-            table.add_column(head, justify="right")
-        for model in quantity.models:
-            table.add_row(
-                Text(model.name),
-                f"{model.error:.1e}" if model is not quantity.models[-1] else "finest",
-                f"{model.designs_per_second:,.0f}".replace(",", " "),
-                f"{1e3 * model.seconds:.3g} ms",
-            )
-        parts += [table, Padding(Text(f"the finest is known to {quantity.uncertainty:.1e}"), (0, 0, 0, 2))]
-    return Group(*parts)

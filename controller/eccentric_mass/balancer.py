@@ -16,26 +16,28 @@ from ringbalance.controller.balancer import (
     Input,
     Outcomes,
     Progress,
-    Run,
     Setting,
+    TracedRun,
     inputs_of,
     outcomes_of,
     rotor_fault,
     vibrating,
-    with_settings,
 )
-from ringbalance.controller.eccentric_mass.document import eccentric_history
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at
+from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.study import eccentric_study, reach_of
 from ringbalance.controller.eccentric_mass.tuning import (
     EccentricTuning,
     drawn_run,
     tune_eccentric,
 )
+from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
+from ringbalance.results.rows import Quantity
+from ringbalance.scene.paths import with_values_at
 
 _FINEST_SHARE: Final = 0.01
 """Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
@@ -61,15 +63,7 @@ class EccentricMassBalancer:
 
     def inputs(self) -> tuple[Input, ...]:
         """Those of the scene."""
-        scene = self.scene
-        values = {each.path: each.value for each in inputs_of(scene, {})}
-        stated = {each.quantity: each for each in scene.uncertainty}
-        widths = {
-            path: stated[path.split("[")[0]].absolute(value)
-            for path, value in values.items()
-            if path.split("[")[0] in stated
-        }
-        return inputs_of(scene, widths)
+        return inputs_of(self.scene)
 
     def settings(self) -> tuple[Setting, ...]:
         """Gains of the drives."""
@@ -94,21 +88,15 @@ class EccentricMassBalancer:
         progress: Progress | None = None,
     ) -> Outcomes:
         """See `Balancer`."""
-        scene = with_settings(self.scene, settings)
-        rows: list[tuple[Run, float | None, float, float, float]] = []
-        start = scene.supervisor.start
-        for number in draws.numbers:
-            if draws.devices:
-                run = drawn_run(scene, number)
-            else:
-                seeded = replace(scene, run=replace(scene.run, seed=scene.run.seed + number))
-                run = simulate_eccentric(seeded, progress=progress)
-            time = None if run.settling_time is None else max(0.0, run.settling_time - start)
-            balancing = run.amplitude[run.time >= start]
-            worst = float(np.max(balancing)) if balancing.size else run.worst_amplitude
-            rows.append((run, time, run.final_amplitude, run.electrical_energy, worst))
-        found = outcomes_of(rows)
-        return found if trace else replace(found, runs=())
+        scene = with_values_at(self.scene, settings)
+        seed = scene.run.seed
+        runs = (
+            drawn_run(scene, number)
+            if draws.devices
+            else simulate_eccentric(with_values_at(scene, {"run.seed": seed + number}), progress=progress)
+            for number in draws.numbers
+        )
+        return outcomes_of([_traced(run, scene.supervisor.start) for run in runs], trace=trace)
 
     def rotor(self) -> CommonRotor:
         """At the speed at which the strategy starts; see `Balancer`."""
@@ -185,6 +173,17 @@ class EccentricMassBalancer:
         """See `Balancer`."""
         return tune_eccentric(self.scene, told=progress)
 
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Reach, and the largest gains of the drives; see `Balancer`."""
+        reach = Quantity(
+            key="reach", name="usable moment in any direction", unit="kg m", value=reach_of(self.scene)
+        )
+        return (reach, *tune_eccentric(self.scene, runs=0).rows().quantities)
+
+    def requirements(self) -> tuple[Requirement, ...]:
+        """See `Balancer`."""
+        return eccentric_study(self.scene).requirements
+
     def rows(self, run: EccentricRun) -> Rows:
         """See `Balancer`."""
         return run.rows()
@@ -192,6 +191,18 @@ class EccentricMassBalancer:
     def history(self, run: EccentricRun) -> Mapping[str, Sequence[Any]]:
         """See `Balancer`."""
         return eccentric_history(run)
+
+
+def _traced(run: EccentricRun, start: float) -> TracedRun:
+    """Args: `start`: of balancing, s."""
+    balancing = run.amplitude[run.time >= start]
+    return TracedRun(
+        run=run,
+        settling_time=None if run.settling_time is None else max(0.0, run.settling_time - start),
+        final_amplitude=run.final_amplitude,
+        energy=run.electrical_energy,
+        worst_amplitude=float(np.max(balancing)) if balancing.size else run.worst_amplitude,
+    )
 
 
 def _believed(scene: EccentricScene, found: EccentricRotor, rotor: CommonRotor, *, heavier: float) -> Any:

@@ -10,15 +10,16 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain, track_model
+from ringbalance.controller.eccentric_mass.settings import lqr_gain, track_model
 from ringbalance.scene.arrays import ComplexArray
+from ringbalance.scene.paths import with_values_at
 
 GAIN_MARGIN: Final = 2.0
 """Factor by which the recommended gains could be higher before a pole leaves the unit circle."""
@@ -107,11 +108,7 @@ def advised(
     changes = {loop.key: loop.recommended for loop in advice.loops if loop.value > loop.recommended}
     if advice.drive_speed > scene.friction_filter.drive_speed:
         changes["friction_filter.drive_speed"] = advice.drive_speed
-    for key, value in changes.items():
-        table, name = key.split(".")
-        changed: dict[str, Any] = {table: replace(getattr(scene, table), **{name: value})}
-        scene = replace(scene, **changed)
-    return scene, changes
+    return with_values_at(scene, changes), changes
 
 
 def _regulator(scene: EccentricScene) -> _SampledLoop:

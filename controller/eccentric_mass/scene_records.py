@@ -3,16 +3,15 @@
 Angles are radians in the rotor's frame, positive with the rotation; amplitudes are zero-to-peak.  A walk is
 the standard deviation gathered within 1 s, so its square is a spectral density: unit^2 / s.  What a
 field's key takes and means stands in its annotation, see `ringbalance.scene.keys.declaration`.  At the end
-the tables of such a file; all is loaded for such a file only.
+the tables of such a file and its rules; all is loaded for such a file only.
 """
 
 import math
-import re
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from ringbalance.controller.eccentric_mass.control_records import (
     Supervisor,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, needed, standard, unused
+from ringbalance.scene.keys.declaration import UNCERTAIN, Entries, Listed, needed, standard, unused
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -45,9 +44,20 @@ from ringbalance.scene.keys.fields import (
     Velocity,
     quantity,
 )
-from ringbalance.scene.keys.schema import Schema, Table
+from ringbalance.scene.keys.schema import ORIGIN, Schema, Table
+from ringbalance.scene.kinds import (
+    Check,
+    Finding,
+    Rule,
+    SceneKind,
+    check,
+    limit_above_noise,
+    reader_of,
+    written,
+)
 from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.origins import InputUncertainty, SceneFile
+from ringbalance.scene.paths import moved_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 Frame = Literal["rotor", "laboratory"]
@@ -209,45 +219,6 @@ ECCENTRIC_MASS = Schema.of(
 """A scene whose balancer is two eccentric masses."""
 
 
-_PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[([01])\])?")
-
-
-def eccentric_value(scene: EccentricScene, path: str) -> float:
-    """SI value at a path, such as "rotor.mass" or "masses.friction_arm[0]"."""
-    table, key, entry = _placed(path)
-    value = getattr(getattr(scene, table), key)
-    return float(value if entry is None else value[entry])
-
-
-def eccentric_moved(scene: EccentricScene, path: str, move: Callable[[float], float]) -> EccentricScene:
-    """Copy a scene of eccentric masses with the value at a path moved, SI; nothing is checked again.
-
-    A path without an entry, such as "masses.friction_arm", moves the values of both masses.
-    """
-    table, key, entry = _placed(path)
-    record = getattr(scene, table)
-    value = getattr(record, key)
-    moved: Any
-    if isinstance(value, tuple):
-        moved = tuple(move(old) if entry in (None, place) else old for place, old in enumerate(value))
-    else:
-        moved = move(value)
-    changed: dict[str, Any] = {table: replace(record, **{key: moved})}
-    return replace(scene, **changed)
-
-
-def eccentric_with(scene: EccentricScene, value: float, *, name: str) -> EccentricScene:
-    """The same with a value in place of the one at a path."""
-    return eccentric_moved(scene, name, lambda _: value)
-
-
-def _placed(path: str) -> tuple[str, str, int | None]:
-    match = _PATH.fullmatch(path)
-    if match is None:
-        raise ValueError(f"{path!r} is no path of a scene")
-    return match[1], match[2], None if match[3] is None else int(match[3])
-
-
 def eccentric_drawn(scene: EccentricScene, random: np.random.Generator) -> EccentricScene:
     """The scene with every stated input drawn: relative ones log-normal, so that none changes its sign.
 
@@ -261,9 +232,9 @@ def eccentric_drawn(scene: EccentricScene, random: np.random.Generator) -> Eccen
         both = [f"{uncertain.quantity}[{place}]" for place in (0, 1)]
         alone = [name for name in both if name not in together]
         for path in [uncertain.quantity] if len(alone) == len(both) else alone:
-            scene = eccentric_moved(scene, path, move)
+            scene = moved_at(scene, path, move)
     for each, change in zip(scene.fitted.quantities, scene.fitted.drawn(random).tolist(), strict=True):
-        scene = eccentric_moved(scene, each.quantity, partial(_by, change, each.unit in _ANGLES))
+        scene = moved_at(scene, each.quantity, partial(_by, change, each.unit in _ANGLES))
     return scene
 
 
@@ -280,3 +251,129 @@ def _drawn(uncertain: InputUncertainty, part: float) -> Callable[[float], float]
     if uncertain.relative:
         return lambda value: value * math.exp(math.log1p(uncertain.half_width) * part)
     return lambda value: value + uncertain.half_width * part
+
+
+_ROUNDING = 1e-9
+
+
+def _imbalance_in_rotor(imbalance: float, rotor: float) -> Finding | None:
+    """m_im <= m_r, since the imbalance is a part of the rotor."""
+    if imbalance <= rotor:
+        return None
+    whole = written(rotor, "kg")
+    return Finding(
+        problem=f"the imbalance is a part of the rotor's mass ({whole}), so it cannot be heavier",
+        allowed=f"at least 0 kg and at most {whole}",
+    )
+
+
+def _masses_fit_track(arc: float, radius: float) -> Finding | None:
+    """Both masses fit on the track: l <= pi r_b."""
+    limit = math.pi * radius
+    if arc <= limit * (1 + _ROUNDING):
+        return None
+    return Finding(
+        problem="two masses of this length do not fit on the track",
+        allowed=f"above 0 mm and at most pi * guide_radius = {written(limit, 'mm')}",
+    )
+
+
+def _masses_apart(angles: tuple[float, float], arc: float, radius: float) -> Finding | None:
+    """The masses do not overlap at the start: |phi_1 - phi_2| >= l / r_b around the circle."""
+    apart, least = abs(math.remainder(angles[0] - angles[1], 2 * math.pi)), arc / radius
+    if apart >= least * (1 - _ROUNDING):
+        return None
+    width = written(least, "deg")
+    return Finding(
+        problem=f"the masses overlap: they are {written(apart, 'deg')} apart, each {width} wide",
+        allowed=f"angles at least arc_length / guide_radius = {width} apart",
+    )
+
+
+def _profile_in_order(profile: tuple[SpeedPoint, ...]) -> Finding | None:
+    """The profile has a corner, and its times increase."""
+    allowed = "at least one { time, speed }, in order of time, each time once"
+    if not profile:
+        return Finding(problem="it has no entry", allowed=allowed)
+    for place, (before, after) in enumerate(pairwise(profile), start=2):
+        if after.time <= before.time:
+            late, early = written(after.time, "s"), written(before.time, "s")
+            problem = f"entry {place} ({late}) does not come after the one before ({early})"
+            return Finding(problem=problem, allowed=allowed)
+    return None
+
+
+def _step_is_multiple(step: float, base: float) -> Finding | None:
+    """A step is a whole multiple of the sensor's."""
+    times = round(step / base)
+    if times >= 1 and abs(step / base - times) <= 1e-6 * times:
+        return None
+    first, second, third = (written(count * base, "s") for count in (1, 2, 3))
+    return Finding(
+        problem=f"it is not a whole multiple of the step of [sensor] ({first})",
+        allowed=f"{first}, {second}, {third} ...",
+    )
+
+
+def _moves_in_order(stop: float, step: float) -> Finding | None:
+    """The smallest trial move is not longer than the first."""
+    if stop <= step:
+        return None
+    return Finding(
+        problem=f"the smallest trial move must not be longer than the first, step ({written(step, 'deg')})",
+        allowed=f"above 0 deg and at most {written(step, 'deg')}",
+    )
+
+
+def _widths_below(names: tuple[str, ...]) -> Rule:
+    """No stated uncertainty is larger than its quantity, of those whose values follow the widths."""
+
+    def below(
+        widths: Mapping[str, tuple[float, bool]], *values: float | tuple[float, float]
+    ) -> Finding | None:
+        for name, value in zip(names, values, strict=True):
+            width, relative = widths.get(name, (0.0, True))
+            if not relative and width > min(value if isinstance(value, tuple) else (value,)):
+                return Finding(
+                    problem=f"the uncertainty of {name} is larger than {name} itself",
+                    allowed="at most the quantity itself, or below 100 %",
+                )
+        return None
+
+    return below
+
+
+def _width_checks() -> Iterator[Check]:
+    """An angle may be less than its uncertainty."""
+    for table, key in ECCENTRIC_MASS.tables["uncertainty"].keys.items():
+        if table != ORIGIN and isinstance(key.takes, Entries):
+            names = tuple(name for name in key.takes.keys if name != "phase")
+            paths = (f"{table}.{name}" for name in names)
+            yield check(_widths_below(names), f"uncertainty.{table}", *paths)
+
+
+_ARC, _GUIDE = "masses.arc_length", "masses.guide_radius"
+_STEPS = ("imbalance_filter.step", "friction_filter.step", "lqr.step")
+
+CHECKS: tuple[Check, ...] = (
+    check(_profile_in_order, "rotor.speed_profile"),
+    check(_imbalance_in_rotor, "imbalance.mass", "rotor.mass"),
+    check(_masses_fit_track, _ARC, _GUIDE),
+    check(_masses_apart, "masses.initial_angle", _ARC, _GUIDE, moot=(_masses_fit_track,)),
+    *(check(_step_is_multiple, step, "sensor.step") for step in _STEPS),
+    check(_moves_in_order, "fine_tuning.stop", "fine_tuning.step"),
+    check(limit_above_noise("position_noise", "mm"), "supervisor.limit", "sensor.position_noise"),
+    *_width_checks(),
+)
+
+KIND: Final = SceneKind(
+    schema=ECCENTRIC_MASS,
+    read=reader_of(ECCENTRIC_MASS, CHECKS),
+    main=(
+        ("rotor.mass", "rotor.stiffness", "rotor.damping"),
+        ("imbalance.mass", "imbalance.radius", "masses.mass", "masses.guide_radius"),
+        ("supervisor.limit", "run.seed"),
+    ),
+    usual_units={"angle": "deg", "length": "mm"},
+)
+"""Scenes whose balancer is two eccentric masses."""

@@ -6,100 +6,41 @@ the controller is configured with, which does not know what is unknown.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, asdict, dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.document import eccentric_document
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plan import STAGE_NAMES, Stage
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
     eccentric_drawn,
-    eccentric_moved,
 )
-from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
-from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
-from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.targets import target_angles
 from ringbalance.controller.eccentric_mass.tuning import (
     EccentricTuning,
     eccentric_tuning_document,
     tune_eccentric,
 )
+from ringbalance.results.requirements import AT_LEAST, AT_MOST, Interval, Requirement
 from ringbalance.scene.origins import InputUncertainty
+from ringbalance.scene.paths import moved_at
 
-_AT_LEAST: Final = "at least"
-_AT_MOST: Final = "at most"
 _LIMIT: Final = "supervisor.limit"
 _ROUNDING: Final = 1e-12
 _FEWEST: Final = 3
-Interval = tuple[float, float]
 Judged = Mapping[str, float | None]
 """Numbers that a run comes to, by name; None: it does not come to it."""
 NOISE: Final = "sensor.noise"
 _SEEDS: Final = 2
 DRAWS: Final = 39
 """Of so many: 95 % of further ones lie between least and greatest, or between an end and the second."""
-
-
-@dataclass(frozen=True)
-class EccentricRequirement:
-    """What is asked of the balancer and what it comes to; intervals are 95 %, from stated uncertainties."""
-
-    quantity: str
-    unit: str
-    """SI; empty for a ratio."""
-    sense: str
-    """ "at least" or "at most"."""
-    required: float
-    set_by: str
-    """Where the requirement comes from."""
-    achieved: float | None
-    """None: the run did not come to it."""
-    _: KW_ONLY
-    required_interval: Interval | None = None
-    achieved_interval: Interval | None = None
-    """None: no uncertainty is stated, or it does not move the number."""
-    effects: Mapping[str, Interval] = field(default_factory=dict)
-    """By how much each cause alone lowers and raises `excess`, by the input's path."""
-    lost: tuple[str, ...] = ()
-    """Causes with which a run does not come to it at all."""
-    excess_interval: Interval | None = None
-    """None: as `achieved_interval`."""
-    reached: float = 1.0
-    """Fraction of the drawn runs that come to it at all."""
-    held: float = 1.0
-    """Fraction of the drawn runs that meet the requirement."""
-
-    @property
-    def excess(self) -> float:
-        """By which the requirement is more than met; minus infinity where the run does not come to it."""
-        if self.achieved is None:
-            return -math.inf
-        more = self.achieved - self.required
-        return more if self.sense == _AT_LEAST else -more
-
-    @property
-    def met(self) -> bool:
-        """Whether it is, as the scene says."""
-        return self.excess >= 0
-
-    @property
-    def verdict(self) -> str:
-        """Whether it is with 95 % of what the inputs may be: met, not met, cannot be told.
-
-        It is not where none of the drawn runs meets it, though the run as the scene says may.
-        """
-        least, most = self.excess_interval or (self.excess, self.excess)
-        if most < 0 or self.held == 0.0:
-            return "not met"
-        always = self.reached == 1.0 and not self.lost
-        return "met" if least >= 0 and always else "cannot be told"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +54,7 @@ class _EccentricStudy:
     """With the masses clamped where they start: the same rotor without balancing."""
     tuning: EccentricTuning
     """The loops alone, without runs."""
-    requirements: tuple[EccentricRequirement, ...]
+    requirements: tuple[Requirement, ...]
 
     def document(self) -> dict[str, Any]:
         """Plain numbers in SI: both runs as `simulate --json` gives them, the loops as `tune --json` does."""
@@ -121,9 +62,7 @@ class _EccentricStudy:
             "run": eccentric_document(self.run),
             "locked": eccentric_document(self.locked),
             "tuning": eccentric_tuning_document(self.tuning),
-            "requirements": [
-                {**asdict(row), "met": row.met, "verdict": row.verdict} for row in self.requirements
-            ],
+            "requirements": [row.document() for row in self.requirements],
         }
 
 
@@ -141,34 +80,37 @@ def eccentric_study(scene: EccentricScene) -> _EccentricStudy:
     return _EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
 
 
-def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[EccentricRequirement]:
+def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
     plant = PlantParameters.of(scene)
-    gap = scene.masses.arc_length / scene.masses.guide_radius
-    # Of an imbalance beyond all reach, what the masses side by side leave is what they lack.
-    beyond = 4 * plant.moment
-    capacity = beyond - target_angles(beyond, 0.0, plant.moment, gap).residual
     deviation = float(np.sqrt(np.max(np.linalg.eigvalsh(run.estimates.imbalance_covariance[-1]))))
     estimate = float(np.hypot(*run.estimates.imbalance[-1]))
     limit, gate = scene.supervisor.limit, scene.imbalance_filter.gate
     until, why = _deadline(scene)
     return [
-        EccentricRequirement(
-            "balancing moment", "kg m", _AT_LEAST, plant.unbalance, "the imbalance to cancel", capacity
+        Requirement(
+            "balancing moment", "kg m", AT_LEAST, plant.unbalance, "the imbalance to cancel", reach_of(scene)
         ),
-        EccentricRequirement("amplitude at the end", "m", _AT_MOST, limit, _LIMIT, run.final_amplitude),
-        EccentricRequirement(
-            "largest amplitude after balancing", "m", _AT_MOST, limit, _LIMIT, _largest_balanced(run)
-        ),
-        EccentricRequirement("settling time", "s", _AT_MOST, until, why, run.settling_time),
-        EccentricRequirement(
+        Requirement("amplitude at the end", "m", AT_MOST, limit, _LIMIT, run.final_amplitude),
+        Requirement("largest amplitude after balancing", "m", AT_MOST, limit, _LIMIT, _largest_balanced(run)),
+        Requirement("settling time", "s", AT_MOST, until, why, run.settling_time),
+        Requirement(
             "standard deviation of the imbalance, from noise",
             "kg m",
-            _AT_MOST,
+            AT_MOST,
             gate * plant.unbalance,
             f"imbalance_filter.gate, {100 * gate:g} % of the imbalance",
             deviation if estimate > 0 else None,
         ),
     ]
+
+
+def reach_of(scene: EccentricScene) -> float:
+    """Largest imbalance that the masses cancel, kg m."""
+    moment = PlantParameters.of(scene).moment
+    gap = scene.masses.arc_length / scene.masses.guide_radius
+    # Of an imbalance beyond all reach, what the masses side by side leave is what they lack.
+    beyond = 4 * moment
+    return beyond - target_angles(beyond, 0.0, moment, gap).residual
 
 
 def _deadline(scene: EccentricScene) -> tuple[float, str]:
@@ -179,12 +121,10 @@ def _deadline(scene: EccentricScene) -> tuple[float, str]:
     return scene.run.time_limit, "run.time_limit, the end of the run"
 
 
-def _of_loops(gains: RecommendedGains) -> Sequence[EccentricRequirement]:
+def _of_loops(gains: RecommendedGains) -> Sequence[Requirement]:
     why = "half the gain at which the loop is unstable"
     return [
-        EccentricRequirement(
-            f"gain margin of the {loop.name}", "", _AT_LEAST, GAIN_MARGIN, why, loop.gain_margin
-        )
+        Requirement(f"gain margin of the {loop.name}", "", AT_LEAST, GAIN_MARGIN, why, loop.gain_margin)
         for loop in gains.loops
     ]
 
@@ -203,8 +143,8 @@ def _judged(scene: EccentricScene, run: EccentricRun) -> Judged:
 
 
 def _with_intervals(
-    row: EccentricRequirement, moved: Mapping[str, list[Judged]], drawn: Sequence[Judged]
-) -> EccentricRequirement:
+    row: Requirement, moved: Mapping[str, list[Judged]], drawn: Sequence[Judged]
+) -> Requirement:
     if not drawn or row.achieved is None:
         return row
     excess = [run[f"{row.quantity}.excess"] for run in drawn]
@@ -290,7 +230,7 @@ def _both_ends(scene: EccentricScene, uncertain: InputUncertainty) -> Iterator[E
         return lambda value: value + sign * uncertain.absolute(value)
 
     for sign in (-1, 1):
-        yield eccentric_moved(scene, uncertain.quantity, at(sign))
+        yield moved_at(scene, uncertain.quantity, at(sign))
 
 
 def _effects(value: float, moved: Mapping[str, list[Judged]], name: str) -> dict[str, tuple[float, float]]:

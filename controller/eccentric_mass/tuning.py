@@ -11,12 +11,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
-from ringbalance.controller.eccentric_mass.strategy.plan import STAGE_NAMES, Stage
-from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
 from ringbalance.results.result import Presentation, PresentedResult, Rows, Table
 from ringbalance.results.rows import Finding, Quantity

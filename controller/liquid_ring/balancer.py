@@ -6,7 +6,7 @@ import cmath
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,12 +18,12 @@ from ringbalance.controller.balancer import (
     Input,
     Outcomes,
     Progress,
-    Run,
     Setting,
+    TracedRun,
     inputs_of,
     outcomes_of,
+    requirements_of,
     vibrating,
-    with_settings,
 )
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
 from ringbalance.controller.ensemble import member_noise, simulate_members
@@ -37,17 +37,19 @@ from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.search import recommended
 from ringbalance.controller.tuning.settling import drawn_run
 from ringbalance.controller.tuning.tune import tune
-from ringbalance.reduced_model.calibration import calibrated_model, chamber_and_law, law_by_name
+from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import gives_forces
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, completed_model, lacking
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
+from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
-from ringbalance.results.rows import Finding
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
+from ringbalance.scene.paths import with_values_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
 
 _GAIN: Final = 30.0
@@ -59,7 +61,7 @@ _PRESSURE: Final = 3.0
 class LiquidRingBalancer:
     """A disc with chambers that a gas drives liquid between; options as in `ringbalance.simulate`."""
 
-    options: ClassVar = frozenset({"flow_law", "controller", "sensor", "modelled"})
+    options = frozenset({"flow_law", "controller", "sensor", "modelled"})
     scene: Scene
     _: KW_ONLY
     flow_law: Any = None
@@ -95,7 +97,8 @@ class LiquidRingBalancer:
     def inputs(self) -> tuple[Input, ...]:
         """Those of the scene, with what it assumes where it states no uncertainty."""
         widths = half_widths(self.scene).items()
-        return inputs_of(self.scene, {f"{UNCERTAIN_QUANTITIES[name]}.{name}": each for name, each in widths})
+        by_path = {f"{UNCERTAIN_QUANTITIES[name]}.{name}": each for name, each in widths}
+        return inputs_of(self.scene, lambda path, _: by_path.get(path, by_path.get(path.split("[")[0], 0.0)))
 
     def settings(self) -> tuple[Setting, ...]:
         """Gas pressure, gain and integral time."""
@@ -125,16 +128,24 @@ class LiquidRingBalancer:
         progress: Progress | None = None,
     ) -> Outcomes:
         """See `Balancer`; without traces, runs of the program's own algorithm and sensor are many at once."""
-        scene = with_settings(self.scene, settings)
+        scene = with_values_at(self.scene, settings)
         own = (self.controller, self.sensor, self.modelled) != (None, None, None) or self.to_time_limit
         if not trace and not own:
             return self._untraced(scene, draws)
-        rows: list[tuple[Run, float | None, float, float, float]] = []
-        for number in draws.numbers:
-            run = self._traced(scene, number, devices=draws.devices, progress=progress)
-            final, worst = float(run.amplitude[-1]), float(np.max(run.amplitude))
-            rows.append((run, run.settling_time, final, run.gas.energy, worst))
-        return outcomes_of(rows)
+        runs = (
+            self._traced(scene, number, devices=draws.devices, progress=progress) for number in draws.numbers
+        )
+        traced = [
+            TracedRun(
+                run=run,
+                settling_time=run.settling_time,
+                final_amplitude=float(run.amplitude[-1]),
+                energy=run.gas.energy,
+                worst_amplitude=float(np.max(run.amplitude)),
+            )
+            for run in runs
+        ]
+        return outcomes_of(traced, trace=trace)
 
     def _untraced(self, scene: Scene, draws: Draws) -> Outcomes:
         seed, numbers = scene.run.seed, list(draws.numbers)
@@ -248,6 +259,22 @@ class LiquidRingBalancer:
     def recommend(self, *, progress: Callable[[str], None] | None = None) -> Tuning:
         """See `Balancer`."""
         return tune(self.scene, self.model, progress=progress)
+
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Those of its calibration; see `Balancer`."""
+        return calibrate(self.scene).rows().quantities
+
+    def requirements(self) -> tuple[Requirement, ...]:
+        """See `Balancer`."""
+        wanted, rotor = self.scene.requirement, self.scene.rotor
+        reach = next(each.value for each in self.quantities() if each.key == "reach")
+        return requirements_of(
+            self,
+            unbalance=wanted.correction_moment or abs(rotor.initial_unbalance),
+            reach=reach or 0.0,
+            residual=wanted.residual or self.scene.controller.limit,
+            settling_time=wanted.settling_time or self.span(),
+        )
 
     def rows(self, run: Simulation) -> Rows:
         """See `Balancer`."""

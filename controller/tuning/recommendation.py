@@ -21,8 +21,8 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
-from ringbalance.scene.joint import FITTED, independent_half_widths, input_sides
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import FITTED, independent_half_widths, input_sides
 
 _ELSEWHERE: Final = frozenset({"influence_coefficient", "lag_angle", "density"})
 """Inputs with a part of their own; the density is in that of the moment, and the velocity makes up for some

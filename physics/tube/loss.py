@@ -34,9 +34,8 @@ from ringbalance.physics.tube.rotation_table import rotating_friction_ratio, rot
 from ringbalance.physics.tube.state import TubeState, tube_state
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.designs import Designs, input_effects
-from ringbalance.scene.joint import FITTED, fitted_causes
 from ringbalance.scene.models import Scene, Tube
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.uncertain import FITTED, NORMAL_95, fitted_causes
 
 INPUT_PART: Final = "input: "
 """What the names of parts by inputs begin with."""

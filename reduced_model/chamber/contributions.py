@@ -30,7 +30,7 @@ from ringbalance.reduced_model.chamber.values import (
 )
 from ringbalance.scene.arrays import FloatArray, distinct
 from ringbalance.scene.models import Scene
-from ringbalance.scene.rules.validity import LARGEST_COMPRESSION, METAL_DENSITY, bulk_modulus
+from ringbalance.scene.rules.working import LARGEST_COMPRESSION, METAL_DENSITY, bulk_modulus
 
 _NO_BASIS: Final = "the scene gives no basis for an estimate"
 
@@ -328,7 +328,7 @@ def compression(scene: Scene, fills: FloatArray) -> FloatArray:
 
     Returns: Shares along the fills; those above `LARGEST_COMPRESSION` are beyond every model here, and so
         are velocities that such a pressure drives.
-    Source: p = f p_gas + rho omega^2 (R2^2 - a^2)/2; `scene.rules.validity`.
+    Source: p = f p_gas + rho omega^2 (R2^2 - a^2)/2; `scene.rules.working`.
     """
     column = hydrostatic_pressure(
         density=scene.liquid.density,

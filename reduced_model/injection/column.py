@@ -15,7 +15,7 @@ a_f is the smaller one, so du/dt = min(a_f, a_s).  It is continuous across the c
 u is the smaller of the quasi-steady velocities, as in the flow law.  Over a primed tube p_c is the cavity's;
 an unprimed one spills with gas there, as far as the law has it carried out.
 
-The conditions are those of `reduced_model.tube.regime`, number by number; a test compares the two.
+The conditions are those of `reduced_model.tube.regime`, interpreted there and compiled here.
 """
 
 from __future__ import annotations
@@ -25,9 +25,11 @@ from typing import Final
 
 from ringbalance.reduced_model.injection.dynamics import HEAD, HYDROSTATIC, RETURN_CREST, TO_CREST, Record
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.tube.regime import CLEARING
+from ringbalance.reduced_model.tube import regime
+from ringbalance.reduced_model.tube.regime import CLEARING, cleared, crest_margins, driving_pressure
 from ringbalance.scene.platform.compiled import in_place, inlined
 
+Four = tuple[float, float, float, float]
 _SLOWEST: Final = 1e-150
 """m/s, below which the tube's loss is neglected."""
 _NEWTON_STEPS: Final = 60
@@ -148,9 +150,7 @@ def hydrostatic(plant: Record, x: float) -> tuple[float, float]:
 
 
 @inlined
-def ends(
-    plant: Record, x: float, opposite: float, p: float, q: float, direction: int
-) -> tuple[float, float, float, float]:
+def ends(plant: Record, x: float, opposite: float, p: float, q: float, direction: int) -> Four:
     """Gas pressures and hydrostatic pressures upstream and downstream, Pa, from fills and gauge pressures."""
     near, far = hydrostatic(plant, x)[0], hydrostatic(plant, opposite)[0]
     if direction > 0:
@@ -159,67 +159,37 @@ def ends(
 
 
 @inlined
-def _driving(plant: Record, at: tuple[float, float, float, float]) -> float:
-    return float(at[0] - at[1] + at[2] - max(at[3], plant.port_pressure))
-
-
-@inlined
-def _allowed(plant: Record, at: tuple[float, float, float, float]) -> bool:
+def _allowed(plant: Record, at: Four) -> bool:
     """Under a one-way law liquid leaves a chamber with gas in it, or one whose level passes the crest."""
     return bool(not plant.one_way or at[0] > plant.gas_off or at[2] - plant.column_pressure > at[1])
 
 
-@inlined
-def crest_margins(plant: Record, at: tuple[float, float, float, float]) -> tuple[float, float]:
-    """Crest pressure at rest less that of the cavity of a primed tube, and less that of gas there, Pa."""
-    low = at[1] if at[3] < plant.port_pressure else plant.vapour_pressure
-    high = low if plant.released == 0.0 else max(at[1], low)
-    cavity = low + plant.released * (high - low)
-    gas = at[1] + (max(at[3] - plant.port_pressure, 0.0) if plant.trapped else 0.0)
-    resting = at[0] + at[2] - plant.column_pressure
-    return resting - cavity, resting - max(gas, cavity)
+@in_place
+def can_flow(plant: Record, at: Four, primed: bool) -> bool:
+    """Whether liquid flows, by the law's conditions."""
+    return bool(_allowed(plant, at) and regime.can_flow(plant, at, primed))
 
 
 @in_place
-def can_flow(plant: Record, at: tuple[float, float, float, float], primed: bool) -> bool:
-    """Whether liquid flows: port covered, driving pressure positive, crest passed."""
-    if not _allowed(plant, at) or at[2] < plant.port_pressure or _driving(plant, at) <= 0.0:
-        return False
-    if not plant.crest:
-        return True
-    primed_margin, gas_margin = crest_margins(plant, at)
-    return bool((primed_margin if primed and not plant.one_way else gas_margin) > 0.0)
-
-
-@in_place
-def holds_at_rest(plant: Record, at: tuple[float, float, float, float], primed: bool) -> bool:
-    """Whether a column in which nothing flows is still there: below a level, or in exact balance."""
-    covered = at[2] >= plant.port_pressure
-    if plant.one_way or not primed:
-        return False
-    if not plant.crest:
-        return bool(covered)
-    return bool(covered and _driving(plant, at) == 0.0 and crest_margins(plant, at)[0] > 0.0)
+def holds_at_rest(plant: Record, at: Four, primed: bool) -> bool:
+    """Whether a column in which nothing flows is still there; a one-way law has none."""
+    return bool(not plant.one_way and regime.holds_at_rest(plant, at, primed))
 
 
 @inlined
-def _cleared(plant: Record, spill: float) -> tuple[float, float]:
-    """Fraction of the way from gas to cavity pressure over the crest, by the spilling liquid's velocity.
-
-    And its derivative by that velocity.
-    """
+def _clearing_slope(plant: Record, spill: float) -> float:
+    """Derivative of `cleared` by the spilling liquid's velocity."""
     if plant.froude_velocity == 0.0:
-        return 1.0, 0.0
+        return 0.0
     part = (spill / plant.froude_velocity - _SLOW_FROUDE) / (_FAST_FROUDE - _SLOW_FROUDE)
     part = min(max(part, 0.0), 1.0)
-    slope = 6.0 * part * (1.0 - part) / ((_FAST_FROUDE - _SLOW_FROUDE) * plant.froude_velocity)
-    return part * part * (3.0 - 2.0 * part), slope
+    return float(6.0 * part * (1.0 - part) / ((_FAST_FROUDE - _SLOW_FROUDE) * plant.froude_velocity))
 
 
 @inlined
 def _crest_margin(
     plant: Record,
-    at: tuple[float, float, float, float],
+    at: Four,
     direction: int,
     primed: bool,
     log_speed: float,
@@ -233,17 +203,17 @@ def _crest_margin(
         return gas_margin, 0.0, 0.0
     which = crest_table(direction)
     spill = quasi_steady(plant, which, gas_margin, log_speed)
-    cleared, slope = _cleared(plant, spill)
+    carried, slope = cleared(plant, spill), _clearing_slope(plant, spill)
     more = max(primed_margin - gas_margin, 0.0)
     if slope > 0.0:
         slope /= plant.density * tube_loss(plant, which, spill, law_log(spill, log_speed))[1]
-    return gas_margin + cleared * more, cleared, slope * more
+    return gas_margin + carried * more, carried, slope * more
 
 
 @in_place
 def _directed(
     plant: Record,
-    at: tuple[float, float, float, float],
+    at: Four,
     direction: int,
     primed: bool,
     log_speed: float,
@@ -251,7 +221,7 @@ def _directed(
     """Velocity of flow in one direction, and whether the column is separated."""
     if not can_flow(plant, at, primed):
         return 0.0, False
-    full = quasi_steady(plant, HEAD, _driving(plant, at), log_speed)
+    full = quasi_steady(plant, HEAD, driving_pressure(plant, at), log_speed)
     if not plant.crest:
         return full, False
     margin = _crest_margin(plant, at, direction, primed, log_speed)[0]
@@ -291,9 +261,7 @@ def holds(
 
 
 @in_place
-def clearance(
-    plant: Record, at: tuple[float, float, float, float], direction: int, log_speed: float
-) -> float:
+def clearance(plant: Record, at: Four, direction: int, log_speed: float) -> float:
     """What an unprimed tube has beyond the flow that carries the gas over its crest out.
 
     Returns: Pressure over rho, m^2/s^2.
@@ -306,14 +274,14 @@ def clearance(
         crest_margins(plant, at)[1] / plant.density
         - tube_loss(plant, crest_table(direction), half, log_of_law)[0]
     )
-    flows = _driving(plant, at) / plant.density - tube_loss(plant, HEAD, half, log_of_law)[0]
+    flows = driving_pressure(plant, at) / plant.density - tube_loss(plant, HEAD, half, log_of_law)[0]
     return float(min(spills, flows))
 
 
 @in_place
 def _fills(
     plant: Record,
-    at: tuple[float, float, float, float],
+    at: Four,
     direction: int,
     primed: bool,
     log_speed: float,
@@ -321,7 +289,7 @@ def _fills(
     """Whether a column that flows is a continuous one: gas carried out, no cavity open to the port."""
     if not plant.crest:
         return True
-    which, driving = crest_table(direction), _driving(plant, at)
+    which, driving = crest_table(direction), driving_pressure(plant, at)
     if not primed and clearance(plant, at, direction, log_speed) <= 0.0:
         return False
     if at[3] >= plant.port_pressure:
@@ -334,7 +302,7 @@ def _fills(
 @inlined
 def accelerations(
     plant: Record,
-    at: tuple[float, float, float, float],
+    at: Four,
     speed: float,
     direction: int,
     primed: bool,
@@ -350,25 +318,25 @@ def accelerations(
     loss, slope = tube_loss(plant, HEAD, speed, log_of_law)
     length, covered = plant.length, 1.0 if at[3] > plant.port_pressure else 0.0
     per, each = 1.0 / length, 1.0 / (plant.density * length)
-    full = _driving(plant, at) * each - loss * per
+    full = driving_pressure(plant, at) * each - loss * per
     if not plant.crest:
         return full, math.inf, -slope * per, each, -each, -each * covered
     fraction = plant.crest_end if direction > 0 else plant.return_crest_end
-    margin, cleared, more = _crest_margin(plant, at, direction, primed, log_speed)
+    margin, carried, more = _crest_margin(plant, at, direction, primed, log_speed)
     upper_loss, upper_slope = tube_loss(plant, crest_table(direction), speed, log_of_law)
     per_upper, each_upper = 1.0 / (fraction * length), 1.0 / (plant.density * fraction * length)
     broken = margin * each_upper - upper_loss * per_upper
     if full <= broken:
         return full, broken, -slope * per, each, -each, -each * covered
     by_cavity, by_gas, by_far = crest_slopes(plant, at)
-    gas = 1.0 - cleared + more
-    by_down = -each_upper * (gas * by_gas + cleared * by_cavity)
-    by_up, by_liquid = each_upper * (gas + cleared), -each_upper * gas * by_far
+    gas = 1.0 - carried + more
+    by_down = -each_upper * (gas * by_gas + carried * by_cavity)
+    by_up, by_liquid = each_upper * (gas + carried), -each_upper * gas * by_far
     return full, broken, -upper_slope * per_upper, by_up, by_down, by_liquid
 
 
 @inlined
-def crest_slopes(plant: Record, at: tuple[float, float, float, float]) -> tuple[float, float, float]:
+def crest_slopes(plant: Record, at: Four) -> tuple[float, float, float]:
     """Derivatives of the pressures over the crest: of a cavity and of gas by the gas pressure downstream, and
     of gas by the liquid's pressure there."""
     is_open = at[3] < plant.port_pressure
@@ -380,7 +348,7 @@ def crest_slopes(plant: Record, at: tuple[float, float, float, float]) -> tuple[
 
 
 @in_place
-def open_to_gas(plant: Record, at: tuple[float, float, float, float]) -> bool:
+def open_to_gas(plant: Record, at: Four) -> bool:
     """Whether its liquid leaves the upstream port open, or flow is ruled out without gas."""
     if plant.tabled:
         return False

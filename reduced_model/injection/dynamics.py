@@ -25,7 +25,7 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.heads import entrance_fraction
 from ringbalance.reduced_model.tube.path import crest_span
-from ringbalance.reduced_model.tube.regime import SiphonCrest
+from ringbalance.reduced_model.tube.regime import TubePath
 from ringbalance.scene.models import Scene, Tube
 
 
@@ -69,7 +69,7 @@ _PLANT_REAL: Final = (
     "port_pressure",  # D_p, Pa
     "column_pressure",  # D_m, Pa; of a one-way law the level above which liquid leaves a vented chamber
     "vapour_pressure",  # gauge, Pa
-    "released",  # as in `SiphonCrest`
+    "released",  # as in `TubePath`
     "froude_velocity",  # m/s
     "lift_straight",  # of `Lift`
     "lift_entrance",
@@ -177,7 +177,7 @@ class Lift:
     def of(cls, scene: Scene, *, law: FlowLaw) -> Lift | None:
         """What liquid meets on its way up to the crest; None without one, or under a law that has none."""
         tube = scene.tube
-        if tube.hump_radius is None or not isinstance(law, CalibratedLaw) or law.path.crest is None:
+        if tube.hump_radius is None or not isinstance(law, CalibratedLaw):
             return None
         half = law.max_fill_ratio / 2
         flow = law.evaluate(fill_ratio=half, gas_pressure=scene.gas.pressure, primed=True)
@@ -200,9 +200,8 @@ class Column:
     tables: tuple[HermiteTable, ...]
     """P(x), Pa, over the fill; ln((k + 1) u^2/2) over ln u; with a crest ln((alpha + k_up) u^2/2) for flow
     out of chamber 0 and out of chamber 1."""
-    port_pressure: float
-    """D_p, Pa."""
-    crest: SiphonCrest[float] | None
+    path: TubePath | None
+    """None under a law without a path of its own: no crest, and the port always covered."""
     one_way: bool
     """Whether liquid leaves only a chamber that has gas, as in the paper's Eq. 19, or a level that passes the
     crest."""
@@ -227,8 +226,7 @@ class Column:
             length=tube.length,
             crest_ends=(1.0, 1.0),
             tables=(),
-            port_pressure=0.0,
-            crest=None,
+            path=None,
             one_way=False,
             gas_off=gas_off,
             velocities=law,
@@ -242,14 +240,13 @@ def gives_forces(law: FlowLaw) -> bool:
 
 def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:
     ahead, back = law.heads.hump_head, law.heads.return_hump_head
-    to_crest = (ahead, back) if ahead and back and law.path.crest else ()
+    to_crest = (ahead, back) if ahead and back else ()
     return Column(
         density=law.density,
         length=tube.length,
         crest_ends=(crest_span(tube)[1], 1 - crest_span(tube)[0]),
         tables=(law.hydrostatic_pressure, law.heads.head, *to_crest),
-        port_pressure=law.path.port_pressure,
-        crest=law.path.crest if to_crest else None,
+        path=law.path,
         one_way=False,
         gas_off=gas_off,
         gas_factor=law.gas_factor,
@@ -263,8 +260,7 @@ def _paper(law: PaperLaw, tube: Tube, gas_off: float) -> Column:
         length=tube.length,
         crest_ends=(1.0, 1.0),
         tables=(_straight(0.0, law.pressure_per_fill_difference), _straight(float(loss), 2.0)),
-        port_pressure=0.0,
-        crest=None,
+        path=None,
         one_way=True,
         gas_off=gas_off,
         return_pressure=math.inf if law.return_pressure is None else law.return_pressure,
@@ -369,8 +365,16 @@ class Dynamics:
         return self._plants[total]
 
 
-_OF_COLUMN: Final = ("density", "length", "port_pressure", "gas_off", "gas_factor", "one_way")
-_OF_CREST: Final = ("column_pressure", "vapour_pressure", "trapped", "released", "froude_velocity")
+_OF_COLUMN: Final = ("density", "length", "gas_off", "gas_factor", "one_way")
+_OF_PATH: Final = (
+    "port_pressure",
+    "column_pressure",
+    "vapour_pressure",
+    "trapped",
+    "released",
+    "froude_velocity",
+    "crest",
+)
 _OF_DYNAMICS: Final = (
     "inertia",
     "valve_lag",
@@ -386,14 +390,13 @@ _OF_DYNAMICS: Final = (
 
 def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDArray[np.void]:
     plant, column = np.zeros(1, dtype=PLANT), dynamics.column
-    for source, names in ((column, _OF_COLUMN), (column.crest, _OF_CREST), (dynamics, _OF_DYNAMICS)):
+    for source, names in ((column, _OF_COLUMN), (column.path, _OF_PATH), (dynamics, _OF_DYNAMICS)):
         for name in names if source is not None else ():
             plant[name] = getattr(source, name)
-    if column.crest is None:
+    if not plant["crest"]:
         plant["column_pressure"] = column.return_pressure
-    plant["crest"] = column.crest is not None
     plant["hold_up"] = dynamics.tube_area * column.length / dynamics.chamber_volume
-    if dynamics.lift is not None and column.crest is not None:
+    if dynamics.lift is not None and plant["crest"]:
         plant["lifts"] = True
         plant["lift_straight"], plant["lift_entrance"] = dynamics.lift.straight, dynamics.lift.entrance
     plant["crest_end"], plant["return_crest_end"] = column.crest_ends

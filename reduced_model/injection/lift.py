@@ -19,7 +19,6 @@ import math
 from typing import Final
 
 from ringbalance.reduced_model.injection.column import (
-    crest_margins,
     crest_slopes,
     crest_table,
     ends,
@@ -30,6 +29,7 @@ from ringbalance.reduced_model.injection.column import (
 )
 from ringbalance.reduced_model.injection.dynamics import P, Record, U, X
 from ringbalance.reduced_model.injection.gas import gas_volume, line_rates
+from ringbalance.reduced_model.tube.regime import crest_margins
 from ringbalance.scene.platform.compiled import in_place, inlined
 
 _BEHIND: Final = 0.54956

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -19,15 +19,21 @@ from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_table
 from ringbalance.reduced_model.chamber.contributions import mean_gravity
 from ringbalance.reduced_model.chamber.values import RingValues, share_across
-from ringbalance.reduced_model.law.flow_law import Conditions, Flow, Regime, law_text, save_record
+from ringbalance.reduced_model.law.flow_law import CALIBRATED, Conditions, Flow, Regime, law_text, save_record
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
 from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty, siphon_margin
 from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
-from ringbalance.reduced_model.tube.regime import TubeEnds, TubePath
+from ringbalance.reduced_model.tube.regime import (
+    TubeEnds,
+    TubePath,
+    crest_margins,
+    driving_pressure,
+    possible_cavity,
+)
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
-from ringbalance.scene.joint import FITTED, direction_sides, independent_half_widths
 from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import FITTED, direction_sides, independent_half_widths
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,7 +135,7 @@ class CalibratedLaw:
         fill_ratio: npt.ArrayLike,
         opposite_fill_ratio: npt.ArrayLike | None = None,
         gas_pressure: npt.ArrayLike = 0.0,
-    ) -> TubeEnds[FloatArray]:
+    ) -> TubeEnds:
         """Pressures at the tube's ends for flow out of the driven chamber; not checked."""
         x = np.asarray(fill_ratio, dtype=np.float64)
         y = self.max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
@@ -143,7 +149,6 @@ class CalibratedLaw:
             downstream_gas=np.zeros_like(gas),
             upstream_hydrostatic=own,
             downstream_hydrostatic=other,
-            port_pressure=self.path.port_pressure,
         )
 
     def holds(self, fill_ratio: float) -> bool:
@@ -243,7 +248,7 @@ class DirectedState:
         return cls(reverse=reverse, conditions=asked, drive=law.drive(asked, reverse=reverse))
 
     @property
-    def ends(self) -> TubeEnds[Any]:
+    def ends(self) -> TubeEnds:
         """Pressures at the tube's ends."""
         return self.drive.ends
 
@@ -252,18 +257,18 @@ class DirectedState:
 
         The state is that in the direction of the driving pressure.
         """
-        crest, head = law.path.crest, law.heads.to_crest(reverse=self.reverse)
-        if crest is None or head is None:
+        path, head = law.path, law.heads.to_crest(reverse=self.reverse)
+        if head is None:
             return None, None
-        driving, (low, high) = np.asarray(self.ends.driving_pressure()), crest.possible_cavity(self.ends)
+        driving, (low, high) = driving_pressure(path, self.ends), possible_cavity(path, self.ends)
         margin, width = siphon_margin(
             path=law.path,
             heads=law.heads,
             hump_head=head,
             inputs=law.inputs,
             drive=self.drive,
-            at_rest=np.asarray(crest.separation_margin(self.ends)),
-            spread=np.asarray(max(crest.released, 1 - crest.released) * (high - low)),
+            at_rest=np.asarray(crest_margins(path, self.ends)[0]),
+            spread=np.asarray(max(path.released, 1 - path.released) * (high - low)),
             velocity=velocity_of(table=law.heads.head, head=driving / law.density, where=driving > 0),
         )
         sides = [
@@ -377,7 +382,7 @@ def _put_together(
     moment: CalibratedMoment,
 ) -> CalibratedLaw:
     return CalibratedLaw(
-        name="calibrated",
+        name=CALIBRATED,
         max_fill_ratio=scene.disc.max_fill_ratio,
         ambient_pressure=scene.gas.ambient_pressure,
         chamber_volume=chamber_volume(disc=scene.disc),

@@ -20,6 +20,8 @@ from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArr
 from ringbalance.scene.origins import summary_text
 from ringbalance.scene.platform.files import write_whole
 
+CALIBRATED: Final = "calibrated"
+"""Name of the law that `calibrate` makes, which is used where no other is asked for."""
 _FILL_SLACK: Final = 1e-9
 """Fill ratios this far outside the range are taken as its end: integrators land there by round-off."""
 

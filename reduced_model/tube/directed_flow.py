@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -16,11 +15,17 @@ from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
 from ringbalance.reduced_model.tube.regime import (
     ColumnFlow,
-    SiphonCrest,
     Truth,
     TubeEnds,
     TubePath,
+    back_pressure,
+    cavity_pressure,
     column_flow,
+    driving_pressure,
+    gas_over_crest,
+    possible_cavity,
+    resting_pressure,
+    stall_pressure,
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
 
@@ -42,7 +47,7 @@ class DriveUncertainty:
 class Drive:
     """What acts on the tube in one direction; arrays of one shape."""
 
-    ends: TubeEnds[Any]
+    ends: TubeEnds
     """Pressures at the tube's ends."""
     upstream_uncertainty: FloatArray | float
     """Expanded uncertainty (95 %) of the upstream hydrostatic pressure, Pa."""
@@ -105,25 +110,20 @@ class DirectedFlow:
         def velocity(table: HermiteTable, pressure: FloatArray, where: Truth) -> FloatArray:
             return velocity_of(table=table, head=pressure / path.density, where=np.asarray(where))
 
-        crest = path.crest if hump_head is not None else None
         separation = partial(velocity, hump_head or heads.head)
         flow = column_flow(
-            ends=drive.ends,
-            crest=crest,
+            path,
+            drive.ends,
             primed=drive.primed,
             siphon=partial(velocity, heads.head),
             separation=separation,
         )
-        width = _siphon_width(heads, inputs, drive, flow.siphon_velocity)
+        width = _siphon_width(path, heads, inputs, drive, flow.siphon_velocity)
         undecided = np.zeros_like(drive.primed)
         margin, open_by = np.zeros_like(flow.velocity), np.zeros_like(flow.velocity)
-        if crest is not None and hump_head is not None:
-            broken = _separated_width(
-                hump_head, heads.hump_uncertainty, path.density, inputs, drive, crest, flow
-            )
-            bounds = _separation_margins(
-                ends=drive.ends, crest=crest, primed=drive.primed, spill=flow.spill_velocity
-            )
+        if hump_head is not None:
+            broken = _separated_width(path, hump_head, heads.hump_uncertainty, inputs, drive, flow)
+            bounds = _separation_margins(path, drive.ends, primed=drive.primed, spill=flow.spill_velocity)
             flows, full = flow.velocity > 0, flow.siphon_velocity
             slowest, fastest = (separation(bound, flows & (bound > 0)) for bound in bounds)
             held = _head_at(hump_head, flow.separation_velocity) * path.density
@@ -154,7 +154,7 @@ class DirectedFlow:
 
 
 def _siphon_width(
-    heads: TubeHeads, inputs: DriveUncertainty, drive: Drive, velocity: FloatArray
+    path: TubePath, heads: TubeHeads, inputs: DriveUncertainty, drive: Drive, velocity: FloatArray
 ) -> FloatArray:
     """Half-width from the tube's loss and all that drives it; the density matters where gas drives."""
     ends = drive.ends
@@ -162,28 +162,27 @@ def _siphon_width(
     parts = (
         np.hypot(drive.upstream_uncertainty, drive.downstream_uncertainty),
         inputs.relative_density * gas,
-        inputs.relative_speed * 2 * (ends.upstream_hydrostatic - ends.back_pressure()),
+        inputs.relative_speed * 2 * (ends.upstream_hydrostatic - back_pressure(path, ends)),
         inputs.relative_gas_pressure * gas,
     )
-    return _width(heads.head, heads.uncertainty, ends.driving_pressure(), parts, velocity)
+    return _width(heads.head, heads.uncertainty, driving_pressure(path, ends), parts, velocity)
 
 
 def _separated_width(
+    path: TubePath,
     head: HermiteTable,
     uncertainty_95: HermiteTable,
-    density: float,
     inputs: DriveUncertainty,
     drive: Drive,
-    crest: SiphonCrest[FloatArray],
     flow: ColumnFlow[FloatArray],
 ) -> FloatArray:
     """Half-width at the pressure taken over the crest; what else that may be is not in it."""
     ends, velocity = drive.ends, flow.separation_velocity
-    margin = _head_at(head, velocity) * density
+    margin = _head_at(head, velocity) * path.density
     parts = (
         np.hypot(drive.upstream_uncertainty, drive.downstream_uncertainty),
-        inputs.relative_density * (ends.upstream_gas - crest.cavity_pressure(ends)),
-        inputs.relative_speed * 2 * (ends.upstream_hydrostatic - crest.column_pressure),
+        inputs.relative_density * (ends.upstream_gas - cavity_pressure(path, ends)),
+        inputs.relative_speed * 2 * (ends.upstream_hydrostatic - path.column_pressure),
         inputs.relative_gas_pressure * ends.upstream_gas,
         np.full_like(margin, np.hypot(inputs.hump_pressure, inputs.vapour_pressure)),
     )
@@ -216,9 +215,9 @@ def siphon_margin(
     """
     ends, flows = drive.ends, velocity > 0
     log_u = np.log(np.where(flows, velocity, 1.0))
-    driving = np.where(flows, ends.driving_pressure(), 0.0)
+    driving = np.where(flows, driving_pressure(path, ends), 0.0)
     fraction = np.where(flows, np.exp(hump_head(log_u) - heads.head(log_u)), 0.0)
-    liquid = ends.upstream_hydrostatic - (path.hump_pressure or 0.0) + fraction * ends.stall_pressure()
+    liquid = ends.upstream_hydrostatic - path.column_pressure + fraction * stall_pressure(path, ends)
     parts = (
         heads.fraction_uncertainty(log_u) * driving,
         (1 - fraction) * drive.upstream_uncertainty,
@@ -251,16 +250,16 @@ def _width(
 
 
 def _separation_margins(
-    *, ends: TubeEnds[FloatArray], crest: SiphonCrest[FloatArray], primed: BoolArray, spill: FloatArray
+    path: TubePath, ends: TubeEnds, *, primed: BoolArray, spill: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest separation margin that the cavity's pressure and the gas over the crest allow, Pa.
 
     Args: `spill`: `ColumnFlow.spill_velocity`; between `clearing_velocities` the gas may be there or gone.
     """
-    low, high = crest.possible_cavity(ends)
-    gas = np.maximum(crest.gas_pressure(ends), high)
-    slowest, fastest = crest.clearing_velocities
-    rest = crest.resting_pressure(ends)
+    low, high = possible_cavity(path, ends)
+    gas = np.maximum(gas_over_crest(path, ends), high)
+    slowest, fastest = path.clearing_velocities
+    rest = resting_pressure(path, ends)
     highest = np.where(~primed & (spill < fastest), gas, high)
     lowest = np.where(~primed & (spill < slowest), gas, low)
     return rest - highest, rest - lowest

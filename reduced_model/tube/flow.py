@@ -24,10 +24,9 @@ from ringbalance.reduced_model.tube.regime import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, plain
 from ringbalance.scene.designs import Designs
-from ringbalance.scene.joint import fitted_causes
-from ringbalance.scene.model_errors import CAVITY_ERROR, CLEARING_ERROR
+from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.models import Scene
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.uncertain import NORMAL_95, fitted_causes
 
 _LEAST, _MOST = np.log(1e-9), np.log(1e6)
 """ln u between which velocities are looked for, u in m/s."""
@@ -143,7 +142,7 @@ class TubeFlow:
         log_velocity = fastest + _NODES[:, None]
         state, u = corrected_state(scene, np.exp(log_velocity)), np.exp(log_velocity)
         to_crest = None
-        if path.crest is not None:
+        if path.crest:
             head = crest_head(scene=scene, tube=scene.tube, state=state, velocity=u)
             to_crest = _Inverse.through(log_velocity, np.log(head))
         between = _Inverse.through(log_velocity, np.log((state.k + 1) / 2) + 2 * log_velocity)
@@ -160,7 +159,7 @@ class TubeFlow:
             to_crest=None if self.to_crest is None else self.to_crest.take(rows),
         )
 
-    def ends(self, own: FloatArray, other: FloatArray, *, driven: bool = True) -> TubeEnds[FloatArray]:
+    def ends(self, own: FloatArray, other: FloatArray, *, driven: bool = True) -> TubeEnds:
         """For levels of the two chambers, Pa. Args: `driven`: with the gas on."""
         gas = self.gas_factor * self.designs.scene.gas.pressure if driven else 0.0
         return TubeEnds(
@@ -168,16 +167,15 @@ class TubeFlow:
             downstream_gas=0 * own,
             upstream_hydrostatic=own,
             downstream_hydrostatic=other,
-            port_pressure=self.path.port_pressure,
         )
 
     def flow(
-        self, ends: TubeEnds[FloatArray], *, primed: bool | BoolArray, exactly: bool = True
+        self, ends: TubeEnds, *, primed: bool | BoolArray, exactly: bool = True
     ) -> ColumnFlow[FloatArray]:
         """Flow out of the driven chambers. Args: `exactly`: to 1e-9 of a head, else to about a hundredth."""
         return column_flow(
-            ends=ends,
-            crest=self.path.crest,
+            self.path,
+            ends,
             primed=primed,
             siphon=partial(self.velocity, to_crest=False, exactly=exactly),
             separation=partial(self.velocity, to_crest=True, exactly=exactly),

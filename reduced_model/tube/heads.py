@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -19,7 +18,7 @@ from ringbalance.physics.tube.loss import (
     with_errors,
 )
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.tables import HermiteTable, flat_table, level_table, refined_table
+from ringbalance.reduced_model.tables import HermiteTable, flat_table, level_table, table_from_samples
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
     crest_span,
@@ -28,19 +27,17 @@ from ringbalance.reduced_model.tube.path import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.describe import scene_fault
-from ringbalance.scene.faults import SceneError, toml_text
-from ringbalance.scene.joint import independent_half_widths
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene, Tube
+from ringbalance.scene.toml import toml_text
+from ringbalance.scene.uncertain import independent_half_widths
 
 TABLE_VELOCITIES: Final = (1e-5, 1e3)
 """m/s; below, the flow creeps and the head is proportional to u; above, to a power of u."""
-_TABLE_ERROR: Final = 1e-9
-"""Aimed at, relative, between the nodes."""
-_UNCERTAINTY_NODES: Final = 513
-_FIRST_NODES: Final = 129
+_NODES: Final = 2049
+"""Of a table; more sharpen nothing but the bend where the flow turns turbulent."""
 _NOMINAL_NODES: Final = 257
-_MOST_NODES: Final = 4097
-"""Of a refined table."""
+_UNCERTAINTY_NODES: Final = 513
 _LEVELLED: Final = 0.05
 """Of ln of a head: a few percent, a fraction of what such errors change it by."""
 _RISE: Final = 1e-9
@@ -70,25 +67,25 @@ class TubeHeads:
     """Largest relative error of the head tables found between their nodes."""
 
     @classmethod
-    def exact(cls, scene: Scene, *, tolerance: float = _TABLE_ERROR, first: int = _FIRST_NODES) -> TubeHeads:
-        """The heads without uncertainties, on some nodes at first and on more up to an error between them.
+    def nominal(cls, scene: Scene, *, nodes: int = _NOMINAL_NODES) -> TubeHeads:
+        """The heads without uncertainties and, unless asked for more, on few nodes.
 
+        These do not depend on the scene: their error, below 1e-4 of a head, is smooth in its values.
         Raises: ValueError: as `TubeHeads.of`. SceneError: the scene's `model_errors` make no loss.
         """
         start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-        heads = log_heads(scene)[:3]
+        places = np.linspace(start, stop, 2 * nodes - 1)
         with np.errstate(invalid="ignore", divide="ignore"):
-            if not all(np.all(np.isfinite(head(np.linspace(start, stop, first)))) for head in heads):
-                raise _inconsistent(scene)
-        if scene.tube.model_errors:
-            heads = [_growing(scene, head) for head in heads]
-        found = [
-            refined_table(function=head, start=start, stop=stop, tolerance=tolerance, first=first)
-            for head in heads
-        ]
-        if not all(np.all(np.diff(table.value) > 0) for table, _ in found):
+            values = [head(places) for head in log_heads(scene)[:3]]
+        if not np.all(np.isfinite(values)):
             raise _inconsistent(scene)
-        between, *to_crest = (table for table, _ in found)
+        if scene.tube.model_errors:
+            values = [_growing(scene, places, value) for value in values]
+        tables = [table_from_samples(start=start, stop=stop, value=value[::2]) for value in values]
+        if not all(np.all(np.diff(table.value) > 0) for table in tables):
+            raise _inconsistent(scene)
+        missed = [table(places) - value for table, value in zip(tables, values, strict=True)]
+        between, *to_crest = tables
         exact = flat_table(start=start, stop=stop)
         return cls(
             head=between,
@@ -97,17 +94,8 @@ class TubeHeads:
             uncertainty=exact,
             hump_uncertainty=exact,
             fraction_uncertainty=exact,
-            interpolation_error=max(error for _, error in found),
+            interpolation_error=float(np.max(np.abs(missed))),
         )
-
-    @classmethod
-    def nominal(cls, scene: Scene) -> TubeHeads:
-        """The heads on few nodes and without uncertainties, in a tenth of the time of `TubeHeads.of`.
-
-        The nodes do not depend on the scene: the error, below 1e-4 of a head, is smooth in its values.
-        Raises: ValueError: as `TubeHeads.of`.
-        """
-        return TubeHeads.exact(scene, tolerance=math.inf, first=_NOMINAL_NODES)
 
     @classmethod
     def of(cls, scene: Scene) -> TubeHeads:
@@ -119,7 +107,7 @@ class TubeHeads:
         place = crest_end_uncertainty(scene.tube, independent_half_widths(scene).get("hump_position", 0.0))
         start, stop = np.log(TABLE_VELOCITIES)
         widths = _widths(scene, np.linspace(start, stop, _UNCERTAINTY_NODES), place=place)
-        return replace(TubeHeads.exact(scene), **widths)  # type: ignore[arg-type]
+        return replace(TubeHeads.nominal(scene, nodes=_NODES), **widths)  # type: ignore[arg-type]
 
     def to_crest(self, *, reverse: bool) -> HermiteTable | None:
         """From the chamber that gives liquid; None without a crest."""
@@ -155,25 +143,17 @@ def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -
     return np.where(flows, np.exp(table.inverse(np.log(np.where(flows, head, 1.0)))), 0.0)
 
 
-def _growing(scene: Scene, head: LogHead) -> LogHead:
+def _growing(scene: Scene, log_velocity: FloatArray, log_head: FloatArray) -> FloatArray:
     """A head with supposed errors of models, level where these make it fall a little.
 
-    Sizes of errors change fast where the flow turns turbulent. Its largest value up to a velocity is taken at
-    the places of the finest table, rising by `_RISE` per unit of ln u, so that one velocity belongs to each.
-    Raises: SceneError: it falls by more than `_LEVELLED`.
+    Sizes of errors change fast where the flow turns turbulent. Its largest value up to a velocity is taken,
+    rising by `_RISE` per unit of ln u, so that one velocity belongs to each.
+    Raises: SceneError: it falls by more than `_LEVELLED`, or is none.
     """
-    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-    places = np.linspace(start, stop, _MOST_NODES)
-    values = head(places)
-    highest = np.maximum.accumulate(values)
-    if not np.all(highest - values <= _LEVELLED):
+    highest = np.maximum.accumulate(log_head)
+    if not np.all(highest - log_head <= _LEVELLED):
         raise _inconsistent(scene)
-
-    def growing(log_velocity: FloatArray) -> FloatArray:
-        below = np.clip(np.searchsorted(places, log_velocity, side="right") - 1, 0, None)
-        return np.asarray(np.maximum(head(log_velocity), highest[below]) + _RISE * log_velocity)
-
-    return growing
+    return highest + _RISE * log_velocity
 
 
 def _widths(

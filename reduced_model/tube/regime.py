@@ -4,18 +4,21 @@ The one place for the conditions under which the tube is blocked, runs as a full
 column.  Everything is written for one direction of flow: upstream is the chamber that gives liquid,
 downstream the one that receives it; `TubeEnds.reversed` changes the direction.  Pressures are gauge, Pa; a
 hydrostatic pressure is that of a chamber's liquid at the outer wall, rho omega^2 (R2^2 - a^2)/2, without its
-gas.  The functions accept plain numbers and arrays of one shape.
+gas.  The functions take numbers and arrays of one shape, and compiled code calls the same ones with numbers:
+there the path is the record of a plant, which has the same names, and the ends are four numbers in the order
+of `TubeEnds`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, Generic, TypeAlias, TypeVar
+from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, plain
+from ringbalance.scene.platform.compiled import both_ways, chosen
 
 CLEARING: Final = (0.6, 1.1)
 """Froude numbers u/sqrt(g_c d), g_c = omega^2 r_m, below which gas stays over the crest, and above which the
@@ -40,149 +43,29 @@ Truth: TypeAlias = bool | BoolArray
 Pressure = TypeVar("Pressure", float, FloatArray)
 
 
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class TubeEnds(Generic[Pressure]):
-    """What acts on the two ends of the tube."""
+class TubeEnds(NamedTuple):
+    """What acts on the two ends of the tube, Pa; numbers or arrays."""
 
-    upstream_gas: Pressure
-    """p_A, Pa."""
-    downstream_gas: Pressure
-    """p_C, Pa."""
-    upstream_hydrostatic: Pressure
-    """P_A, Pa."""
-    downstream_hydrostatic: Pressure
-    """P_C, Pa."""
-    port_pressure: Pressure | float
-    """D_p = rho omega^2 (R2^2 - r_p^2)/2, of a column from the port to the outer wall, Pa."""
+    upstream_gas: Any
+    """p_A."""
+    downstream_gas: Any
+    """p_C."""
+    upstream_hydrostatic: Any
+    """P_A."""
+    downstream_hydrostatic: Any
+    """P_C."""
 
-    def reversed(self) -> TubeEnds[Pressure]:
+    def reversed(self) -> TubeEnds:
         """The same ends for flow in the other direction."""
-        return TubeEnds(
-            upstream_gas=self.downstream_gas,
-            downstream_gas=self.upstream_gas,
-            upstream_hydrostatic=self.downstream_hydrostatic,
-            downstream_hydrostatic=self.upstream_hydrostatic,
-            port_pressure=self.port_pressure,
-        )
+        return TubeEnds(self[1], self[0], self[3], self[2])
 
-    def upstream_covered(self) -> Truth:
-        """Whether the upstream liquid covers the port; otherwise only gas can leave."""
-        return self.upstream_hydrostatic >= self.port_pressure
-
-    def downstream_open(self) -> Truth:
-        """Whether the downstream liquid leaves the port open to the gas."""
-        return self.downstream_hydrostatic < self.port_pressure
-
-    def upstream_pressure(self) -> Pressure:
+    def upstream_pressure(self) -> Any:
         """At the upstream outer wall, gas and liquid, p_A + P_A, Pa."""
         return self.upstream_gas + self.upstream_hydrostatic
 
-    def downstream_pressure(self) -> Pressure:
+    def downstream_pressure(self) -> Any:
         """At the downstream outer wall, gas and liquid, p_C + P_C, Pa."""
         return self.downstream_gas + self.downstream_hydrostatic
-
-    def back_pressure(self) -> Pressure:
-        """Hydrostatic pressure that the tube discharges against, max(P_C, D_p), Pa."""
-        return _larger(self.downstream_hydrostatic, self.port_pressure)
-
-    def driving_pressure(self) -> Pressure:
-        """Pressure that drives a full siphon, p_A - p_C + P_A - max(P_C, D_p), Pa.
-
-        Source: Eqs. 13 to 16 of the liquid-ring paper.
-        """
-        return self.upstream_gas - self.downstream_gas + self.upstream_hydrostatic - self.back_pressure()
-
-    def stall_pressure(self) -> Pressure:
-        """Difference of the gas pressures at which a full siphon stalls, max(P_C, D_p) - P_A, Pa."""
-        return self.back_pressure() - self.upstream_hydrostatic
-
-
-@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
-class SiphonCrest(Generic[Pressure]):
-    """The innermost point of the tube's path, where the column must be primed and may separate."""
-
-    column_pressure: Pressure | float
-    """D_m = rho omega^2 (R2^2 - r_m^2)/2, of a column from the crest to the outer wall, Pa."""
-    vapour_pressure: Pressure | float
-    """Pa, gauge."""
-    trapped: bool
-    """Whether the gas over the crest must be displaced through the downstream port."""
-    released: float = 0.0
-    """Where between the vapour pressure, 0, and the downstream gas, 1, the cavity's pressure is taken;
-    `RELEASED` with dissolved gas."""
-    froude_velocity: float = 0.0
-    """sqrt(g_c d), m/s; zero: gas over the crest leaves as soon as liquid flows."""
-    cavity_fitted: bool = False
-    """Whether what the cavity's pressure may be is among the inputs that were fitted together."""
-    clearing_fitted: bool = False
-    """Whether the Froude number that clears the crest is."""
-
-    @property
-    def clearing_velocities(self) -> tuple[float, float]:
-        """Between which the gas over the crest may be there or gone, m/s; fitted, both in their middle."""
-        low, high = (sum(CLEARING) / 2,) * 2 if self.clearing_fitted else CLEARING
-        return low * self.froude_velocity, high * self.froude_velocity
-
-    def possible_cavity(self, ends: TubeEnds[Pressure]) -> tuple[Pressure, Pressure]:
-        """Between which a cavity's pressure lies, Pa; fitted, twice what is taken."""
-        if self.cavity_fitted:
-            return self.cavity_pressure(ends), self.cavity_pressure(ends)
-        return self.cavity_bounds(ends)
-
-    def cavity_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
-        """Pressure of a cavity in a primed tube, Pa; over an open downstream port that of the gas there."""
-        low, high = self.cavity_bounds(ends)
-        return low + self.released * (high - low)
-
-    def cavity_bounds(self, ends: TubeEnds[Pressure]) -> tuple[Pressure, Pressure]:
-        """Lowest and highest pressure of a cavity in a primed tube, Pa.
-
-        Vapour alone, and, with dissolved gas, the downstream chamber's gas: more would leave into it.
-        """
-        gas = ends.downstream_gas
-        low = _choose(ends.downstream_open(), gas, self.vapour_pressure)
-        return low, low if np.all(np.asarray(self.released) == 0) else _larger(gas, low)
-
-    def resting_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
-        """Crest pressure of a column at rest, p_A + P_A - D_m, Pa."""
-        return ends.upstream_gas + ends.upstream_hydrostatic - self.column_pressure
-
-    def gas_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
-        """Pressure of gas not carried out, Pa: the downstream chamber's; trapped, what displaces it."""
-        if not self.trapped:
-            return ends.downstream_gas
-        return ends.downstream_gas + _larger(ends.downstream_hydrostatic - ends.port_pressure, 0.0)
-
-    def separation_margin(self, ends: TubeEnds[Pressure]) -> Pressure:
-        """Crest pressure of a column at rest less the cavity pressure, p_A - p_c + P_A - D_m, Pa.
-
-        Returns: What drives a separated column of a primed tube; where it is not positive, no column holds.
-        """
-        return self.resting_pressure(ends) - self.cavity_pressure(ends)
-
-    def cleared(self, velocity: Pressure) -> Pressure:
-        """Fraction of the way from gas to cavity pressure over the crest, by the spilling liquid's velocity.
-
-        Zero below and one above `CLEARING`, smooth between: which of both holds there is not known.
-        """
-        if np.all(np.asarray(self.froude_velocity) == 0):
-            return velocity * 0 + 1
-        low, high = CLEARING
-        part = (velocity / self.froude_velocity - low) / (high - low)
-        part = _larger(-_larger(-part, -1.0), 0.0)
-        return part * part * (3 - 2 * part)
-
-    def priming_pressure(self, ends: TubeEnds[Pressure]) -> Pressure:
-        """Difference of the gas pressures that lifts liquid over the crest of an unprimed tube, Pa.
-
-        Returns: D_m - P_A, and P_C - D_p more where trapped gas is displaced through a covered port.
-        """
-        lift = self.column_pressure - ends.upstream_hydrostatic
-        return lift + (self.gas_pressure(ends) - ends.downstream_gas)
-
-    def primes(self, ends: TubeEnds[Pressure]) -> Truth:
-        """Whether the gas lifts liquid over the crest of an unprimed tube."""
-        return self.resting_pressure(ends) > self.gas_pressure(ends)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,37 +75,39 @@ class TubePath:
     density: float
     """rho, kg/m^3."""
     port_pressure: float
-    """rho omega^2 (R2^2 - r_p^2)/2, Pa."""
+    """D_p = rho omega^2 (R2^2 - r_p^2)/2, Pa."""
     hump_pressure: float | None
-    """rho omega^2 (R2^2 - r_m^2)/2, Pa; None: no crest, the tube stays at the port's radius, under the levels
-    of both chambers, and is full whether the gas is on or off."""
+    """D_m = rho omega^2 (R2^2 - r_m^2)/2, Pa; None: no crest, the tube stays at the port's radius, under the
+    levels of both chambers, and is full whether the gas is on or off."""
     trapped: bool
     """Whether the gas over the siphon crest must be displaced through the downstream port."""
     vapour_pressure: float
     """Gauge, Pa."""
     released: float
-    """As in `SiphonCrest`."""
+    """Where between the vapour pressure, 0, and the downstream gas, 1, the cavity's pressure is taken;
+    `RELEASED` with dissolved gas."""
     froude_velocity: float
-    """sqrt(omega^2 r_m d), m/s; zero without a crest."""
+    """sqrt(g_c d) = sqrt(omega^2 r_m d), m/s; zero: gas over the crest leaves as soon as liquid flows."""
     cavity_fitted: bool = False
-    """As in `SiphonCrest`."""
+    """Whether what the cavity's pressure may be is among the inputs that were fitted together."""
     clearing_fitted: bool = False
-    """As in `SiphonCrest`."""
+    """Whether the Froude number that clears the crest is."""
 
     @property
-    def crest(self) -> SiphonCrest[Any] | None:
-        """The siphon crest, None without one."""
-        if self.hump_pressure is None:
-            return None
-        return SiphonCrest(
-            column_pressure=self.hump_pressure,
-            vapour_pressure=self.vapour_pressure,
-            trapped=self.trapped,
-            released=self.released,
-            froude_velocity=self.froude_velocity,
-            cavity_fitted=self.cavity_fitted,
-            clearing_fitted=self.clearing_fitted,
-        )
+    def crest(self) -> bool:
+        """Whether there is a siphon crest."""
+        return self.hump_pressure is not None
+
+    @property
+    def column_pressure(self) -> Any:
+        """D_m, Pa; zero without a crest."""
+        return 0.0 if self.hump_pressure is None else self.hump_pressure
+
+    @property
+    def clearing_velocities(self) -> tuple[float, float]:
+        """Between which the gas over the crest may be there or gone, m/s; fitted, both in their middle."""
+        low, high = (sum(CLEARING) / 2,) * 2 if self.clearing_fitted else CLEARING
+        return low * self.froude_velocity, high * self.froude_velocity
 
     @property
     def return_pressure(self) -> float:
@@ -231,25 +116,133 @@ class TubePath:
         D_m + p_c, with the pressure p_c of a cavity: below, a full column over the crest parts.  Without a
         crest nothing parts, and the chambers level out.
         """
-        if self.crest is None:
+        if not self.crest:
             return 0.0
-        still = TubeEnds(
-            upstream_gas=0.0,
-            downstream_gas=0.0,
-            upstream_hydrostatic=0.0,
-            downstream_hydrostatic=self.port_pressure,
-            port_pressure=self.port_pressure,
-        )
-        highest: float = plain(-self.crest.separation_margin(still))
+        highest: float = plain(-crest_margins(self, TubeEnds(0.0, 0.0, 0.0, self.port_pressure))[0])
         return highest
 
     def holds(self, level: float) -> bool:
         """Whether a correction with a chamber of that hydrostatic pressure, Pa, lasts with the gas off."""
-        return self.crest is not None and level <= self.return_pressure
+        return self.crest and level <= self.return_pressure
 
     def holding_pressure(self, level: float) -> float:
         """D_m of a crest from which on it lasts whatever the pressure of a cavity over the crest, Pa."""
         return level - min(self.vapour_pressure, 0.0)
+
+
+@both_ways
+def back_pressure(path: Any, ends: Any) -> Any:
+    """Hydrostatic pressure that the tube discharges against, max(P_C, D_p), Pa."""
+    return np.maximum(ends[3], path.port_pressure)
+
+
+@both_ways
+def driving_pressure(path: Any, ends: Any) -> Any:
+    """Pressure that drives a full siphon, p_A - p_C + P_A - max(P_C, D_p), Pa.
+
+    Source: Eqs. 13 to 16 of the liquid-ring paper.
+    """
+    return ends[0] - ends[1] + ends[2] - back_pressure(path, ends)
+
+
+@both_ways
+def stall_pressure(path: Any, ends: Any) -> Any:
+    """Difference of the gas pressures at which a full siphon stalls, max(P_C, D_p) - P_A, Pa."""
+    return back_pressure(path, ends) - ends[2]
+
+
+@both_ways
+def covered(path: Any, ends: Any) -> Any:
+    """Whether the upstream liquid covers the port; otherwise only gas can leave."""
+    return ends[2] >= path.port_pressure
+
+
+@both_ways
+def discharges_openly(path: Any, ends: Any) -> Any:
+    """Whether the downstream liquid leaves the port open to the gas."""
+    return ends[3] < path.port_pressure
+
+
+@both_ways
+def cavity_bounds(path: Any, ends: Any) -> Any:
+    """Lowest and highest pressure of a cavity in a primed tube, Pa.
+
+    Vapour alone, and, with dissolved gas, the downstream chamber's gas: more would leave into it.
+    """
+    low = chosen(discharges_openly(path, ends), ends[1], path.vapour_pressure)
+    return low, chosen(path.released == 0.0, low, np.maximum(ends[1], low))
+
+
+@both_ways
+def cavity_pressure(path: Any, ends: Any) -> Any:
+    """Pressure of a cavity in a primed tube, Pa; over an open downstream port that of the gas there."""
+    low, high = cavity_bounds(path, ends)
+    return low + path.released * (high - low)
+
+
+@both_ways
+def resting_pressure(path: Any, ends: Any) -> Any:
+    """Crest pressure of a column at rest, p_A + P_A - D_m, Pa."""
+    return ends[0] + ends[2] - path.column_pressure
+
+
+@both_ways
+def gas_over_crest(path: Any, ends: Any) -> Any:
+    """Pressure of gas not carried out, Pa: the downstream chamber's; trapped, what displaces it."""
+    return ends[1] + chosen(path.trapped, np.maximum(ends[3] - path.port_pressure, 0.0), 0.0)
+
+
+@both_ways
+def crest_margins(path: Any, ends: Any) -> Any:
+    """Crest pressure at rest less that of a primed tube's cavity, and less that of gas there, Pa.
+
+    Each drives a separated column of its tube; where it is not positive, no column holds.
+    """
+    resting, cavity = resting_pressure(path, ends), cavity_pressure(path, ends)
+    return resting - cavity, resting - np.maximum(gas_over_crest(path, ends), cavity)
+
+
+@both_ways
+def cleared(path: Any, velocity: Any) -> Any:
+    """Fraction of the way from gas to cavity pressure over the crest, by the spilling liquid's velocity.
+
+    Zero below and one above `CLEARING`, smooth between: which of both holds there is not known.
+    """
+    froude = velocity / chosen(path.froude_velocity == 0.0, 1.0, path.froude_velocity)
+    part = np.minimum(np.maximum((froude - CLEARING[0]) / (CLEARING[1] - CLEARING[0]), 0.0), 1.0)
+    return chosen(path.froude_velocity == 0.0, 1.0, part * part * (3.0 - 2.0 * part))
+
+
+@both_ways
+def can_flow(path: Any, ends: Any, primed: Any) -> Any:
+    """Whether liquid flows: port covered, driving pressure positive, crest passed."""
+    flows = covered(path, ends) & (driving_pressure(path, ends) > 0.0)
+    if not path.crest:
+        return flows
+    over_cavity, over_gas = crest_margins(path, ends)
+    return flows & (chosen(primed, over_cavity, over_gas) > 0.0)
+
+
+@both_ways
+def holds_at_rest(path: Any, ends: Any, primed: Any) -> Any:
+    """Whether a column in which nothing flows is still there: below a level, or in exact balance."""
+    held = primed & covered(path, ends)
+    if not path.crest:
+        return held
+    return held & (driving_pressure(path, ends) == 0.0) & (crest_margins(path, ends)[0] > 0.0)
+
+
+def possible_cavity(path: TubePath, ends: TubeEnds) -> Any:
+    """Between which a cavity's pressure lies, Pa; fitted, twice what is taken."""
+    return (cavity_pressure(path, ends),) * 2 if path.cavity_fitted else cavity_bounds(path, ends)
+
+
+def priming_pressure(path: TubePath, ends: TubeEnds) -> Any:
+    """Difference of the gas pressures that lifts liquid over the crest of an unprimed tube, Pa.
+
+    Returns: D_m - P_A, and P_C - D_p more where trapped gas is displaced through a covered port.
+    """
+    return path.column_pressure - ends.upstream_hydrostatic + gas_over_crest(path, ends) - ends.downstream_gas
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -270,34 +263,14 @@ class ColumnFlow(Generic[Pressure]):
     """Whether the tube holds a continuous column afterwards."""
 
 
-def can_flow(*, ends: TubeEnds[Pressure], crest: SiphonCrest[Pressure] | None, primed: Truth) -> Truth:
-    """Whether liquid flows: port covered, driving pressure positive, crest passed."""
-    return _flows(ends, ends.driving_pressure(), crest, primed)[0]
-
-
-def _flows(
-    ends: TubeEnds[Pressure], driving: Pressure, crest: SiphonCrest[Pressure] | None, primed: Truth
-) -> tuple[Truth, Pressure]:
-    """Whether liquid flows, and the crest pressure at rest less that of what lies over it beforehand.
-
-    Without a crest the driving pressure stands in for the latter.
-    """
-    flows = ends.upstream_covered() & (driving > 0)
-    if crest is None:
-        return flows, driving
-    cavity = crest.cavity_pressure(ends)
-    margin = crest.resting_pressure(ends) - _choose(primed, cavity, _larger(crest.gas_pressure(ends), cavity))
-    return flows & (margin > 0), margin
-
-
 def column_flow(
+    path: TubePath,
+    ends: TubeEnds,
     *,
-    ends: TubeEnds[Pressure],
-    crest: SiphonCrest[Pressure] | None,
     primed: Truth,
-    siphon: Callable[[Pressure, Truth], Pressure],
-    separation: Callable[[Pressure, Truth], Pressure],
-) -> ColumnFlow[Pressure]:
+    siphon: Callable[[Any, Any], Any],
+    separation: Callable[[Any, Any], Any],
+) -> ColumnFlow[Any]:
     """Regime and velocity of the quasi-steady column, the smaller of siphon and separation velocity.
 
     siphon: (k + 1) rho u^2/2 = driving pressure; separated: (alpha + k_up) rho u^2/2 = separation margin.
@@ -306,59 +279,38 @@ def column_flow(
     Where the siphon's velocity is the smaller one its crest pressure is above the cavity pressure, so the
     smaller of the two is continuous across the change.
     Args:
-        ends: pressures at the tube's ends.
-        crest: None without one.
         primed: whether the tube holds a continuous column beforehand.
         siphon: velocity of the full siphon under a pressure, zero where the second argument is false.
-        separation: velocity of the separated column under a pressure, likewise; not called without a crest.
+        separation: of the separated column, likewise; not called without a crest.
     Source: Eqs. 13 to 18 of the liquid-ring paper, extended to the siphon crest.
     """
-    driving = ends.driving_pressure()
-    flows, margin = _flows(ends, driving, crest, primed)
+    driving, flows = driving_pressure(path, ends), can_flow(path, ends, primed)
     full = siphon(driving, flows)
-    if crest is None:
+    if not path.crest:
         return ColumnFlow(
             velocity=full,
             siphon_velocity=full,
             separation_velocity=full,
             spill_velocity=full,
             separated=full < full,
-            primed=flows | (primed & ends.upstream_covered()),
+            primed=flows | holds_at_rest(path, ends, primed),
         )
+    over_cavity, over_gas = crest_margins(path, ends)
+    margin = chosen(primed, over_cavity, over_gas)
     spill = separation(margin, flows)
-    cleared = crest.cleared(spill)
-    broken = spill
+    carried, broken = cleared(path, spill), spill
     if primed is not True:
-        gas = _larger(crest.separation_margin(ends) - margin, 0.0)
-        broken = _choose(primed, spill, separation(margin + cleared * gas, flows))
+        more = carried * np.maximum(over_cavity - margin, 0.0)
+        broken = chosen(primed, spill, separation(margin + more, flows))
     separated = broken < full
-    # At exact balance nothing flows, yet a column that holds is still there.
-    rests = primed & (driving == 0) & (margin > 0) & ends.upstream_covered()
     # Gas stays over the crest of a tube that was unprimed until what flows through it carries the gas out.
-    swept = (cleared > 0.5) & (crest.cleared(full) > 0.5)
-    keeps = (primed | swept) & ((broken >= full) | (ends.downstream_hydrostatic >= ends.port_pressure))
+    swept = (carried > 0.5) & (cleared(path, full) > 0.5)
+    keeps = (primed | swept) & ((broken >= full) | (ends.downstream_hydrostatic >= path.port_pressure))
     return ColumnFlow(
-        velocity=_choose(separated, broken, full),
+        velocity=chosen(separated, broken, full),
         siphon_velocity=full,
         separation_velocity=broken,
         spill_velocity=spill,
         separated=separated,
-        primed=(flows & keeps) | rests,
+        primed=(flows & keeps) | holds_at_rest(path, ends, primed),
     )
-
-
-def _larger(first: Pressure, second: Pressure | float) -> Pressure:
-    """The larger of two, without the cost of an array for plain numbers."""
-    if isinstance(first, float) and not isinstance(second, np.ndarray):
-        return max(first, second)
-    return np.asarray(np.maximum(first, second), dtype=np.float64)
-
-
-def _choose(condition: Truth, first: Pressure | float, second: Pressure | float) -> Pressure:
-    either: Any
-    if isinstance(condition, np.ndarray):
-        either = np.where(condition, first, second)
-    else:
-        either = first if condition else second
-    chosen: Pressure = either
-    return chosen

@@ -3,11 +3,25 @@
 from __future__ import annotations
 
 import math
+from itertools import count
 from typing import Any, Final
 
+import numpy as np
+
 from ringbalance.reports.equations import equation_svg
-from ringbalance.reports.figures.cases import order_plot, series_plots
-from ringbalance.reports.prose import input_name, traced
+from ringbalance.reports.figure import (
+    AS_PAPER,
+    FOUND,
+    INK,
+    THIRD,
+    Drawing,
+    Paint,
+    curve,
+    draw,
+    line,
+    logarithmic,
+)
+from ringbalance.reports.prose import input_name, traced, typeset
 from ringbalance.reports.section import Record
 from ringbalance.results.numbers import (
     MISSING,
@@ -16,7 +30,6 @@ from ringbalance.results.numbers import (
     display_unit,
     given,
     number,
-    percent,
     short,
     shown,
     with_unit,
@@ -25,12 +38,13 @@ from ringbalance.results.result import Table
 
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
-_FACTS: Final = (
-    ("explanation", "Finding"),
-    ("judgement", "Why this verdict"),
-    ("protects", "Protects"),
-    ("assumes", "Assumes"),
-    ("does_not_cover", "Does not cover"),
+_TOLD: Final = (
+    *("explanation", "judgement", "protects", "assumes", "does_not_cover", "rests_on", "reference"),
+    *("declared_mutations", "doubts", "level", "status", "judged_on", "scene_sha256"),
+)
+"""Keys of a case's record that its box on the page tells."""
+_NO_SEQUENCE: Final = dict.fromkeys(
+    ("unit", "unknowns", "value", "error", "formal_order", "observed_order", "gci", "note")
 )
 _LOPSIDED: Final = 1.2
 """Ratio of the two sides of an interval from which on both ends are shown."""
@@ -39,6 +53,16 @@ _FINE: Final = 0.01
 _NAMED_INPUTS: Final = 2
 _DIGITS: Final = 4
 """Most that a number in brief has: the inputs leave no more standing, however fine a comparison is."""
+_LONGEST_LABEL: Final = 28
+_CURVES: Final[dict[str, Record]] = {
+    "paper": AS_PAPER,
+    "found": {"color": FOUND},
+    "reference": {"color": THIRD, "linestyle": (0, (1, 1.5))},
+    "points": {"color": INK, "linestyle": "", "marker": "o", "markersize": 2.5},
+}
+"""Looks of a curve by its style."""
+_SPARE: Final = (*(line(index) for index in (2, 3, 5)), {"color": INK})
+"""Looks of further curves of a style that is taken."""
 _RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 
 
@@ -62,36 +86,6 @@ def table_file(case: Record, table: Record) -> str:
 def anchor(case: Record) -> str:
     """Place of a case on the page."""
     return f"case-{str(case['id']).replace('_', '-')}"
-
-
-def _sentence(value: Any) -> str:
-    return "; ".join(str(item) for item in value) if isinstance(value, list) else str(value)
-
-
-def _facts(case: Record) -> list[tuple[str, str]]:
-    pairs = [(label, _sentence(case[key])) for key, label in _FACTS if case.get(key)]
-    reference = case.get("reference") or {}
-    told = [str(reference[key]) for key in ("kind", "source", "uncertainty") if reference.get(key)]
-    rests = [("Rests on", "; ".join(map(_assumption, found)))] if (found := case.get("rests_on")) else []
-    rows = [*pairs, *rests, ("Reference", "; ".join(told)), ("Must be noticed", "; ".join(_mutations(case)))]
-    doubts = ("Doubts", " ".join(case.get("doubts") or []))
-    return [(label, text) for label, text in (*rows, doubts, ("Run", _how_run(case))) if text]
-
-
-def _assumption(one: Record) -> str:
-    """An input that nobody gave, with its range in SI, and what either rests on."""
-    low, value, high = (short(one[key], digits=3) for key in ("low", "value", "high"))
-    accounted = f"; {one['covered']}" if one["covered"] else ""
-    return f"{one['path']}, {one['origin']}: {value}, from {low} to {high} in SI ({one['why']}{accounted})"
-
-
-def _how_run(case: Record) -> str:
-    parts = [str(case[key]) for key in ("level", "status") if case.get(key)]
-    judged = {"paper": "judged on the paper’s disc", "scene": "judged on this scene"}.get(
-        case.get("judged_on", "")
-    )
-    digest = case.get("scene_sha256")
-    return "; ".join([*parts, *([judged] if judged else []), *([f"scene {digest[:12]}"] if digest else [])])
 
 
 def _criterion(quantity: Record) -> str:
@@ -150,36 +144,10 @@ def _value(quantity: Record, half_width: float | None) -> str:
     return short(value, digits=6 if float(value).is_integer() else 3)
 
 
-def _sequence_table(sequence: Record) -> Table:
-    """One convergence table, with those columns that it has."""
-    levels, unit = len(sequence["h"]), sequence.get("unit") or "1"
-    orders = list(sequence.get("observed_order") or [])
-    columns = {
-        "Relative mesh size": [short(h, digits=3) for h in sequence["h"]],
-        "Unknowns": [short(n) for n in sequence.get("unknowns") or []],
-        "Value": [shown(value, unit, digits=8) for value in sequence.get("value") or []],
-        "Error": [shown(error, unit, digits=3) for error in sequence.get("error") or []],
-        "Observed order": [number(p, digits=3) for p in [None] * (levels - len(orders)) + orders],
-    }
-    present = {head: column for head, column in columns.items() if column}
-    formal = sequence.get("formal_order")
-    order = [f"formal order {short(formal, digits=3)}"] if formal else []
-    caption = "; ".join([_sequence_label(sequence), *order, *_notes(sequence)])
-    return Table(
-        caption=caption, heads=tuple(present), rows=list(zip(*present.values(), strict=True)), style=""
-    )
-
-
 def _sequence_label(sequence: Record) -> str:
     """What a convergence sequence is of."""
     geometry = f", {sequence['geometry']} geometry" if sequence.get("geometry") else ""
     return f"{sequence['quantity']}{geometry}"
-
-
-def _notes(sequence: Record) -> list[str]:
-    gci = sequence.get("gci")
-    told = [] if gci is None else [f"Grid convergence index of the finest value {percent(gci)}"]
-    return [*told, sequence["note"]] if sequence.get("note") else told
 
 
 def _equations(case: Record) -> list[Record]:
@@ -205,18 +173,6 @@ def _column(name: str, values: list[Any], unit: str) -> tuple[str, list[str]]:
         for v in values
     ]
     return f"{name} in {display.symbol}" if display.symbol else name, texts
-
-
-def _mutations(case: Record) -> list[str]:
-    run = {item["id"]: item for item in case.get("mutations") or []}
-    told = []
-    for item in case.get("declared_mutations") or []:
-        found = run.get(item["id"])
-        end = f"must come out as {item['expect']}"
-        if found:
-            end = f"came out as {found['verdict']}, {'as it must' if found['failed'] else 'and was missed'}"
-        told.append(f"{item['what']}: {end}")
-    return told
 
 
 def _deciding_quantity(case: Record) -> Record | None:
@@ -306,9 +262,75 @@ def _rests_on(case: Record) -> list[str]:
     return every if rest <= 1 else [*every[:_NAMED_INPUTS], f"{rest} more"]
 
 
+def _order_plot(case: Record, sequences: list[Record]) -> Drawing | None:
+    """Error against mesh size, a line per sequence, dotted the formal order as a slope to compare.
+
+    Returns: The figure; None when no sequence has errors.
+    """
+    if not sequences:
+        return None
+    paints: list[Paint] = []
+    for index, sequence in enumerate(sequences):
+        size, error, look = np.asarray(sequence["h"]), np.asarray(sequence["error"]), line(index, size=4)
+        paints.append(curve(size, error, sequence["label"], **look))
+        if order := sequence["formal_order"]:
+            slope = 0.6 * error[-1] * (size / size[-1]) ** order
+            paints.append(curve(size, slope, color=look["color"], linewidth=0.8, linestyle=":"))
+    return draw(
+        f"order-{case['id'].replace('_', '-')}",
+        *paints,
+        logarithmic("x", ticks=sorted({float(f"{size:.3g}") for size in sequences[0]["h"]})),
+        logarithmic("y"),
+        x=("relative mesh or step size", "1"),
+        y=("error", "1"),
+        columns=1,
+        height=2.7 + 0.175 * len(sequences),
+    )
+
+
+def series_plots(case: Record) -> list[Drawing]:
+    """The figures that a case hands over as plain series."""
+    stem = f"case-{case['id'].replace('_', '-')}"
+    return [_series_plot(f"{stem}-{index}", series) for index, series in enumerate(case.get("series") or [])]
+
+
+def _series_plot(name: str, series: Record) -> Drawing:
+    x, curves, title = series["x"], series["y"], typeset(series["name"])
+    values = _with_gaps(x["values"])
+    spare, used, paints = count(), list[Record](), list[Paint]()
+    for each in curves:
+        look = _CURVES[each.get("style") or "found"]
+        look = _SPARE[next(spare) % len(_SPARE)] if look in used else look
+        used.append(look)
+        width = each.get("uncertainty")
+        band = None if not width else _with_gaps(width)
+        paints.append(curve(values, _with_gaps(each["values"]), typeset(each["name"]), band=band, **look))
+    if series.get("log"):
+        # Decades alone would be too few labels within one or two of them.
+        paints += [lambda axes: logarithmic("x", within=_few(axes.get_xlim()))(axes)]
+        paints += [lambda axes: logarithmic("y", within=_few(axes.get_ylim()))(axes)]
+    return draw(
+        name,
+        *paints,
+        x=(typeset(x["name"]), x["unit"].replace("*", " ")),
+        y=(title[:1].upper() + title[1:] if len(title) < _LONGEST_LABEL else "", curves[0]["unit"]),
+    )
+
+
+def _with_gaps(values: list[float | None]) -> Any:
+    """None leaves a gap in a line."""
+    return np.array([np.nan if value is None else value for value in values])
+
+
+def _few(limits: tuple[float, float]) -> tuple[float, float] | None:
+    return limits if 0 < limits[0] < limits[1] < 50 * limits[0] else None
+
+
 def case_view(case: Record) -> Record:
     """Everything that the page shows of one case."""
-    sequences = [{**item, "label": _sequence_label(item)} for item in case.get("convergence") or []]
+    studies, tables = case.get("convergence") or [], case.get("tables") or []
+    sequences = [{**_NO_SEQUENCE, **each, "label": _sequence_label(each)} for each in studies]
+    falling = [s for s in sequences if s["error"] and all(e is not None and e > 0 for e in s["error"])]
     return {
         "id": case["id"],
         "anchor": anchor(case),
@@ -321,21 +343,21 @@ def case_view(case: Record) -> Record:
         "consequence": case.get("consequence") or "",
         "cause": case.get("cause") or "",
         "rests_on": _rests_on(case),
-        "facts": _facts(case),
+        "told": {key: case.get(key) for key in _TOLD},
+        "mutations": {each["id"]: each for each in case.get("mutations") or []},
         "equations": _equations(case),
         "rows": [
             _quantity_row(quantity, f"verification.{case['id']}.quantities.{place}")
             for place, quantity in enumerate(case.get("quantities") or [])
         ],
-        "order_plot": order_plot({**case, "convergence": sequences}),
+        "order_plot": _order_plot(case, falling),
+        # An error that changes its sign from mesh to mesh, or is rounding, falls at no order.
+        "orders": [max(s["observed_order"][-1], 0.0) for s in falling if s["observed_order"]],
         "drawings": series_plots(case),
-        "tables": [
-            *(_sequence_table(sequence) for sequence in case.get("convergence") or []),
-            *(_data_table(table) for table in case.get("tables") or [] if not is_long(table)),
-        ],
+        "series": [series["name"] for series in case.get("series") or []],
+        "sequences": sequences,
+        "tables": [_data_table(table) for table in tables if not is_long(table)],
         "files": [
-            (table["name"], f"{TABLES}/{table_file(case, table)}")
-            for table in case.get("tables") or []
-            if is_long(table)
+            (table["name"], f"{TABLES}/{table_file(case, table)}") for table in tables if is_long(table)
         ],
     }

@@ -7,20 +7,50 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from ringbalance.physics.tube.loss import VELOCITIES
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reports.figures.drag_coefficient import drag_figures
+from ringbalance.reports.figure import (
+    AS_PAPER,
+    FOUND,
+    INK,
+    MUTED,
+    PAPER,
+    SURFACE,
+    THIRD,
+    WIDE,
+    Drawing,
+    curve,
+    draw,
+    figure_of,
+    legend_above,
+    level,
+    logarithmic,
+)
+from ringbalance.reports.pages.drag_map import ApparentDrag, DragMap, DragPoint, LiquidVerdicts
+from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.studies.drag_map import ApparentDrag, DragMap, LiquidVerdicts
-from ringbalance.reports.studies.drag_point import DragPoint
+from ringbalance.results.numbers import number, short
+from ringbalance.scene.arrays import FloatArray
 
 _SAME_POINT: Final = 1e-6
 """Relative difference of two velocities of one operating point: rounding."""
 _DIGITS: Final = 5
 _READINGS: Final = 60
+_FIFTY: Final = paper.PAPER_DRAG_COEFFICIENT
+_LEVELS: Final = (3, 5, 10, 20, 100, 200, 500, 1000, 10_000, 100_000, 1_000_000)
+"""Of k, beside the paper's, on the map."""
+_MM2: Final = 1e6
+"""mm^2/s in m^2/s: no unit of a scale, since its powers of ten are those of no prefix."""
+_HEIGHT: Final = 4.9
+_LIST: Final = 2.35
+"""Inches to the right of the map for the names of the liquids."""
+_APART: Final = 0.155
+"""Inches between two names."""
 
 
 def _collect(work: Work) -> Record:
@@ -35,7 +65,7 @@ def _collect(work: Work) -> Record:
             name: _contour(found, apparent=apparent) for name, apparent in (("k", False), ("apparent", True))
         },
         "liquids": [
-            record | {"verdict": verdict_on_fifty(record)}
+            record | {"verdict": _verdict_on_fifty(record)}
             for record in _with_budget(_liquid_records(verdicts), work.calibration)
         ],
         "apparent": _apparent(work.calibration),
@@ -157,7 +187,7 @@ def _apparent(calibration: Calibration) -> Record | None:
     }
 
 
-def verdict_on_fifty(record: Record) -> str:
+def _verdict_on_fifty(record: Record) -> str:
     """What a liquid says of k = 50, judged by the velocity that Eq. 19 gives with it."""
     if not record["runs"]:
         return "nothing flows"
@@ -168,7 +198,173 @@ def verdict_on_fifty(record: Record) -> str:
 
 
 def _view(found: Record, _evidence: Record) -> Record:
-    return {**drag_figures(found)}
+    return {
+        "map": _map_figure(found) if found["map"]["runs"] else None,
+        "apparent": _apparent_figure(found["apparent"]) if found["apparent"] else None,
+    }
+
+
+def _map_figure(found: Record) -> Drawing:
+    """k over bore and viscosity: lines of equal k, k = 50 with its band, the separated column, liquids."""
+    drag = found["map"]
+    bore = np.asarray(drag["bore_m"])
+    nu = np.asarray(drag["kinematic_viscosity_m2_s"]) * _MM2
+
+    def paint(axes: Axes) -> None:
+        _shade(axes, drag, bore, nu)
+        _lines(axes, drag, bore, nu)
+        _mark_liquids(axes, found)
+        axes.set(xlim=(bore[0], bore[-1]), ylim=(nu[0], nu[-1]))
+        axes.grid(visible=False)
+        legend_above(axes, columns=2)
+        box = axes.get_position()
+        axes.set_position((box.x0, box.y0, 1 - box.x0 - _LIST / WIDE, box.height))
+        _name_liquids(axes, found)
+
+    return draw(
+        "fifty-map",
+        logarithmic("x", within=(bore[0], bore[-1])),
+        logarithmic("y", within=(nu[0], nu[-1])),
+        paint,
+        x=("bore of the tube", "m"),
+        y=("kinematic viscosity", "mm²/s"),
+        columns=0,
+        wide=True,
+        height=_HEIGHT,
+    )
+
+
+def _shade(axes: Axes, told: Record, bore: FloatArray, nu: FloatArray) -> None:
+    tearing = np.asarray(told["tearing"]).T
+    if np.any(tearing > 0):
+        axes.contourf(bore, nu, tearing, levels=[0.0, 100.0], colors=[MUTED], alpha=0.16)
+        axes.fill_between(
+            [],
+            [],
+            [],
+            color=MUTED,
+            alpha=0.16,
+            linewidth=0,
+            label="column separated at the siphon crest",
+        )
+    k, width = (np.asarray(told[key]).T for key in ("k", "k_uncertainty"))
+    near = np.where(
+        np.abs(np.log(np.maximum(k, 1e-9) / _FIFTY)) < 2,
+        np.abs(k - _FIFTY) - width,
+        1.0,
+    )
+    axes.contourf(bore, nu, near, levels=[-1e9, 0], colors=[PAPER], alpha=0.2)
+
+
+def _lines(axes: Axes, told: Record, bore: FloatArray, nu: FloatArray) -> None:
+    k, read = (np.log10(np.maximum(np.asarray(told[key]).T, 1e-3)) for key in ("k", "apparent_k"))
+    levels = [level for level in _LEVELS if k.min() < np.log10(level) < k.max()]
+    thin = axes.contour(bore, nu, k, levels=np.log10(levels), colors=[FOUND], linewidths=0.7)
+    shown = (short(level) if level < 10_000 else number(level, digits=1) for level in levels)
+    names = dict(zip(thin.levels, shown, strict=True))
+    texts = axes.clabel(thin, fmt=names, inline=True, inline_spacing=3)
+    for text in texts:
+        text.set_color(FOUND)
+    if k.min() < np.log10(_FIFTY) < k.max():
+        axes.contour(bore, nu, k, levels=[np.log10(_FIFTY)], colors=[PAPER], linewidths=2.2)
+        axes.plot([], [], color=PAPER, linewidth=2.2, label="k = 50, with its 95 % band")
+    axes.plot([], [], color=FOUND, linewidth=0.7, label="other k")
+    apart = np.where(read - k > 1e-3, read, np.nan)
+    if np.nanmin(apart, initial=9) < np.log10(_FIFTY) < np.nanmax(apart, initial=-9):
+        axes.contour(
+            bore,
+            nu,
+            read,
+            levels=[np.log10(_FIFTY)],
+            colors=[INK],
+            linewidths=1.1,
+            linestyles=[(0, (4, 2))],
+        )
+        axes.plot([], [], color=INK, linewidth=1.1, linestyle=(0, (4, 2)), label="Eq. 19’s velocity is right")
+
+
+def _mark_liquids(axes: Axes, found: Record) -> None:
+    for record in found["liquids"]:
+        if record["runs"]:
+            axes.plot(
+                [found["bore_m"]],
+                [record["kinematic_viscosity_m2_s"] * _MM2],
+                "o",
+                color=INK,
+                markerfacecolor=INK if record["starts_at_scene_pressure"] else SURFACE,
+                markersize=4.5,
+                zorder=5,
+            )
+    axes.axvline(found["bore_m"], color=INK, linewidth=0.6, linestyle=":", zorder=2)
+
+
+def _name_liquids(axes: Axes, found: Record) -> None:
+    """Names at the right edge, level with their circles but never on top of each other."""
+    figure = figure_of(axes)
+    shown_liquids = sorted(
+        (r for r in found["liquids"] if r["runs"]), key=lambda r: float(r["kinematic_viscosity_m2_s"])
+    )
+    box, (low, high) = axes.get_position(), np.log(axes.get_ylim())
+    share = [(np.log(r["kinematic_viscosity_m2_s"] * _MM2) - low) / (high - low) for r in shown_liquids]
+    wanted = [box.y0 + s * box.height for s in share]
+    for record, at, place in zip(shown_liquids, wanted, _spread(wanted, _APART / _HEIGHT), strict=True):
+        edge = box.x1
+        leader = Line2D(
+            [edge, edge + 0.012, edge + 0.022],
+            [at, at, place],
+            color=MUTED,
+            linewidth=0.7,
+            transform=figure.transFigure,
+        )
+        figure.add_artist(leader)
+        text = f"{typeset(record['name'])}, k {number(record['k'], digits=2)}"
+        figure.text(edge + 0.026, place, text, va="center", ha="left", color=INK)
+
+
+def _spread(wanted: list[float], apart: float) -> list[float]:
+    """Places at least so far apart, near the wanted ones, in their order: blocks that touch move as one."""
+    blocks: list[tuple[float, int]] = []
+    for place in wanted:
+        blocks.append((place, 1))
+        while len(blocks) > 1:
+            (a, m), (b, n) = blocks[-2:]
+            if b - a >= apart * (m + n) / 2:
+                break
+            blocks[-2:] = [((a * m + b * n) / (m + n), m + n)]
+    return [middle + (i - (count - 1) / 2) * apart for middle, count in blocks for i in range(count)]
+
+
+def _apparent_figure(read: Record) -> Drawing:
+    """The k that Eq. 18 reads off the tube, over the velocity: its 1/u^2 line, k(u) and k = 50.
+
+    Args: `read`: `apparent` of the evidence's `fifty`.
+    """
+    speed, siphon, separated, every, floor = (
+        np.asarray(read[key]) for key in ("velocity_m_s", "siphon", "separated", "read", "floor")
+    )
+    crest, excess = {"color": THIRD}, read["excess_head_m2_s2"]
+    part: dict[str, Any] = {**crest, "linewidth": 0.9, "linestyle": ":"}
+    machine: dict[str, Any] = {"color": INK, "linestyle": "", "marker": "o", "markersize": 5}
+    bottom = max(0.5 * min(siphon.min(), floor.min(), 2.0), 0.3)
+    top = 2 * max(float(every.max()), _FIFTY)
+    return draw(
+        "fifty-apparent",
+        level(_FIFTY, "the paper’s 50", **AS_PAPER),
+        curve(speed, every, "what Eq. 18 reads", color=INK, linewidth=3.2, alpha=0.25),
+        curve(speed, siphon, "k(u) of the full tube", color=FOUND),
+        curve(speed, np.where(separated > 0, separated, np.nan), "separated at the siphon crest", **crest),
+        *([curve(speed, 2 * excess / speed**2, "its part ∝ 1/u²", **part)] if excess > 0 else []),
+        curve([read["operating_velocity_m_s"]], [read["operating_k"]], "this machine", **machine),
+        logarithmic("x", within=(speed[0], speed[-1])),
+        logarithmic("y", within=(bottom, top)),
+        x=("mean velocity in the tube", "m/s"),
+        y=("k as Eq. 18 has it", "1"),
+        xlim=(speed[0], speed[-1]),
+        ylim=(bottom, top),
+        columns=3,
+        wide=True,
+        height=3.7,
+    )
 
 
 SECTION: Final = Section(name="fifty", title="Is k = 50 right?", collect=_collect, apart=True, show=_view)

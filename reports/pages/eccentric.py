@@ -5,36 +5,41 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePath
 from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
 from ringbalance.controller.eccentric_mass.study import DRAWS
 from ringbalance.reports import summary
-from ringbalance.reports.figures.eccentric import (
+from ringbalance.reports.figure import INK, Drawing, curve, draw, line
+from ringbalance.reports.pages import measured
+from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.pages.requirements import requirement_bars
+from ringbalance.reports.pages.standing import CREDIBILITY, DOCUMENT
+from ringbalance.reports.prose import input_name
+from ringbalance.reports.run_figures import (
     DEVIATIONS,
-    amplitude_over_speed,
-    amplitude_over_time,
     friction_estimates,
     imbalance_estimate,
     mass_angles,
-    sampled_poles,
+    over_speed,
+    over_time,
 )
-from ringbalance.reports.figures.operation import requirement_bars
-from ringbalance.reports.pages import measured
-from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.standing import CREDIBILITY, DOCUMENT
-from ringbalance.reports.prose import input_name
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.summary import OPEN
+from ringbalance.results.requirements import OPEN
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
 _KEY: Final = re.compile(r"\b[a-z_]+\.[a-z_]+\b")
 """A key of the scene file, such as supervisor.limit."""
+_POLE_ROOM, _NEAR = 0.75, 0.02
+"""Half of the poles' picture over their extent, and the least extent."""
 _CAUSES: Final = 2
 """Inputs that a row names as those it hangs on most."""
 
@@ -43,7 +48,7 @@ def _summary(_own: Record, evidence: Record) -> Record:
     rows = evidence["requirements"]
     return {
         "decision": summary.decided([(row["quantity"], row["verdict"]) for row in rows]),
-        "causes": [causes(row) for row in rows],
+        "causes": [_causes(row) for row in rows],
         "set_by": [_KEY.sub(lambda match: input_name(match[0]), row["set_by"]) for row in rows],
         "open": _open(rows),
         "bars": requirement_bars(map(_bar, rows)),
@@ -57,12 +62,12 @@ def _open(rows: list[Record]) -> list[tuple[str, list[str]]]:
     """Inputs to find out first, with the requirements that the stated uncertainties leave open."""
     found: dict[str, list[str]] = {}
     for row in rows:
-        if row["verdict"] == OPEN and (paths := causes(row)):
+        if row["verdict"] == OPEN and (paths := _causes(row)):
             found.setdefault(", ".join(sorted(map(input_name, paths))), []).append(row["quantity"])
     return list(found.items())
 
 
-def causes(row: Record) -> list[str]:
+def _causes(row: Record) -> list[str]:
     """Paths of the inputs that a requirement hangs on most: those that lose it, then the largest effects."""
     effects = {path: max(both) for path, both in row["effects"].items()}
     largest = max(effects.values(), default=0.0)
@@ -89,8 +94,8 @@ def _run(_own: Record, evidence: Record) -> Record:
     varies = max(run["speed_rad_s"]) > min(run["speed_rad_s"])
     ends = np.interp([stage["end_s"] for stage in run["stages"]], run["time_s"], run["amplitude_m"])
     return {
-        "over_speed": amplitude_over_speed(run, locked) if varies else None,
-        "over_time": amplitude_over_time(run, locked),
+        "over_speed": over_speed(run, locked) if varies else None,
+        "over_time": over_time(run, locked),
         "stages": [{"place": place, "amplitude_m": float(end)} for place, end in enumerate(ends)],
     }
 
@@ -98,15 +103,13 @@ def _run(_own: Record, evidence: Record) -> Record:
 def _estimates(_own: Record, evidence: Record) -> Record:
     run, truth = evidence["closed_loop"]["balanced"], evidence["truth"]
     return {
-        "figures": [
-            imbalance_estimate(run, truth["unbalance_kg_m"]),
-            friction_estimates(run, tuple(truth["friction_arm_m"])),
-        ],
-        "rows": estimate_rows(run["estimates"], truth),
+        "imbalance": imbalance_estimate(run, truth["unbalance_kg_m"]),
+        "friction": friction_estimates(run, truth["friction_arm_m"]),
+        "rows": _estimate_rows(run["estimates"], truth),
     }
 
 
-def estimate_rows(estimates: Record, truth: Record) -> list[Record]:
+def _estimate_rows(estimates: Record, truth: Record) -> list[Record]:
     """Final estimates with their 95 % half-widths beside the true values, errors in standard deviations."""
     true = truth["unbalance_kg_m"] * np.array([math.cos(truth["phase_rad"]), math.sin(truth["phase_rad"])])
     covariance = np.asarray(estimates["imbalance_covariance"][-1])
@@ -134,8 +137,44 @@ def estimate_rows(estimates: Record, truth: Record) -> list[Record]:
 
 
 def _loops(_own: Record, evidence: Record) -> Record:
-    poles = sampled_poles(evidence["tuning"]["loops"])
-    return {"figures": [poles, mass_angles(evidence["closed_loop"]["balanced"])]}
+    loops = evidence["tuning"]["loops"]
+    return {
+        "poles": _sampled_poles(loops),
+        "unstable": [loop["name"] for loop in loops if not loop["stable"]],
+        "angles": mass_angles(evidence["closed_loop"]["balanced"]),
+    }
+
+
+def _sampled_poles(loops: Sequence[Record]) -> Drawing:
+    """Sampled poles of the drives' loops in the complex plane, with the unit circle where they are."""
+    points = np.array([[1.0, 0.0], *(pole for loop in loops for pole in loop["poles"])])
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = (low + high) / 2, _POLE_ROOM * max(*(high - low), _NEAR)
+    (left, right), (bottom, top) = np.column_stack((middle - half, middle + half)).tolist()
+
+    def circle(axes: Axes) -> None:
+        axes.add_patch(Circle((0, 0), 1, fill=False, color=INK, linewidth=1))
+        axes.set_aspect("equal")
+
+    return draw(
+        "sampled-poles",
+        circle,
+        *(
+            curve(
+                [real for real, _ in loop["poles"]],
+                [imaginary for _, imaginary in loop["poles"]],
+                loop["name"],
+                linestyle="",
+                **line(index, size=6),
+            )
+            for index, loop in enumerate(loops)
+        ),
+        x=("real part", "1"),
+        y=("imaginary part", "1"),
+        xlim=(left, right),
+        ylim=(bottom, top),
+        height=3.4,
+    )
 
 
 def _claims(_own: Record, evidence: Record) -> Record:

@@ -24,8 +24,9 @@ from ringbalance.reports.pages.requirements import (
 )
 from ringbalance.reports.prose import found_at, key_words, named_with_origin, read, states_uncertainty, traced
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.summary import LIKELY, MISSED, OPEN, tuning_of
+from ringbalance.reports.summary import LIKELY, tuning_of
 from ringbalance.results.numbers import MISSING, THIN_SPACE, given, number, percent, shown
+from ringbalance.results.requirements import MISSED, OPEN
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.uncertain import half_widths
 from ringbalance.verification.assumptions import assumptions_of

@@ -2,22 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from ringbalance.reports.figures import style
-from ringbalance.reports.figures.operation import residual_polar, settling_histogram
-from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.figure import (
+    AMPLITUDE,
+    AS_PAPER,
+    FOUND,
+    INK,
+    MUTED,
+    PAPER,
+    REGIME_COLOURS,
+    SURFACE,
+    TIME,
+    Curve,
+    Drawing,
+    amplitudes,
+    curve,
+    draw,
+    level,
+    logarithmic,
+    nice_span,
+    panels,
+    plain_number,
+)
+from ringbalance.reports.pages.consequences import find_consequences
 from ringbalance.reports.pages.first_page import RETUNED, place_of_run
+from ringbalance.reports.run_figures import early_time, fill_ratios, residual_polar
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.studies.consequences import find_consequences
 from ringbalance.reports.summary import runs_settled, tuning_of
+from ringbalance.results.numbers import percent
 
 _GAINS: Final = {1: "with the scene’s gain", 2: "with the recommended settings"}
 """Titles of the calibrated law's ensembles, by their place in the evidence."""
+_LAWS: Final[dict[str, dict[str, Any]]] = {
+    "calibrated": {"color": FOUND, "label": "the calibrated law"},
+    "paper": {**AS_PAPER, "label": "the paper’s law"},
+}
+_SAME: Final = 1e-3
+"""Relative change of the amplitude that counts as none."""
+_CROPPED: Final = 0.7
+"""Fraction of a run up to which its rest is cut off, when nothing moves there."""
+_MARKED: Final = 20
+"""Samples that are marked: those at rest repeat one value."""
+_BINS: Final = 16
+_MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
+"""Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""
 
 
 def _reach(work: Work) -> Record:
@@ -31,19 +65,24 @@ def _reach(work: Work) -> Record:
     }
 
 
-def _loop(found: Record, evidence: Record) -> Record:
-    run = evidence["closed_loop"].get("calibrated")
-    tuning = tuning_of(evidence)
-    reached = tuning.get("fraction_settled") is not None
+def _loop(own: Record, evidence: Record) -> Record:
+    runs, limit = evidence["closed_loop"], evidence["limit_m"]
+    run, tuning = runs.get("calibrated"), tuning_of(evidence)
+    longest, until = _still_from(runs)
+    samples = _samples(evidence) if own else []
     return {
         "retuned": place_of_run(evidence, RETUNED),
-        "runs_settled": runs_settled(tuning) if reached else "",
-        "polar": residual_polar(run, found) if run and found else None,
-        "settling": settling_histogram(_samples(found, evidence)) if found else None,
+        "runs_settled": runs_settled(tuning) if tuning.get("fraction_settled") is not None else "",
+        "amplitude": _amplitude(runs, limit, until) if runs else None,
+        "longest": longest,
+        "laws": [name for name in _LAWS if name in runs],
+        "polar": residual_polar(run, own) if run and own else None,
+        "settling": _settling_histogram(samples) if samples else None,
+        "samples": samples,
     }
 
 
-def _samples(found: Record, evidence: Record) -> list[Record]:
+def _samples(evidence: Record) -> list[Record]:
     ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
     return [
         {
@@ -52,11 +91,78 @@ def _samples(found: Record, evidence: Record) -> list[Record]:
             "counts": ensembles[place]["settling_time_s"]["counts"],
             "runs": ensembles[place]["members"],
             "not_settled": ensembles[place]["probability"]["not_settled"]["value"],
-            "time_limit_s": found["time_limit_s"],
+            "place": place,
         }
         for place, title in _GAINS.items()
         if place < len(ensembles)
     ]
+
+
+def _still_from(runs: Mapping[str, Record]) -> tuple[str, float]:
+    """Law of the longest run, where it ends with nothing moving, else empty; time up to which to draw, s."""
+    ends = {law: float(run["time_s"][-1]) for law, run in runs.items()}
+    longest = max(ends, key=lambda law: ends[law], default="")
+    last = max((_last_change(run) for run in runs.values()), default=0.0)
+    cropped = 0 < 1.5 * last < _CROPPED * ends.get(longest, 0.0)
+    return (longest, 1.5 * last) if cropped else ("", ends.get(longest, 1.0))
+
+
+def _last_change(run: Record) -> float:
+    """Time from which the amplitude of a run changes no more, s."""
+    values = np.asarray(run["amplitude_m"])
+    moving = np.flatnonzero(np.abs(values - values[-1]) > _SAME * values[-1])
+    return float(run["time_s"][moving[-1]]) if moving.size else 0.0
+
+
+def _amplitude(runs: Mapping[str, Record], limit: float, until: float) -> Drawing:
+    """Vibration amplitude at the controller's samples, m, under the laws that were run."""
+    marks = {"linewidth": 1.2, "marker": "o", "markersize": 3, "markevery": slice(0, _MARKED)}
+
+    def of(run: Record, look: dict[str, Any]) -> Curve:
+        time = run["samples"]["time_s"]
+        return time, np.interp(time, run["time_s"], run["amplitude_m"]), {**look, **marks}
+
+    return draw(
+        "amplitude",
+        amplitudes([of(runs[name], look) for name, look in _LAWS.items() if name in runs], limit),
+        x=TIME,
+        y=AMPLITUDE,
+        xlim=(0, until),
+        columns=3,
+        wide=True,
+        height=3.5,
+    )
+
+
+def _settling_histogram(samples: list[Record]) -> Drawing:
+    """Settling times of samples of runs, a panel each, with those that never settle as a bar of their own."""
+    side = 1 / len(samples)
+
+    def paint(axes: Axes) -> None:
+        drawn = panels(
+            axes, *((place * side + 0.085, 0.2, side - 0.105, 0.62) for place in range(len(samples)))
+        )
+        for panel, sample in zip(drawn, samples, strict=True):
+            _histogram(panel, sample)
+        drawn[0].set_ylabel("share of all runs in %")
+
+    return draw("settling-histogram", paint, columns=0, wide=True)
+
+
+def _histogram(panel: Axes, sample: Record) -> None:
+    edges, counts = np.asarray(sample["edges_s"], dtype=float), np.asarray(sample["counts"], dtype=float)
+    starts = np.arange(0, counts.size, max(-(-counts.size // _BINS), 1))
+    shares = 100 * np.add.reduceat(counts, starts) / sample["runs"]
+    ends = edges[np.append(starts, counts.size)]
+    panel.bar(ends[:-1], shares, width=np.diff(ends), align="edge", color=FOUND, edgecolor=SURFACE)
+    span = float(ends[-1] - ends[0])
+    place, width, never = ends[-1] + 0.14 * span, 0.1 * span, 100 * sample["not_settled"]
+    panel.bar(place, never, width=width, color=SURFACE, edgecolor=PAPER, hatch="////", linewidth=1)
+    panel.text(place, never + 1.5, percent(sample["not_settled"]), ha="center", color=PAPER)
+    ticks = [tick for tick in nice_span(float(ends[-1])) if ends[0] <= tick <= ends[-1] - 0.05 * span]
+    panel.set_xticks([*ticks, place], [*(plain_number(tick) for tick in ticks), "never"])
+    panel.set_title(sample["title"], loc="left", fontsize="medium", color=INK)
+    panel.set(xlabel="settling time in s", xlim=(ends[0], place + width), ylim=(0, 112))
 
 
 LOOP: Final = Section(
@@ -64,16 +170,86 @@ LOOP: Final = Section(
 )
 
 
-_MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
-"""Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""
+def _injections(_own: Record, evidence: Record) -> Record:
+    runs = evidence["closed_loop"]
+    if not (run := runs.get("calibrated")):
+        return {"early": None}
+    until = early_time(next(iter(runs.values())))
+    return {
+        "early": _early_amplitude(runs, evidence["limit_m"], until),
+        "fills": fill_ratios(run, until),
+        "regimes": _regimes(run) if run["injections"] else None,
+    }
+
+
+def _early_amplitude(runs: Mapping[str, Record], limit: float, until: float) -> Drawing:
+    """Vibration amplitude within the first operations, m, liquid flowing, under the laws that were run."""
+
+    def of(run: Record, look: dict[str, Any]) -> Curve:
+        early = np.asarray(run["time_s"]) <= until
+        time, values = (np.asarray(run[key])[early] for key in ("time_s", "amplitude_m"))
+        return time, values, {**look, "linewidth": 1.3}
+
+    return draw(
+        "amplitude-early",
+        amplitudes([of(runs[name], look) for name, look in _LAWS.items() if name in runs], limit),
+        x=TIME,
+        y=AMPLITUDE,
+        xlim=(0, until),
+        columns=3,
+    )
+
+
+def _regimes(run: Record) -> Drawing:
+    """The regime of the tube in every gas operation of a run, by chamber and time."""
+    operations, letters = run["injections"], list(run["fill_ratio"])
+    last = max(item["time_s"] + item["duration_s"] for item in operations)
+    least = 0.006 * last
+    named: set[str] = set()
+
+    def bar(axes: Axes, item: Record, regime: str, share: tuple[float, float]) -> None:
+        width = max(item["duration_s"], least)
+        axes.barh(
+            letters.index(item["chamber"]),
+            width * (share[1] - share[0]),
+            left=item["time_s"] + width * share[0],
+            height=0.55,
+            color=REGIME_COLOURS[regime],
+            linewidth=0,
+            label=None if regime in named else regime,
+        )
+        named.add(regime)
+
+    def paint(axes: Axes) -> None:
+        for item in operations:
+            start, end = item["regime"], item.get("regime_end") or item["regime"]
+            parts = [(start, (0.0, 1.0))] if end == start else [(start, (0.0, 0.5)), (end, (0.5, 1.0))]
+            for regime, share in parts:
+                bar(axes, item, regime, share)
+        axes.set_yticks(range(len(letters)), letters)
+
+    return draw(
+        "loop-regimes",
+        paint,
+        x=TIME,
+        y=("gas into chamber", "1"),
+        xlim=(0, 1.02 * (last + least)),
+        ylim=(len(letters) - 0.5, -0.5),
+        columns=4,
+        wide=True,
+        height=1.5 + 0.2 * len(letters),
+    )
+
+
+INJECTIONS: Final = Section(
+    name="injections", title="The closed loop, injection by injection", show=_injections
+)
 
 
 def _find(work: Work) -> Record:
-    members = _MEMBERS[work.level]
     tuned = work.tuning.scene if work.tuning.gain else None
-    return find_consequences(
-        work.scene, work.calibration.model, recommended=tuned, members=members
-    ).document()
+    model, members = work.calibration.model, _MEMBERS[work.level]
+    return find_consequences(work.scene, model, recommended=tuned, members=members).document()
 
 
 def _consequences(found: Record, _evidence: Record) -> Record:
@@ -85,42 +261,34 @@ def _gain_margin(gain: Record) -> Drawing:
 
     Args: `gain`: one law's entry of `gain`, SI.
     """
-    curve = gain["over_drag_coefficient"]
-    k = np.asarray(curve["values"])
-    lines = (
-        ("overshoot_gain", style.FOUND, "overshoot from"),
-        ("instability_gain", style.PAPER, "unstable from"),
-    )
-    scene = gain["proportional_s_per_m"] * 1e-6
-
-    def paint(axes: Axes) -> None:
-        for analytic, colour, label in lines:
-            axes.plot(k, np.asarray(curve[analytic]) * 1e-6, color=colour, label=label)
-        axes.axhline(scene, color=style.MUTED, linewidth=1, linestyle=":", label="Kc in the scene")
-        axes.plot(
-            [gain["drag_coefficient"]], [scene], "D", color=style.INK, markersize=5, label="this machine"
-        )
-        values = np.concatenate([np.asarray(curve[name]) * 1e-6 for name, *_ in lines] + [[scene]])
-        low, high = values.min() * 0.8, values.max() * 1.25
-        style.logarithmic(axes, "x", within=(k[0], k[-1]))
-        style.logarithmic(axes, "y", within=(low, high))
-        axes.set_ylim(low, high)
-
+    over, scene = gain["over_drag_coefficient"], gain["proportional_s_per_m"]
+    k, overshoot, unstable = (over[key] for key in ("values", "overshoot_gain", "instability_gain"))
+    low, high = 0.8 * min(*overshoot, *unstable, scene), 1.25 * max(*overshoot, *unstable, scene)
     return draw(
+        "gain-margin",
+        curve(k, overshoot, "overshoot from", color=FOUND),
+        curve(k, unstable, "unstable from", color=PAPER),
+        level(scene, "Kc in the scene", color=MUTED, linewidth=1, linestyle=":"),
+        curve(
+            [gain["drag_coefficient"]],
+            [scene],
+            "this machine",
+            color=INK,
+            linestyle="",
+            marker="D",
+            markersize=5,
+        ),
+        logarithmic("x", within=(k[0], k[-1])),
+        logarithmic("y", within=(low, high)),
+        x=("drag coefficient k at equal fills", "1"),
+        y=("Kc", "s/m"),
+        ylim=(low, high),
         columns=4,
-        x="drag coefficient k at equal fills",
-        y="Kc in s/µm",
-        name="gain-margin",
-        paint=paint,
         wide=True,
         height=3.4,
-        alt="Gains at which the loop overshoots and at which it is unstable, both growing with k.",
     )
 
 
 CONSEQUENCES: Final = Section(
-    name="consequences",
-    title="What a wrong k costs",
-    collect=_find,
-    show=_consequences,
+    name="consequences", title="What a wrong k costs", collect=_find, show=_consequences
 )

@@ -10,16 +10,29 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
+from scipy.ndimage import distance_transform_edt
 
 from ringbalance.mesh.section import outlines
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reports.figures import style
-from ringbalance.reports.figures.operation import operating_map
-from ringbalance.reports.figures.style import Drawing, draw
-from ringbalance.reports.prose import key_words
+from ringbalance.reports.figure import (
+    FIFTH,
+    FOUND,
+    FOURTH,
+    INK,
+    MAP,
+    MUTED,
+    PAPER,
+    SURFACE,
+    THIRD,
+    WIDE,
+    Drawing,
+    curve,
+    draw,
+    panels,
+)
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.results.numbers import given, number
+from ringbalance.results.numbers import number
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 
@@ -31,11 +44,23 @@ _PLACES: Final = 7
 """Of an outline, m."""
 _SPILLING: Final = "spilling"
 _NAMES: Final = (*(regime.label for regime in Regime), _SPILLING)
+_SHADES: Final = {
+    "siphon": (FOUND, 0.30),
+    "separated": (THIRD, 0.24),
+    "spilling": (FIFTH, 0.30),
+    "blocked": (MUTED, 0.10),
+    "reverse": (FOURTH, 0.26),
+    "cannot be told": (PAPER, 0.22),
+}
+_CLEARANCE: Final = 2.2
+"""Cells between a regime's name and the edge of its area, at the least."""
+_LINE: Final = 0.035
+"""Of the map's height on either side of the working range, which its regimes' names keep clear of."""
 _MILLIMETRES: Final = 1e3
 _HEIGHT: Final = 4.1
 _REACH: Final = 1.42
 """Half the height of the picture over the outer radius: room for the dimensions."""
-_TUBE: Final[dict[str, Any]] = {"color": style.PAPER, "linewidth": 2.0}
+_TUBE: Final[dict[str, Any]] = {"color": PAPER, "linewidth": 2.0}
 
 
 def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.ArrayLike) -> IntArray:
@@ -45,7 +70,7 @@ def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.
     """
     flow = law.evaluate(fill_ratio=fill, gas_pressure=pressure)
     ends = law.ends(fill_ratio=fill, gas_pressure=pressure)
-    covered = ends.downstream_hydrostatic >= ends.port_pressure
+    covered = ends.downstream_hydrostatic >= law.path.port_pressure
     spills = (flow.regime == Regime.SEPARATED) & ~flow.primed & covered
     return np.asarray(np.where(spills, _NAMES.index(_SPILLING), flow.regime), dtype=np.int64)
 
@@ -103,10 +128,57 @@ def _view(found: Record, evidence: Record) -> Record:
     chamber, disc = evidence["calibration"]["chamber"], found["disc"]
     surface = np.interp(disc["fill_ratio"], chamber["fill_ratio"], chamber["free_surface_radius_m"])
     disc = {**disc, "free_surface_radius_m": float(surface)}
-    return {"map": operating_map(found), "disc": disc_section(disc)}
+    return {"map": _operating_map(found), "disc": _disc_section(disc)}
 
 
-def disc_section(found: Record) -> Drawing:
+def _operating_map(found: Record) -> Drawing:
+    """Regime of the unprimed tube over the driven chamber's fill and the gas pressure.
+
+    Args: `found`: axes, names and numbers of the regimes, the operating point and the fills that the scene's
+        gas works between.
+    """
+    fill, pressure = np.asarray(found["fill_ratio"]), np.asarray(found["gas_pressure_Pa"])
+    regime = np.array([[int(sign) for sign in row] for row in found["regime"]])
+    point, gas = found["point"], found["point"]["gas_pressure_Pa"]
+
+    def areas(axes: Axes) -> None:
+        for index, name in enumerate(found["regimes"]):
+            colour, strength = _SHADES[name]
+            there = regime == index
+            if not there.all() and there.any():
+                axes.contourf(fill, pressure, there, levels=[0.5, 1.5], colors=[colour], alpha=strength)
+                axes.contour(fill, pressure, there, levels=[0.5], colors=[MUTED], linewidths=0.7)
+        near = np.abs(pressure - gas)[:, None] < _LINE * (pressure[-1] - pressure[0])
+        _name_areas(axes, fill, pressure, np.where(near, -1, regime), found["regimes"])
+        axes.grid(visible=False)
+
+    working: dict[str, Any] = {"color": INK, "marker": "|", "linewidth": 2, "markersize": 9}
+    return draw(
+        "operating-map",
+        areas,
+        curve(found["working_fill_ratio"], [gas, gas], "working range", **working),
+        curve(
+            [point["fill_ratio"]], [gas], "operating point", color=INK, linestyle="", marker="o", markersize=6
+        ),
+        x=("fill ratio of the driven chamber", "1"),
+        y=("gas pressure, gauge,", "Pa"),
+        xlim=(fill[0], fill[-1]),
+        ylim=(pressure[0], pressure[-1]),
+        wide=True,
+        height=3.6,
+    )
+
+
+def _name_areas(axes: Axes, fill: FloatArray, pressure: FloatArray, regime: Any, names: list[str]) -> None:
+    """Each regime's name at the place in its area that is farthest from the edges."""
+    for index, name in enumerate(names):
+        room = distance_transform_edt(np.pad(regime == index, 1))[1:-1, 1:-1]
+        row, column = np.unravel_index(np.argmax(room), room.shape)
+        if room[row, column] >= _CLEARANCE:
+            axes.text(fill[column], pressure[row], name, ha="center", va="center", color=INK, weight="bold")
+
+
+def _disc_section(found: Record) -> Drawing:
     """Section of the disc with its dimensions.
 
     Args: `found`: `disc` of the evidence: lengths in m, angles in rad, the fill that is drawn and, of an
@@ -120,34 +192,15 @@ def disc_section(found: Record) -> Drawing:
     reach = _REACH * size["outer_radius"]
 
     def paint(axes: Axes) -> None:
-        axes.set_axis_off()
-        figure = style.figure_of(axes)
-        across, along = figure.add_axes((0.0, 0.0, 0.56, 1)), figure.add_axes((0.57, 0.0, 0.43, 1))
+        across, along = panels(axes, (0.0, 0.0, 0.56, 1), (0.57, 0.0, 0.43, 1))
         for panel, width in ((across, 0.56), (along, 0.43)):
-            half = reach * width * style.WIDE / _HEIGHT
+            half = reach * width * WIDE / _HEIGHT
             panel.set(xlim=(-half, half), ylim=(-reach, reach), aspect="equal")
             panel.set_axis_off()
         _across(across, found, size)
         _along(along, found, size)
 
-    r1, r2, width = (given(found[key], "m") for key in ("inner_radius_m", "outer_radius_m", "axial_width_m"))
-    fill = number(found["fill_ratio"], digits=2)
-    return draw(
-        name="disc-section",
-        paint=paint,
-        columns=0,
-        wide=True,
-        height=_HEIGHT,
-        alt=f"Section of the disc: {found['chambers']} chambers between {r1} and {r2}, {width} wide.",
-        caption=f"Section across the shaft and along it, dimensions in mm, to scale but for the bore, at a "
-        f"fill ratio of {fill}. The tube joins opposite chambers; the other pairs’ tubes are left out."
-        f"{_assumed(found)}",
-    )
-
-
-def _assumed(found: Record) -> str:
-    names = [key_words(f"tube.{name}") for name, origin in found["origins"].items() if origin == "assumed"]
-    return f" Assumed: {', '.join(names)}." if names else ""
+    return draw("disc-section", paint, columns=0, wide=True, height=_HEIGHT)
 
 
 def _arc(radius: float, start: float, end: float) -> FloatArray:
@@ -157,7 +210,7 @@ def _arc(radius: float, start: float, end: float) -> FloatArray:
 
 def _arrow(panel: Axes, start: Sequence[float], end: Sequence[float], kind: str, **line: Any) -> None:
     """A line between two places, with the heads of its kind."""
-    shape = {"arrowstyle": kind, "color": style.INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, **line}
+    shape = {"arrowstyle": kind, "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, **line}
     panel.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=shape)
 
 
@@ -199,11 +252,11 @@ def _area(loops: Sequence[FloatArray]) -> Path:
 
 def _filled(panel: Axes, area: Path, liquid: Path) -> None:
     """A chamber's gas, and its liquid where the place is one of `liquid`."""
-    panel.add_patch(PathPatch(area, facecolor=style.SURFACE, edgecolor=style.INK, linewidth=0.6))
-    wet = PathPatch(area, facecolor=style.MAP[7], edgecolor=style.INK, linewidth=0.6)
+    panel.add_patch(PathPatch(area, facecolor=SURFACE, edgecolor=INK, linewidth=0.6))
+    wet = PathPatch(area, facecolor=MAP[7], edgecolor=INK, linewidth=0.6)
     panel.add_patch(wet)
     wet.set_clip_path(liquid, panel.transData)
-    panel.add_patch(PathPatch(area, facecolor="none", edgecolor=style.INK, linewidth=0.6))
+    panel.add_patch(PathPatch(area, facecolor="none", edgecolor=INK, linewidth=0.6))
 
 
 def _turned(loops: Sequence[FloatArray], angle: float) -> list[FloatArray]:
@@ -214,18 +267,18 @@ def _turned(loops: Sequence[FloatArray], angle: float) -> list[FloatArray]:
 def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
     inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
     strip, half = size["plate_thickness"], found["central_angle_rad"] / 2
-    panel.add_patch(Circle((0, 0), outer, facecolor=style.MAP[3], edgecolor=style.INK, linewidth=1))
+    panel.add_patch(Circle((0, 0), outer, facecolor=MAP[3], edgecolor=INK, linewidth=1))
     loops, _ = _closed_lines(found, size)
     ring = _area([_arc(1.1 * outer, 0, 2 * math.pi), _arc(surface, 0, 2 * math.pi)])
     for index in range(found["chambers"]):
         middle = 2 * math.pi * index / found["chambers"]
         area = _area(_turned(loops, middle))
         _filled(panel, area, ring)
-        level = Circle((0, 0), surface, facecolor="none", edgecolor=style.INK, linewidth=0.6)
+        level = Circle((0, 0), surface, facecolor="none", edgecolor=INK, linewidth=0.6)
         panel.add_patch(level).set_clip_path(area, panel.transData)
         place = _letter_radius(size) * np.exp(1j * (middle + 0.62 * half))
         panel.text(place.real, place.imag, chr(ord("A") + index), ha="center", va="center", weight="bold")
-    panel.plot(0, 0, "+", color=style.INK, markersize=9)
+    panel.plot(0, 0, "+", color=INK, markersize=9)
     _tube(panel, size)
     _radius(panel, outer, -0.5, f"R₂ {number(outer, digits=4)}", share=1.34)
     _radius(panel, inner, -2.1, f"R₁ {number(inner, digits=4)}")
@@ -235,7 +288,7 @@ def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
     _arrow(panel, low, high, "<->", connectionstyle=f"arc3,rad={math.tan(half / 2):.3f}")
     for sign in (-1, 1):
         edge = np.outer([0, 1.14 * outer], [math.cos(half), sign * math.sin(half)])
-        panel.plot(*edge.T, color=style.MUTED, linewidth=0.7, linestyle=(0, (6, 2, 1, 2)))
+        panel.plot(*edge.T, color=MUTED, linewidth=0.7, linestyle=(0, (6, 2, 1, 2)))
     panel.text(1.13 * outer, 0.12 * outer, f"θ {number(math.degrees(found['central_angle_rad']), digits=3)}°")
     if "outlines" in found:
         return
@@ -261,7 +314,7 @@ def _tube(panel: Axes, size: dict[str, float]) -> None:
     arc = _arc(crest, 0, math.pi)
     path = np.vstack([[[port, 0]], arc, [[-port, 0]]])
     panel.plot(*path.T, **_TUBE)
-    panel.plot([port, -port], [0, 0], "o", color=style.PAPER, markersize=5)
+    panel.plot([port, -port], [0, 0], "o", color=PAPER, markersize=5)
     _note(
         panel,
         f"tube, bore {number(size['bore'], digits=3)}, length {number(size['length'], digits=4)}",
@@ -281,8 +334,8 @@ def _radius(panel: Axes, radius: float, angle: float, text: str, *, share: float
     if share < 1:
         place[0] += 0.05 * rim
     else:
-        panel.plot(*np.array([tip, 0.95 * place]).T, color=style.MUTED, linewidth=0.7)
-    panel.text(place[0], place[1], text, ha="center" if share > 1 else "left", va="center", color=style.INK)
+        panel.plot(*np.array([tip, 0.95 * place]).T, color=MUTED, linewidth=0.7)
+    panel.text(place[0], place[1], text, ha="center" if share > 1 else "left", va="center", color=INK)
 
 
 def _note(panel: Axes, text: str, at: tuple[float, float], place: tuple[float, float]) -> None:
@@ -290,9 +343,9 @@ def _note(panel: Axes, text: str, at: tuple[float, float], place: tuple[float, f
         text,
         at,
         place,
-        color=style.INK,
+        color=INK,
         va="center",
-        arrowprops={"arrowstyle": "-", "color": style.MUTED, "linewidth": 0.7},
+        arrowprops={"arrowstyle": "-", "color": MUTED, "linewidth": 0.7},
     )
 
 
@@ -307,29 +360,27 @@ def _along(panel: Axes, found: Record, size: dict[str, float]) -> None:
         liquid = np.array([[-1, level], [1, level], [1, sign * reach[1]], [-1, sign * reach[1]]])
         liquid[:, 0] *= reach[0]
         _filled(panel, _area([loop * [1, sign] for loop in loops]), Path(liquid))
-        panel.plot([-half, half], [level, level], color=style.INK, linewidth=0.6)
+        panel.plot([-half, half], [level, level], color=INK, linewidth=0.6)
         panel.plot([half, half + wall], [sign * size["port_radius"] * 0.985] * 2, **_TUBE)
     crest = size.get("crest_radius", 0.0)
     panel.plot([half + wall] * 3, [0.985 * size["port_radius"], crest, -0.985 * size["port_radius"]], **_TUBE)
-    panel.plot(
-        [-1.35 * half, 1.5 * half], [0, 0], color=style.MUTED, linewidth=0.8, linestyle=(0, (8, 2, 1, 2))
-    )
+    panel.plot([-1.35 * half, 1.5 * half], [0, 0], color=MUTED, linewidth=0.8, linestyle=(0, (8, 2, 1, 2)))
     _span(panel, (-half, half), -1.14 * outer, f"B {number(2 * half, digits=4)}")
     panel.text(-half - 0.1 * outer, 0.62 * (inner + outer), "valve side:\ngas line", ha="right", va="center")
     level = 0.5 * (inner + surface)
-    _arrow(panel, (-half - 0.35 * outer, level), (-half, level), "-|>", color=style.THIRD, linewidth=1.4)
-    panel.text(half + 2 * wall, 0.72 * outer, "tube", color=style.PAPER, va="center")
+    _arrow(panel, (-half - 0.35 * outer, level), (-half, level), "-|>", color=THIRD, linewidth=1.4)
+    panel.text(half + 2 * wall, 0.72 * outer, "tube", color=PAPER, va="center")
     panel.text(0, (surface + outer) / 2, "liquid", ha="center", va="center")
     # Beside the middle, where a gas tube may stand.
     panel.text(-half / 2, (surface + inner) / 2, "gas", ha="center", va="center")
-    panel.text(1.5 * half, 0.04 * outer, "shaft", ha="right", va="bottom", color=style.MUTED)
+    panel.text(1.5 * half, 0.04 * outer, "shaft", ha="right", va="bottom", color=MUTED)
 
 
 def _span(panel: Axes, ends: tuple[float, float], level: float, text: str) -> None:
     """A dimension line with its value below."""
     _arrow(panel, (ends[0], level), (ends[1], level), "<->")
     for end in ends:
-        panel.plot([end, end], [level * 0.9, level * 1.04], color=style.MUTED, linewidth=0.7)
+        panel.plot([end, end], [level * 0.9, level * 1.04], color=MUTED, linewidth=0.7)
     panel.text(sum(ends) / 2, level * 1.03, text, ha="center", va="top")
 
 

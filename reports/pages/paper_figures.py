@@ -6,7 +6,7 @@ import math
 from bisect import bisect_left
 from dataclasses import replace
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,13 +16,36 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
-from ringbalance.reports.figures.paper import paper_figures
+from ringbalance.reports.figure import (
+    AMPLITUDE,
+    FOUND,
+    INK,
+    PAPER,
+    THIRD,
+    TIME,
+    Drawing,
+    Paint,
+    amplitudes,
+    curve,
+    draw,
+    line,
+    note,
+    upright,
+)
 from ringbalance.reports.section import Record, Section, Work
+from ringbalance.results.numbers import given
 from ringbalance.scene.models import Scene
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.loops import AMPLITUDES, GAINS, PHASES, calibration_of, loop_scene, run_loop
 from ringbalance.verification.runner import paper_scene
 
+_FLOOR: Final = 5e-9
+"""m: smaller amplitudes are drawn here."""
+_LINES: Final = {
+    "paper_m_s": (PAPER, (0, (5, 2)), "Eq. 19, as Fig. 4 has it"),
+    "levels_m_s": (FOUND, "-", "k = 50, levels by finite elements"),
+    "calibrated_m_s": (THIRD, "-", "calibrated law"),
+}
 _FILLS: Final = 41
 _SEARCH: Final = tuple((np.arange(4, 41) * 5e3).tolist())
 """Kp among which the onset of overshoot is looked for, s/m."""
@@ -131,7 +154,7 @@ def _run(run: Simulation, of: float) -> Record:
 
 def _reading(scene: Scene, model: BalancerModel) -> Record:
     """Lambda per transferred mass, which the loop uses, against Eqs. 21 and 22 taken literally."""
-    literal = replace(model, moment=literal_moment(model))
+    literal = replace(model, moment=_literal_moment(model))
 
     def onset(balancer: BalancerModel) -> float | None:
         # A larger gain never overshoots less.
@@ -157,7 +180,7 @@ def _reading(scene: Scene, model: BalancerModel) -> Record:
     }
 
 
-def literal_moment(model: BalancerModel) -> PaperMoment:
+def _literal_moment(model: BalancerModel) -> PaperMoment:
     """Eqs. 21 and 22 as printed: lambda times the difference of the two chambers' masses.
 
     Args: `model`: the paper's.
@@ -171,7 +194,77 @@ def literal_moment(model: BalancerModel) -> PaperMoment:
 
 
 def _view(found: Record, _evidence: Record) -> Record:
-    return paper_figures(found)
+    limit, gains = found["limit_m"], found["gains"]
+    names = [f"Kp = {run['of'] * 1e-6:.2f}" for run in gains]
+    phases = [f"{math.degrees(run['of']):.0f}°" for run in found["trial"]]
+    bound = upright(5.0, "the paper’s bound, 5 s", color=INK, linewidth=0.8, linestyle=(0, (5, 2)))
+    end = max(5.4, *(run["time_s"][-1] for run in found["amplitudes"]))
+    starts = [given(run["of"], "m") for run in found["amplitudes"]]
+    return {
+        "levels": _velocity_figure("paper-figure-4", found["velocity"], "levels_m_s"),
+        "law": _velocity_figure("paper-figure-4-law", found["velocity"], "calibrated_m_s"),
+        "trial": _amplitudes("paper-figure-6", found["trial"], phases, limit, columns=5, wide=True),
+        "gains": _amplitudes("paper-figure-7", gains, names, limit, columns=3, height=3.5),
+        "phase": _phases(gains, names),
+        "amplitudes": _amplitudes(
+            "paper-figure-8", found["amplitudes"], starts, limit, bound, columns=4, wide=True, xlim=(0, end)
+        ),
+    }
+
+
+def _velocity_figure(name: str, velocity: list[Record], other: str) -> Drawing:
+    """Velocity over the fill at both gas pressures: Eq. 19, and beside it another reading."""
+    paints: list[Paint] = []
+    for index, each in enumerate(velocity):
+        fill, middle = each["fill_ratio"], len(each["fill_ratio"]) // 2
+        for key in ("paper_m_s", other):
+            colour, dashes, label = _LINES[key]
+            width = each["calibrated_uncertainty"] if key == "calibrated_m_s" else None
+            look = {"color": colour, "linestyle": dashes}
+            paints.append(curve(fill, each[key], None if index else label, band=width, **look))
+        place = (fill[middle], each[other][middle])
+        paints.append(note(given(each["gas_pressure_Pa"], "Pa"), place, (0, 7), ha="center"))
+    return draw(
+        name,
+        *paints,
+        x=("fill ratio of the driven chamber", "1"),
+        y=("velocity in the tube", "m/s"),
+        xlim=(0, velocity[0]["fill_ratio"][-1]),
+        ylim=(0, None),
+        height=3.4,
+    )
+
+
+def _look(index: int, label: str) -> dict[str, Any]:
+    return {"label": label, "linewidth": 1.2, **line(index, size=2.6)}
+
+
+def _amplitudes(
+    name: str, runs: list[Record], labels: list[str], limit: float, *paints: Paint, **frame: Any
+) -> Drawing:
+    """Amplitude at each sample of several runs; limit in m."""
+    curves = [
+        (run["time_s"], np.maximum(run["amplitude_m"], _FLOOR), _look(index, label))
+        for index, (run, label) in enumerate(zip(runs, labels, strict=True))
+    ]
+    return draw(name, amplitudes(curves, limit), *paints, x=TIME, y=AMPLITUDE, **{"height": 3.4, **frame})
+
+
+def _phases(runs: list[Record], labels: list[str]) -> Drawing:
+    return draw(
+        "paper-figure-7-phase",
+        *(
+            curve(run["time_s"], np.degrees(run["phase_rad"]), **_look(index, label))
+            for index, (run, label) in enumerate(zip(runs, labels, strict=True))
+        ),
+        lambda axes: axes.set_yticks([-180, -90, 0, 90, 180]),
+        x=TIME,
+        y=("phase", "°"),
+        xlim=(0, None),
+        ylim=(-190, 190),
+        columns=3,
+        height=3.5,
+    )
 
 
 def _results(gains: list[Record], amplitudes: list[Record]) -> Record:

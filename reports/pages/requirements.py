@@ -7,17 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
+from matplotlib.axes import Axes
+
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
-from ringbalance.reports.figures.operation import requirement_bars
-from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.figure import FIFTH, INK, PAPER, THIRD, Drawing, draw
 from ringbalance.reports.prose import evidence_at, read, resting, traced, untraced
 from ringbalance.reports.section import Record
 from ringbalance.reports.summary import (
     LIKELY,
-    MET,
-    MISSED,
-    OPEN,
-    UNASKED,
     above,
     below,
     decided,
@@ -30,6 +27,7 @@ from ringbalance.reports.summary import (
     worst,
 )
 from ringbalance.results.numbers import given, number, percent, shown
+from ringbalance.results.requirements import MET, MISSED, OPEN, UNASKED
 from ringbalance.results.result import Table
 from ringbalance.scene import Scene
 
@@ -37,6 +35,8 @@ CAPACITY: Final = "Correction capacity in any direction"
 STANDING: Final = "Vibration up to which the scene’s valve-open times transfer no liquid"
 SMALLEST: Final = "Smallest correction that the valve can give"
 _NONE: Final = "the scene asks for none"
+_WIDEST: Final = 2.5
+"""Times the requirement at which a bar is cut off."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,6 +121,54 @@ def requirement_figure(rows: Iterable[Requirement]) -> Drawing | None:
         for row in rows
         if row.reached is not None
     )
+
+
+def requirement_bars(rows: Iterable[Record]) -> Drawing | None:
+    """What is required against what is reached, each over its requirement, with 95 % intervals.
+
+    Args: `rows`: `label`, `required`, `reached`, `low` and `high` (ends of what is reached), `at_least`
+    (whether more is better) and `verdict` of each; a bar beyond the axis ends in its number.
+    Returns: The figure; None without rows.
+    """
+    kept = [row for row in rows if row["required"] and row["reached"] is not None]
+    if not kept:
+        return None
+    end = min(1.08 * max(1.0, *(row["high"] / row["required"] for row in kept)), _WIDEST)
+
+    def paint(axes: Axes) -> None:
+        for place, row in enumerate(kept):
+            _requirement_bar(axes, place, row, end)
+        axes.set_yticks([])
+        axes.spines["left"].set_visible(False)
+        axes.grid(visible=False, axis="y")
+
+    return draw(
+        "requirements",
+        paint,
+        x=("reached over required", "1"),
+        xlim=(0, end),
+        ylim=(len(kept) - 0.6, -0.95),
+        columns=0,
+        wide=True,
+        height=0.8 + 0.44 * len(kept),
+    )
+
+
+def _requirement_bar(axes: Axes, place: int, row: Record, end: float) -> None:
+    ratio, low, high = (row[key] / row["required"] for key in ("reached", "low", "high"))
+    colour = {"met": THIRD, "not met": PAPER}.get(row["verdict"], FIFTH)
+    axes.barh(place, min(ratio, end), height=0.42, color=colour, alpha=0.75, linewidth=0)
+    if high > low:
+        axes.plot([low, min(high, end)], [place, place], color=INK, linewidth=1.2)
+        caps = [each for each in (low, high) if each < end]
+        axes.plot(caps, [place] * len(caps), "|", color=INK, markersize=6)
+    axes.plot([1, 1], [place - 0.24, place + 0.24], color=INK, linewidth=1.8)
+    if high > end:
+        start = "up to " if ratio <= end else ("" if high <= ratio else f"{number(ratio, digits=2)} to ")
+        beyond = f"{start}{number(max(ratio, high), digits=2)} \u25b8"
+        axes.text(0.995 * end, place - 0.28, beyond, ha="right", va="bottom", color=INK)
+    sense = "at least" if row["at_least"] else "at most"
+    axes.text(0.0, place - 0.28, f"{row['label']} ({sense}): {row['verdict']}", va="bottom", color=INK)
 
 
 def decision(rows: Iterable[Requirement]) -> str:

@@ -11,22 +11,76 @@ from functools import cache
 from importlib.resources import files
 from typing import Final
 
+from matplotlib.axes import Axes
+
 from ringbalance.reports import summary
-from ringbalance.reports.figures.operation import tornado
-from ringbalance.reports.prose import input_name
+from ringbalance.reports.figure import (
+    FOUND,
+    INK,
+    MUTED,
+    PAPER,
+    Drawing,
+    draw,
+    nice_span,
+    panels,
+    plain_number,
+)
+from ringbalance.reports.prose import input_name, key_words
 from ringbalance.reports.section import Record, Section
 from ringbalance.results.result import Table
 from ringbalance.verification.standing import HEADS, budget_standing, standing_rows
 
 _DRAWN: Final = {"velocity": "Velocity", "usable_moment": "Usable moment", "lambda": "Lever arm λ"}
+_BARS: Final = 5
+"""Inputs that a panel of the tornado shows."""
 
 
 def _conditions(_own: Record, evidence: Record) -> Record:
     budgets = evidence["calibration"].get("budgets") or {}
+    drawn = {_DRAWN[key]: budgets[key] for key in _DRAWN if key in budgets and budgets[key]["value"]}
+    causes = {title: _causes(budget) for title, budget in drawn.items()}
     return {
         "behind": {name: budget_standing(evidence["verification"], name) for name in budgets},
-        "tornado": tornado(budgets, _DRAWN),
+        "tornado": _tornado(causes) if causes else None,
+        "largest": {title: each[0][0] for title, each in causes.items()},
     }
+
+
+def _causes(budget: Record) -> list[tuple[str, float]]:
+    """What makes a result uncertain, with its part relative to the result, the largest first."""
+    parts = {key_words(path): width for path, width in budget["inputs"].items()}
+    parts |= {"the model": budget["model"], "numerics": budget["numerical"]}
+    return sorted(((name, abs(part / budget["value"])) for name, part in parts.items()), key=lambda c: -c[1])
+
+
+def _tornado(causes: dict[str, list[tuple[str, float]]]) -> Drawing:
+    """Contribution of each input, of the model and of the numerics to the main results' uncertainties."""
+    columns = min(len(causes), 3)
+    rows = -(-len(causes) // columns)
+    side, room = 1 / columns, 1 / rows
+    places = [divmod(place, columns) for place in range(len(causes))]
+
+    def paint(axes: Axes) -> None:
+        boxes = [((j + 0.47) * side, 1 - (i + 0.86) * room, 0.47 * side, 0.68 * room) for i, j in places]
+        for bars, (title, parts) in zip(panels(axes, *boxes), causes.items(), strict=True):
+            _panel(bars, title, parts[:_BARS])
+
+    return draw("tornado", paint, columns=0, wide=True, height=0.35 + rows * (0.55 + 0.2 * (_BARS + 2)))
+
+
+def _panel(bars: Axes, title: str, causes: list[tuple[str, float]]) -> None:
+    for place, (name, share) in enumerate(causes):
+        colour = {"the model": PAPER, "numerics": MUTED}.get(name, FOUND)
+        bars.barh(place, 200 * share, left=-100 * share, height=0.62, color=colour, linewidth=0)
+    limit = 115 * max(causes[0][1], 1e-9)
+    bars.set(ylim=(len(causes) - 0.4, -0.6), xlim=(-limit, limit))
+    bars.set_yticks(range(len(causes)), [name for name, _ in causes])
+    bars.tick_params(axis="y", length=0)
+    ticks = nice_span(limit)[:: len(nice_span(limit)) // 2]
+    bars.set_xticks(ticks, [f"{plain_number(tick)} %" for tick in ticks])
+    bars.set_title(title, loc="left", x=-0.9, fontsize="medium", weight="bold", color=INK)
+    bars.grid(visible=False, axis="y")
+    bars.spines["left"].set_visible(False)
 
 
 CONDITIONS: Final = Section(

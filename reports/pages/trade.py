@@ -5,16 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Final
 
-import numpy as np
-from matplotlib.axes import Axes
-
-from ringbalance.reports.figures import style
-from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.figure import FOUND, PAPER, Drawing, curve, draw, level, logarithmic
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.results.numbers import MISSING, number, percent
 from ringbalance.results.result import Table
 from ringbalance.scene.models import Scene
-from ringbalance.verification.trade import TradeStudy, trade_study
+from ringbalance.verification.trade import TradeStudy, error_text, models_table, trade_study
 
 _LEAST: Final = 1e-12
 """Error at which a model that equals the finest is drawn."""
@@ -22,7 +17,7 @@ _LEAST: Final = 1e-12
 
 def _collect(work: Work) -> Record | None:
     """The trade of the scene, light: without meshes in three dimensions."""
-    return _study(work.scene).document()
+    return _study(work.scene).to_dict()
 
 
 @lru_cache(maxsize=4)
@@ -33,7 +28,7 @@ def _study(scene: Scene) -> TradeStudy:
 
 def _view(trade: Record, evidence: Record) -> Record:
     times = evidence["times"].get("trade") or {}
-    terms = [(row["term"], row["group"], _error(row["estimated_contribution"])) for row in trade["terms"]]
+    terms = [(row["term"], row["group"], error_text(row["estimated_contribution"])) for row in trade["terms"]]
     quantities = [quantity for quantity in trade["quantities"] if quantity["models"]]
     return {
         "terms": Table(
@@ -41,64 +36,37 @@ def _view(trade: Record, evidence: Record) -> Record:
             heads=("Term", "Group", "Estimated contribution"),
             rows=terms,
         ),
-        "quantities": [_quantity(each, times.get(each["quantity"], [])) for each in quantities],
+        "quantities": [_quantity(each, times) for each in quantities],
     }
 
 
-def _quantity(quantity: Record, times: list[Record]) -> Record:
-    speed = {entry["model"]: entry["designs_per_second"] for entry in times}
-    models, known = quantity["models"], quantity["uncertainty"]
+def _quantity(quantity: Record, times: Record) -> Record:
+    table = models_table(quantity, times)
+    speed = {each["model"]: each["designs_per_second"] for each in times.get(quantity["quantity"], ())}
     title = quantity["title"][0].upper() + quantity["title"][1:]
-    rows = [
-        (
-            model["model"],
-            MISSING if model is models[-1] else _error(model["error"]),
-            number(speed[model["model"]], digits=2) if model["model"] in speed else MISSING,
-        )
-        for model in models
-    ]
     return {
         "title": title,
-        "status": "" if quantity["status"]["code"] == "ok" else quantity["status"]["text"],
-        "models": Table(
-            caption=f"{title}. The last model is the finest, known to {_error(known)}.",
-            heads=("Model", "Error", "Designs a second"),
-            rows=rows,
-            style="",
-        ),
-        "figure": _figure(quantity, speed, title),
+        "status": table.note,
+        "models": table,
+        "figure": _figure(quantity, speed),
     }
 
 
-def _error(value: float | None) -> str:
-    if value is None:
-        return MISSING
-    return percent(value, digits=2) if value >= 1e-3 else number(value, digits=2)
-
-
-def _figure(quantity: Record, speed: Record, title: str) -> Drawing:
+def _figure(quantity: Record, speed: Record) -> Drawing:
     """Error against designs a second of every model that was timed."""
     models = [model for model in quantity["models"] if model["model"] in speed]
-    rates = np.array([speed[model["model"]] for model in models])
-    errors = np.array([max(model["error"], _LEAST) for model in models])
-    known = quantity["uncertainty"]
-
-    def paint(axes: Axes) -> None:
-        axes.plot(rates, errors, "o", color=style.FOUND, markersize=5, label="models")
-        axes.axhline(max(known, _LEAST), color=style.PAPER, linewidth=1, linestyle=":", label="known to")
-        style.logarithmic(axes, "x")
-        style.logarithmic(axes, "y")
-
+    rates = [speed[model["model"]] for model in models]
+    errors = [max(model["error"], _LEAST) for model in models]
     return draw(
+        f"trade-{quantity['quantity'].replace('_', '-')}",
+        curve(rates, errors, "models", color=FOUND, linestyle="", marker="o", markersize=5),
+        level(max(quantity["uncertainty"], _LEAST), "known to", color=PAPER, linewidth=1, linestyle=":"),
+        logarithmic("x"),
+        logarithmic("y"),
+        x=("designs a second", "1"),
+        y=("error against the finest", "1"),
         columns=4,
-        x="designs a second",
-        y="error against the finest",
-        name=f"trade-{quantity['quantity'].replace('_', '-')}",
-        paint=paint,
         height=2.9,
-        alt=f"Error of {len(models)} models for {quantity['title']} against the designs that each answers in "
-        "a second.",
-        caption=f"{title}. The finest model is drawn at 10⁻¹²; dotted: what it is itself known to.",
     )
 
 

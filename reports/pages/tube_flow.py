@@ -12,8 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from matplotlib.tri import Triangulation
 
 from ringbalance.physics.tube.loss import FlowState, tube_loss
-from ringbalance.reports.figures import style
-from ringbalance.reports.figures.style import Drawing, draw
+from ringbalance.reports.figure import INK, MAP, MUTED, NARROW, Drawing, draw, figure_of, plain_number
 from ringbalance.reports.pages.cases import anchor, case_view
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.arrays import FloatArray
@@ -47,32 +46,30 @@ def _triangulation(record: Record, *, order: tuple[int, int] = (0, 1), sign: flo
 
 def _place(axes: Axes, width: float, height: float) -> None:
     """Gives the axes equal scales in the room below the colour bar."""
-    total = style.figure_of(axes).get_figheight()
-    room, tall = style.NARROW - _LEFT - 0.1, total - _BOTTOM - _TOP
+    total = figure_of(axes).get_figheight()
+    room, tall = NARROW - _LEFT - 0.1, total - _BOTTOM - _TOP
     scale = min(room / width, tall / height)
-    axes.set_position(
-        (_LEFT / style.NARROW, _BOTTOM / total, scale * width / style.NARROW, scale * height / total)
-    )
+    axes.set_position((_LEFT / NARROW, _BOTTOM / total, scale * width / NARROW, scale * height / total))
     axes.grid(visible=False)
 
 
 def _colour_bar(axes: Axes, levels: FloatArray, title: str) -> None:
-    figure = style.figure_of(axes)
+    figure = figure_of(axes)
     total = figure.get_figheight()
-    bar = figure.add_axes((_LEFT / style.NARROW, 1 - 0.3 / total, 0.46, _BAR / total))
+    bar = figure.add_axes((_LEFT / NARROW, 1 - 0.3 / total, 0.46, _BAR / total))
     width = levels[1] - levels[0]
-    for low, shade in zip(levels, style.MAP, strict=False):
+    for low, shade in zip(levels, MAP, strict=False):
         bar.add_patch(Rectangle((low, 0), width, 1, color=shade, linewidth=0))
     bar.set_xlim(levels[0], levels[-1])
     bar.set_ylim(0, 1)
     bar.set_yticks([])
     bar.set_xticks(levels[::4])
-    bar.xaxis.set_major_formatter(FuncFormatter(style.plain_number))
+    bar.xaxis.set_major_formatter(FuncFormatter(plain_number))
     bar.tick_params(length=2, pad=1.5)
     bar.grid(visible=False)
     for spine in bar.spines.values():
         spine.set_visible(False)
-    figure.text(_LEFT / style.NARROW + 0.49, 1 - 0.25 / total, title, va="center", color=style.INK)
+    figure.text(_LEFT / NARROW + 0.49, 1 - 0.25 / total, title, va="center", color=INK)
 
 
 def _levels(values: FloatArray) -> FloatArray:
@@ -93,34 +90,26 @@ def _section_figure(record: Record) -> Drawing:
 
     def paint(axes: Axes) -> None:
         levels = _levels(field)
-        axes.tricontourf(mesh, np.clip(field, 0, levels[-1]), levels=levels, colors=list(style.MAP))
+        axes.tricontourf(mesh, np.clip(field, 0, levels[-1]), levels=levels, colors=list(MAP))
         top = float(np.abs(psi).max())
         if top > 0:
             rising = sorted([-s * top for s in _SHARES] + [s * top for s in _SHARES])
-            axes.tricontour(mesh, psi, levels=rising, colors=[style.INK], linewidths=0.8, linestyles=["-"])
+            axes.tricontour(mesh, psi, levels=rising, colors=[INK], linewidths=0.8, linestyles=["-"])
             way = float(np.sign(drift[0, np.argmin(np.hypot(*_unpacked(record, "points").reshape(2, -1)))]))
             axes.annotate(
                 "",
                 (0, 0.17 * way),
                 xytext=(0, -0.17 * way),
-                arrowprops={"arrowstyle": "->", "color": style.INK, "linewidth": 1.4},
+                arrowprops={"arrowstyle": "->", "color": INK, "linewidth": 1.4},
             )
-        axes.add_patch(Circle((0, 0), 0.5, fill=False, color=style.MUTED, linewidth=1.4))
+        axes.add_patch(Circle((0, 0), 0.5, fill=False, color=MUTED, linewidth=1.4))
         axes.set_xlim(-0.53, 0.53)
         axes.set_ylim(-0.53, 0.53)
         _place(axes, 1.0, 1.0)
         _colour_bar(axes, levels, "axial, over the mean")
 
-    return draw(
-        x="z/d, along the axis of rotation",
-        y="y/d",
-        name="flow-section",
-        columns=0,
-        paint=paint,
-        height=4.6,
-        alt="Section of the turning tube: two mirrored vortices across the axial flow, whose peak they move "
-        "towards one wall.",
-    )
+    along, across = ("z/d, along the axis of rotation", "1"), ("y/d", "1")
+    return draw("flow-section", paint, x=along, y=across, columns=0, height=4.6)
 
 
 def _end_figure(record: Record, end: str) -> Drawing:
@@ -137,29 +126,20 @@ def _end_figure(record: Record, end: str) -> Drawing:
         lines = _FLOW_THROUGH * (np.arange(1, _LINES) / _LINES) ** 2
         for sign in (1.0, -1.0):
             mesh = _triangulation(record, sign=sign)
-            axes.tricontourf(mesh, np.clip(field, 0, levels[-1]), levels=levels, colors=list(style.MAP))
-            axes.tricontour(mesh, psi, levels=lines, colors=[style.INK], linewidths=0.7, linestyles=["-"])
+            axes.tricontourf(mesh, np.clip(field, 0, levels[-1]), levels=levels, colors=list(MAP))
+            axes.tricontour(mesh, psi, levels=lines, colors=[INK], linewidths=0.7, linestyles=["-"])
             corner = (inner[0], 0.5 if sign > 0 else -reach)
             axes.add_patch(
-                Rectangle(corner, inner[1] - inner[0], reach - 0.5, color=style.MUTED, alpha=0.3, linewidth=0)
+                Rectangle(corner, inner[1] - inner[0], reach - 0.5, color=MUTED, alpha=0.3, linewidth=0)
             )
         axes.set_xlim(left, right)
         axes.set_ylim(-reach, reach)
         _place(axes, right - left, 2 * reach)
         _colour_bar(axes, levels, "speed over the mean")
 
-    what = {
-        "entrance": "Streamlines converge from all sides at the sharp edge",
-        "exit": "The stream leaves as a jet that takes its kinetic energy along",
-    }[end]
+    height = _BOTTOM + _TOP + (NARROW - _LEFT - 0.1) * 2 * reach / (right - left)
     return draw(
-        x="x/d, along the flow",
-        y="r/d",
-        name=f"flow-{end}",
-        columns=0,
-        paint=paint,
-        height=_BOTTOM + _TOP + (style.NARROW - _LEFT - 0.1) * 2 * reach / (right - left),
-        alt=f"Laminar flow at the tube’s {end}: speed and streamlines. {what}.",
+        f"flow-{end}", paint, x=("x/d, along the flow", "1"), y=("r/d", "1"), columns=0, height=height
     )
 
 
@@ -184,7 +164,7 @@ def _collect(work: Work) -> Record | None:
     }
 
 
-def packed(values: npt.ArrayLike) -> str:
+def _packed(values: npt.ArrayLike) -> str:
     """Numbers as one line of text: a field of a thousand nodes is nothing to read number by number.
 
     Args: `values`: any shape; written flat.
@@ -199,21 +179,21 @@ def _section_record(flow: SectionFlow) -> Record:
         "friction_ratio": flow.friction_ratio,
         "friction_change": flow.friction_ratio - 1,
         "largest_drift": float(np.hypot(*flow.velocity).max()),
-        "points": packed(flow.points),
+        "points": _packed(flow.points),
         "triangles": " ".join(str(node) for node in flow.triangles.ravel()),
-        "colour": packed(flow.axial_velocity),
-        "stream_function": packed(flow.stream_function),
-        "velocity": packed(flow.velocity),
+        "colour": _packed(flow.axial_velocity),
+        "stream_function": _packed(flow.stream_function),
+        "velocity": _packed(flow.velocity),
     }
 
 
 def _end_record(flow: EndFlow) -> Record:
     return {
         "reynolds": flow.reynolds,
-        "points": packed(flow.points),
+        "points": _packed(flow.points),
         "triangles": " ".join(str(node) for node in flow.triangles.ravel()),
-        "colour": packed(flow.speed),
-        "stream_function": packed(flow.stream_function),
+        "colour": _packed(flow.speed),
+        "stream_function": _packed(flow.stream_function),
     }
 
 
@@ -222,11 +202,11 @@ def _view(found: Record, evidence: Record) -> Record:
     return {
         "section": _section_figure(found["section"]),
         **ends,
-        "check": three_dimensional_check(evidence),
+        "check": _three_dimensional_check(evidence),
     }
 
 
-def three_dimensional_check(evidence: Record) -> Record | None:
+def _three_dimensional_check(evidence: Record) -> Record | None:
     """The bent tube solved in three dimensions, against the sum of the terms of k: run when, on what, how.
 
     Returns: Verdict, texts and the place of the case on the page; None where there is no such case.

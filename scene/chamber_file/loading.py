@@ -19,20 +19,18 @@ import numpy as np
 
 from ringbalance.scene.arrays import IntArray
 from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
-from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.contents import Contents, MeshFileError
+from ringbalance.scene.chamber_file.contents import Body, Contents, MeshFileError
 from ringbalance.scene.chamber_file.elements import dimension
 from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, Placed, placed, port_radius, unfitting
 from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
-from ringbalance.scene.chamber_file.keys import MeshKeys
 from ringbalance.scene.chamber_file.names import boundaries_of
-from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.chamber_file.record import ChamberGeometry, MeshKeys
 from ringbalance.scene.chamber_file.topology import Facets, oriented
 from ringbalance.scene.chamber_file.vtu_file import read_vtu
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.reading import Reading
-from ringbalance.scene.rules.check import Finding
+from ringbalance.scene.kinds import Finding
 from ringbalance.scene.uncertain import SHAPE
 from ringbalance.scene.units import DIMENSIONS
 

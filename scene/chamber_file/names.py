@@ -9,13 +9,13 @@ from typing import Final
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, IntArray
-from ringbalance.scene.chamber_file.assembly import Body
-from ringbalance.scene.chamber_file.contents import Elements
+from ringbalance.scene.chamber_file.contents import Body, Elements
 from ringbalance.scene.chamber_file.elements import CORNERS, key_of
 from ringbalance.scene.chamber_file.record import OUTER_WALL
 from ringbalance.scene.chamber_file.topology import Facets
-from ringbalance.scene.faults import closest, did_you_mean, toml_text
-from ringbalance.scene.rules.check import Finding
+from ringbalance.scene.faults import closest, did_you_mean
+from ringbalance.scene.kinds import Finding
+from ringbalance.scene.toml import toml_text
 
 PORT: Final = "port"
 WALLS: Final = "walls"

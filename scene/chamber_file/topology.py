@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.chamber_file.assembly import Body
+from ringbalance.scene.chamber_file.contents import Body
 from ringbalance.scene.chamber_file.elements import (
     CORNERS,
     between,
@@ -25,7 +25,7 @@ from ringbalance.scene.chamber_file.elements import (
     shape_gradients,
     sides_of,
 )
-from ringbalance.scene.rules.check import Finding
+from ringbalance.scene.kinds import Finding
 
 _SAME: Final = 1e-7
 """Distance, as a share of the body, below which two nodes are meant to be one."""

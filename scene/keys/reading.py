@@ -5,16 +5,15 @@ What a file leaves out follows from its other values where a default says so, or
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Any, Literal
 
-from ringbalance.scene.faults import MISSING, Fault, closest, did_you_mean, toml_key, toml_text
+from ringbalance.scene.faults import MISSING, Fault, closest, did_you_mean
 from ringbalance.scene.keys.declaration import Entries, Key
-from ringbalance.scene.keys.derivations import shortest_path
-from ringbalance.scene.keys.schema import LIQUID_RING, Place, Schema
+from ringbalance.scene.keys.schema import Place, Schema
+from ringbalance.scene.toml import toml_key, toml_text
 from ringbalance.scene.units import FieldError
 
 _MOST_GUESSED = 100
@@ -82,6 +81,10 @@ class Reading:
         value = toml_text(self._table(table)[key]) if self.given(path) else self._default_text(path)
         return Fault(file=self.file, table=table, key=key, value=value, problem=problem, allowed=allowed)
 
+    def missing(self, path: str, problem: str = "every scene needs it") -> Fault:
+        """An error about a value that is not there."""
+        return self.fault(path, problem=problem, allowed=self.allowed(path))
+
     def _table(self, table: str) -> Mapping[str, Any]:
         content = self.document.get(table, {}) if table else self.document
         return content if isinstance(content, Mapping) else {}
@@ -103,7 +106,7 @@ class Reading:
                 if needs and known.lacks(path) and known.known(*needs):
                     result = declared.presence.value(*(known.values[need] for need in needs))
                     known = known.adding({} if result is None else {path: result})
-        return known.adding(_shortest_length(known)) if self.schema is LIQUID_RING else known
+        return known
 
     def missing_faults(self) -> Iterator[Fault]:
         """One error for each missing key, defaults included; one for a whole table that is missing."""
@@ -113,7 +116,7 @@ class Reading:
                 continue
             if self.given(name):
                 paths = (f"{name}.{key}" for key in keys)
-                yield from (_missing(self, path) for path in paths if self.lacks(path))
+                yield from (self.missing(path) for path in paths if self.lacks(path))
             elif name not in self.broken:
                 inside = ", ".join(keys) or "name and temperature, or density and kinematic_viscosity"
                 yield Fault(
@@ -123,8 +126,6 @@ class Reading:
                     problem="every scene needs this table",
                     allowed=f"a table with {inside}",
                 )
-        if self.schema is LIQUID_RING:
-            yield from _needed_by_others(self)
 
 
 def read_document(
@@ -297,31 +298,3 @@ def _meant(rejected: _Rejected, schema: Schema) -> str:
             return f"{home}.{word}"
     near = closest(word, schema.names_at(place[:-1]))
     return ".".join([*map(str, place[:-1]), near]) if near else ""
-
-
-def _shortest_length(reading: Reading) -> Mapping[str, float]:
-    """With a given k the length matters for the liquid's inertia only: that of the shortest tube is used."""
-    hump_settled = reading.known("tube.hump_radius") or reading.lacks("tube.hump_radius")
-    settled = reading.known("tube.drag_coefficient", "tube.port_radius") and hump_settled
-    if not settled or not reading.lacks("tube.length"):
-        return {}
-    port_radius, hump_radius = reading.values["tube.port_radius"], reading.values.get("tube.hump_radius")
-    if hump_radius is not None and hump_radius >= port_radius:
-        return {}
-    length = shortest_path(port_radius=port_radius, hump_radius=hump_radius, separation=math.pi)
-    return {"tube.length": length}
-
-
-def _missing(reading: Reading, path: str, problem: str = "every scene needs it") -> Fault:
-    return reading.fault(path, problem=problem, allowed=reading.allowed(path))
-
-
-def _needed_by_others(reading: Reading) -> Iterator[Fault]:
-    if reading.given("tube") and reading.lacks("tube.length") and reading.lacks("tube.drag_coefficient"):
-        yield _missing(reading, "tube.length", "k cannot be calculated without it")
-    if reading.values.get("tube.entrance") == "rounded" and reading.lacks("tube.entrance_radius"):
-        yield _missing(reading, "tube.entrance_radius", "a rounded entrance needs its radius")
-    pair = ("gas.conductance", "gas.critical_ratio")
-    for present, absent in (pair, pair[::-1]):
-        if reading.known(present) and reading.lacks(absent):
-            yield _missing(reading, absent, f"{present.split('.')[1]} has no meaning without it")

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ringbalance.scene import loop_models, models
-from ringbalance.scene.chamber_file.keys import MeshKeys
+from ringbalance.scene.chamber_file.record import MeshKeys
 from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, one_of, share, text

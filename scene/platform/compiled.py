@@ -25,8 +25,10 @@ from types import FrameType
 from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
+import numpy as np
 from numba.core import registry, sigutils, types
 from numba.core.compiler_lock import global_compiler_lock
+from numba.extending import overload, register_jitable
 
 from ringbalance.scene.platform.kept_code import KeptCode
 
@@ -71,6 +73,24 @@ def in_place(function: Callable[P, R]) -> Callable[P, R]:
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """As `in_place`, within each compiled function that calls it: what that does not use costs nothing."""
     return _dispatcher(function, _nrt=False, forceinline=True)
+
+
+def both_ways(function: Callable[P, R]) -> Callable[P, R]:
+    """A plain function for numbers and arrays, which compiled code may call with numbers."""
+    registered: Callable[P, R] = register_jitable(error_model="numpy", _nrt=False, forceinline=True)(function)
+    return registered
+
+
+def chosen(condition: Any, first: Any, second: Any) -> Any:
+    """The first where a condition holds, elsewhere the second; in compiled code of numbers."""
+    return np.where(condition, first, second)
+
+
+def _chosen_number(condition, first, second):  # type: ignore[no-untyped-def]  # noqa: ARG001
+    return lambda condition, first, second: first if condition else second
+
+
+overload(chosen)(_chosen_number)
 
 
 def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
@@ -183,7 +203,7 @@ def _digest() -> str:
     return total.hexdigest()[:16]
 
 
-_COMPILED: Final = ("controller", "reduced_model/injection")
+_COMPILED: Final = ("controller", "reduced_model")
 """Folders whose functions are compiled, from the package's root."""
 
 

@@ -9,12 +9,12 @@ from typing import Any, Final, get_args
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.faults import Fault, closest, toml_text
-from ringbalance.scene.fitted import MODEL, NO_UNIT, FittedQuantity
+from ringbalance.scene.faults import Fault, closest
+from ringbalance.scene.fitted import ERROR_NAME, MODEL, NO_UNIT, ErrorCause, FittedQuantity
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.keys.schema import LIQUID_RING
-from ringbalance.scene.model_errors import ERROR_NAME, ErrorCause
+from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import DIMENSIONS
 
 _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[[01]\])?")

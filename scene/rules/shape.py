@@ -10,8 +10,8 @@ import math
 
 from ringbalance.scene.keys.derivations import even_number_of_chambers, shortest_path, swept_area
 from ringbalance.scene.keys.reading import Reading
+from ringbalance.scene.kinds import Check, Finding, check, written
 from ringbalance.scene.models import Bend
-from ringbalance.scene.rules.check import Check, Finding, check, written
 
 _ROUNDING = 1e-9
 _NARROWEST = 1 / 2000

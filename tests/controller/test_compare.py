@@ -12,7 +12,7 @@ import pytest
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Balancer, CommonRotor, balancer_of, takes
 from ringbalance.controller.compare import compare
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene

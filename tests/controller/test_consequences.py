@@ -16,7 +16,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
-from ringbalance.reports.studies.consequences import Consequences, LoopGain, find_consequences, loop_gain
+from ringbalance.reports.pages.consequences import Consequences, LoopGain, find_consequences, loop_gain
 from ringbalance.scene.models import Scene
 
 TRUE_K = 3.5

@@ -21,6 +21,7 @@ from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage,
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
+from ringbalance.reduced_model.tube.regime import TubePath
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -33,9 +34,9 @@ PIPED = {"conductance": 1e-8, "critical_ratio": 0.3}
 
 def blocked(dynamics: Dynamics) -> Dynamics:
     """The same with a crest that no gas lifts liquid over."""
-    crest = dynamics.column.crest
-    assert crest is not None
-    return replace(dynamics, column=replace(dynamics.column, crest=replace(crest, column_pressure=1e9)))
+    path = dynamics.column.path
+    assert path is not None
+    return replace(dynamics, column=replace(dynamics.column, path=replace(path, hump_pressure=1e9)))
 
 
 # --- the column ---
@@ -150,7 +151,16 @@ def test_a_column_without_drive_slows_down_by_its_loss(
     # du/dt = -(k + 1) u^2/(2 L): u = u0/(1 + t/tau), so the distance grows like a logarithm.
     assert isinstance(model.flow, PaperLaw)
     level = replace(model, flow=replace(model.flow, angular_velocity=1e-6))
-    coasting = replace(plant(level, "tube inertia").column, one_way=False, port_pressure=-1.0, gas_off=-1.0)
+    path = TubePath(
+        density=1e3,
+        port_pressure=-1.0,
+        hump_pressure=None,
+        trapped=False,
+        vapour_pressure=0.0,
+        released=0.0,
+        froude_velocity=0.0,
+    )
+    coasting = replace(plant(level, "tube inertia").column, one_way=False, path=path, gas_off=-1.0)
     dynamics = replace(plant(level, "tube inertia"), column=coasting)
     t = np.array([1e-3, 10e-3, 0.1])
     found = pulse(dynamics, 0.0, t, motion=Motion(velocity=5.0))

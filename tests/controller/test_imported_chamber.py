@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from block_discs import imported, turned
 
 from ringbalance.controller.ensemble import simulate_members
 from ringbalance.controller.loop import simulate
@@ -18,7 +19,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, MomentCurve
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.block_chambers import disc_chamber, imported, turned
+from ringbalance.verification.reference.block_chambers import disc_chamber
 
 ANGLE = 0.35
 

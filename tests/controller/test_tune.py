@@ -21,7 +21,7 @@ from ringbalance.controller.eccentric_mass.scene_records import (
     eccentric_drawn,
     eccentric_scene,
 )
-from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.tuning import FIRST_RUNS, _eccentric_settling, tune_eccentric
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates

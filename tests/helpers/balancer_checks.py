@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.balancer import AS_GIVEN, Balancer, Draws, Outcomes, balancer_of
+from ringbalance.results.requirements import MET, MISSED, OPEN
 from ringbalance.scene import SceneError
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.units import DIMENSIONS
@@ -78,13 +79,14 @@ def a_time_is_finite_where_it_settled(balancer: Balancer) -> None:
 def a_run_answers_what_its_row_says(balancer: Balancer) -> None:
     """Trace, document and history are those of one run, which is a sample with its trace kept."""
     found = balancer.run({}, AS_GIVEN, trace=True)
-    ((run, energy, worst),) = found.runs
+    (traced,) = found.traced
+    run = traced.run
     document = run.to_dict()
     assert document["balancer"] == balancer.scene.balancer
     assert document["settled"] == run.settled == bool(found.settled[0])
     assert document["status"] == run.status != ""
-    assert energy >= 0
-    assert worst >= found.final_amplitude[0] * (1 - 1e-9)
+    assert traced.energy >= 0
+    assert traced.worst_amplitude >= found.final_amplitude[0] * (1 - 1e-9)
     columns = balancer.history(run)
     assert len({len(column) for column in columns.values()}) == 1
     assert "time_s" in columns
@@ -94,6 +96,20 @@ def a_row_does_not_depend_on_the_trace(balancer: Balancer) -> None:
     plain, traced = (balancer.run({}, Draws.first(2, devices=False), trace=kept) for kept in (False, True))
     np.testing.assert_array_equal(plain.settled, traced.settled)
     np.testing.assert_allclose(plain.settling_time, traced.settling_time, rtol=1e-4)
+
+
+def only_asked_for_runs_are_kept(balancer: Balancer) -> None:
+    assert balancer.run({}, Draws.first(1, devices=False)).traced == ()
+
+
+def its_requirements_are_judged_by_its_reach_and_its_run(balancer: Balancer) -> None:
+    moment, *_ = requirements = {each.quantity: each for each in balancer.requirements()}.values()
+    reach = next(each for each in balancer.quantities() if each.key == "reach")
+    assert moment.achieved == pytest.approx(reach.value)
+    assert {each.verdict for each in requirements} <= {MET, MISSED, OPEN}
+    (settled,) = balancer.run({}, AS_GIVEN).settled
+    settling = next(each for each in requirements if each.quantity == "settling time")
+    assert (settling.achieved is not None) == settled
 
 
 def its_own_rotor_is_the_common_one(balancer: Balancer) -> None:
@@ -143,6 +159,8 @@ CHECKS: tuple[Check, ...] = (
     a_time_is_finite_where_it_settled,
     a_run_answers_what_its_row_says,
     a_row_does_not_depend_on_the_trace,
+    only_asked_for_runs_are_kept,
+    its_requirements_are_judged_by_its_reach_and_its_run,
     its_own_rotor_is_the_common_one,
     a_span_is_what_was_asked_for,
     it_survives_a_pickle,

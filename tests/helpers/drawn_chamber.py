@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
+from block_discs import sector_chamber
 
 from ringbalance.scene import AnyScene, bundled_scene, load_scene
 from ringbalance.scene.chamber_file.elements import (
@@ -17,7 +18,6 @@ from ringbalance.scene.chamber_file.elements import (
     dimension,
 )
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
-from ringbalance.verification.reference.block_chambers import sector_chamber
 
 GMSH_NUMBERS = {name: number for number, name in GMSH_KINDS.items()}
 DIVISIONS = (2, 3, 2)

@@ -20,7 +20,7 @@ from ringbalance.physics.tube.loss import (
     development_uncertainty,
 )
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
-from ringbalance.verification.cases.developing_flow.case import slowest_decay
+from ringbalance.verification.cases.sections import slowest_decay
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,

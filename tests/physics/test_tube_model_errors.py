@@ -9,7 +9,7 @@ import pytest
 
 from ringbalance.physics.tube.loss import MODEL_CAUSES, model_parts, with_errors
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.scene.model_errors import ModelError
+from ringbalance.scene.fitted import ModelError
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.scene.uncertain import NORMAL_95
 

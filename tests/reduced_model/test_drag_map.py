@@ -12,7 +12,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.reports.studies.drag_map import DragMap, LiquidVerdicts
+from ringbalance.reports.pages.drag_map import DragMap, LiquidVerdicts
 from ringbalance.scene.liquids import liquid_at
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty

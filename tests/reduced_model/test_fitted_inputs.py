@@ -15,8 +15,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, nominal_
 from ringbalance.reduced_model.law.files import load_law
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.fitted import Fitted, FittedQuantity
-from ringbalance.scene.model_errors import ModelError
+from ringbalance.scene.fitted import Fitted, FittedQuantity, ModelError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95, with_value
 

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from ringbalance.reduced_model.tables import (
     HermiteTable,
     level_table,
-    refined_table,
     table_from_samples,
 )
 
@@ -48,14 +47,6 @@ def test_beyond_its_ends_the_table_goes_on_straight() -> None:
     for end, out in ((0.0, -0.7), (1.0, 1.9)):
         y, slope = table.with_slope(end)
         assert float(table(out)) == pytest.approx(float(y + (out - end) * slope), rel=1e-13)
-
-
-def test_refinement_stops_at_its_tolerance() -> None:
-    table, error = refined_table(function=np.cos, start=0.0, stop=6.0, tolerance=1e-9, first=9)
-    assert error <= 1e-9
-    coarse, worse = refined_table(function=np.cos, start=0.0, stop=6.0, tolerance=1e-9, first=9, last=17)
-    assert worse > 1e-9
-    assert coarse.value.size == 17 < table.value.size
 
 
 def test_nothing_outside_can_change_a_table() -> None:

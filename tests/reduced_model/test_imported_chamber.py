@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from block_discs import imported, turned
 
 from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
 from ringbalance.reduced_model.calibration import calibrate
@@ -19,7 +20,6 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.calibrated_law import nominal_law
 from ringbalance.reduced_model.law.files import load_law
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.block_chambers import imported, turned
 
 FILLS = np.array([0.1, 0.25, 0.5])
 

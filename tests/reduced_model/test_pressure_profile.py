@@ -17,7 +17,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrat
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.reports.studies.drag_map import ApparentDrag
+from ringbalance.reports.pages.drag_map import ApparentDrag
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 

@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from block_discs import imported
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,7 +17,6 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene import loop_models, models
-from ringbalance.verification.reference.block_chambers import imported
 
 
 def by_grid(

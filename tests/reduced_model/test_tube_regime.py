@@ -3,58 +3,70 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from ringbalance.physics.pressure.hydrostatics import column_radius, hydrostatic_pressure
+from ringbalance.reduced_model.injection.dynamics import PLANT
 from ringbalance.reduced_model.tube.regime import (
     ColumnFlow,
-    SiphonCrest,
-    Truth,
     TubeEnds,
     TubePath,
+    back_pressure,
     can_flow,
+    cavity_pressure,
+    cleared,
     column_flow,
+    covered,
+    crest_margins,
+    discharges_openly,
+    driving_pressure,
+    holds_at_rest,
+    priming_pressure,
+    stall_pressure,
 )
+from ringbalance.scene.platform.compiled import compiled
 
-ENDS = TubeEnds(
-    upstream_gas=5.0,
-    downstream_gas=1.0,
-    upstream_hydrostatic=7.0,
-    downstream_hydrostatic=3.0,
+ENDS = TubeEnds(upstream_gas=5.0, downstream_gas=1.0, upstream_hydrostatic=7.0, downstream_hydrostatic=3.0)
+PATH = TubePath(
+    density=1e3,
     port_pressure=2.0,
+    hump_pressure=9.0,
+    trapped=False,
+    vapour_pressure=-1.0,
+    released=0.0,
+    froude_velocity=0.0,
 )
-CREST = SiphonCrest(column_pressure=9.0, vapour_pressure=-1.0, trapped=False)
+TRAPPED, LEVEL = replace(PATH, trapped=True), replace(PATH, hump_pressure=None)
+SHALLOW = ENDS._replace(downstream_hydrostatic=1.5)
 
 
-def root(pressure: float, where: Truth) -> float:
-    return math.sqrt(pressure) if where else 0.0
+def root(pressure: Any, where: Any) -> Any:
+    return np.where(where, np.sqrt(np.where(where, pressure, 0.0)), 0.0)
 
 
-def flow_of(ends: TubeEnds[float], *, crest: SiphonCrest[float] | None, primed: bool) -> ColumnFlow[float]:
-    return column_flow(ends=ends, crest=crest, primed=primed, siphon=root, separation=root)
+def flow_of(path: TubePath, ends: TubeEnds, *, primed: Any) -> ColumnFlow[Any]:
+    return column_flow(path, ends, primed=primed, siphon=root, separation=root)
 
 
 def test_pressures_at_the_ends() -> None:
-    assert ENDS.back_pressure() == 3.0
-    assert ENDS.driving_pressure() == 5 - 1 + 7 - 3
-    assert ENDS.stall_pressure() == 3 - 7
-    assert ENDS.reversed().driving_pressure() == 1 - 5 + 3 - 7
-    shallow = replace(ENDS, downstream_hydrostatic=1.5)
-    assert (shallow.back_pressure(), shallow.downstream_open()) == (2.0, True)
-    assert not replace(ENDS, upstream_hydrostatic=1.5).upstream_covered()
+    assert driving_pressure(PATH, ENDS) == 5 - 1 + 7 - 3
+    assert stall_pressure(PATH, ENDS) == 3 - 7
+    assert driving_pressure(PATH, ENDS.reversed()) == 1 - 5 + 3 - 7
+    assert (back_pressure(PATH, SHALLOW), bool(discharges_openly(PATH, SHALLOW))) == (2.0, True)
+    assert not covered(PATH, ENDS._replace(upstream_hydrostatic=1.5))
 
 
 def test_pressures_at_the_crest() -> None:
-    assert CREST.separation_margin(ENDS) == 5 + 1 + 7 - 9
-    assert CREST.priming_pressure(ENDS) == 9 - 7
-    assert replace(CREST, trapped=True).priming_pressure(ENDS) == 9 - 7 + (3 - 2)
+    assert crest_margins(PATH, ENDS) == (5 + 1 + 7 - 9, 5 - 1 + 7 - 9)
+    assert priming_pressure(PATH, ENDS) == 9 - 7
+    assert priming_pressure(TRAPPED, ENDS) == 9 - 7 + (3 - 2)
     # With the downstream port open its gas fills the cavity, and trapped gas displaces nothing.
-    shallow = replace(ENDS, downstream_hydrostatic=1.5)
-    assert CREST.cavity_pressure(shallow) == 1.0
-    assert replace(CREST, trapped=True).priming_pressure(shallow) == 9 - 7
+    assert cavity_pressure(PATH, SHALLOW) == 1.0
+    assert priming_pressure(TRAPPED, SHALLOW) == 9 - 7
 
 
 @pytest.mark.parametrize(
@@ -71,20 +83,19 @@ def test_pressures_at_the_crest() -> None:
     ids=["separated", "siphon", "back pressure", "unprimed", "primed", "column breaks", "port open"],
 )
 def test_regimes(changes: dict[str, float], primed: bool, velocity: float, separated: bool) -> None:
-    flow = flow_of(replace(ENDS, **changes), crest=CREST, primed=primed)
+    flow = flow_of(PATH, ENDS._replace(**changes), primed=primed)
     assert (flow.velocity, flow.separated) == (pytest.approx(velocity), separated)
 
 
 def test_a_column_at_exact_balance_stays() -> None:
-    balanced = replace(ENDS, downstream_hydrostatic=11.0)
-    flow = flow_of(balanced, crest=CREST, primed=True)
+    balanced = ENDS._replace(downstream_hydrostatic=11.0)
+    flow = flow_of(PATH, balanced, primed=True)
     assert (flow.velocity, flow.primed) == (0.0, True)
-    assert not flow_of(balanced, crest=CREST, primed=False).primed
+    assert not flow_of(PATH, balanced, primed=False).primed
 
 
 def test_a_separated_column_over_an_open_port_is_lost() -> None:
-    shallow = replace(ENDS, downstream_hydrostatic=1.5)
-    flow = flow_of(shallow, crest=CREST, primed=True)
+    flow = flow_of(PATH, SHALLOW, primed=True)
     assert (flow.separated, flow.primed) == (True, False)
 
 
@@ -96,67 +107,50 @@ def test_a_started_tube_is_primed_once_its_flow_carries_the_gas_out(
 ) -> None:
     # Driving 5 - 1 + 7 - 10.5 = 0.5, gas margin 5 + 7 - 9 - 1 = 2: more could spill than drains, so the tube
     # is full under its gas; a Froude number of 0.71 does not carry that out, one of 1.4 does.
-    slow, crest = replace(ENDS, downstream_hydrostatic=10.5), replace(CREST, froude_velocity=froude_velocity)
-    flow = flow_of(slow, crest=crest, primed=False)
+    slow, path = ENDS._replace(downstream_hydrostatic=10.5), replace(PATH, froude_velocity=froude_velocity)
+    flow = flow_of(path, slow, primed=False)
     assert (flow.velocity, flow.separated) == (math.sqrt(0.5), False)
-    assert flow.primed is primed
-    assert flow_of(slow, crest=crest, primed=True).primed
+    assert flow.primed == primed
+    assert flow_of(path, slow, primed=True).primed
 
 
-@pytest.mark.parametrize("crest", [None, CREST, replace(CREST, trapped=True)])
-def test_arrays_agree_with_numbers(crest: SiphonCrest[float] | None) -> None:
+@compiled
+def conditions(path: Any, ends: tuple[float, float, float, float], primed: bool) -> tuple[Any, ...]:
+    flows, margins = can_flow(path, ends, primed), crest_margins(path, ends)
+    return (
+        flows,
+        holds_at_rest(path, ends, primed),
+        driving_pressure(path, ends),
+        margins[0],
+        margins[1],
+        cleared(path, ends[0]),
+    )
+
+
+@pytest.mark.parametrize("path", [LEVEL, PATH, TRAPPED, replace(TRAPPED, released=0.5, froude_velocity=4.0)])
+def test_compiled_numbers_agree_with_arrays(path: TubePath) -> None:
     random = np.random.default_rng(1)
-    columns = random.uniform([0.0, 0.0, 0.0, 0.0], [9.0, 2.0, 12.0, 12.0], size=(400, 4))
-    primed = random.integers(2, size=400).astype(np.bool_)
-    many = TubeEnds(
-        upstream_gas=columns[:, 0],
-        downstream_gas=columns[:, 1],
-        upstream_hydrostatic=columns[:, 2],
-        downstream_hydrostatic=columns[:, 3],
-        port_pressure=2.0,
+    rows = random.uniform([0.0, 0.0, 0.0, 0.0], [9.0, 2.0, 12.0, 12.0], size=(200, 4))
+    rows[:50, 3] = np.maximum(rows[:50] @ [1, -1, 1, 0], 0.0)
+    primed, ends = random.integers(2, size=200).astype(np.bool_), TubeEnds(*rows.T)
+    plant = np.zeros(1, dtype=PLANT)
+    for name in ("port_pressure", "column_pressure", "vapour_pressure", "trapped", "released", "crest"):
+        plant[name] = getattr(path, name)
+    plant["froude_velocity"] = path.froude_velocity
+    at_once = np.broadcast_arrays(
+        can_flow(path, ends, primed),
+        holds_at_rest(path, ends, primed),
+        driving_pressure(path, ends),
+        *crest_margins(path, ends),
+        cleared(path, ends.upstream_gas),
     )
-
-    def roots(pressure: np.ndarray, where: Truth) -> np.ndarray:
-        return np.where(where, np.sqrt(np.where(where, pressure, 0.0)), 0.0)
-
-    at_once = column_flow(
-        ends=many,
-        crest=None
-        if crest is None
-        else SiphonCrest(**{f.name: getattr(crest, f.name) for f in fields(crest)}),
-        primed=primed,
-        siphon=roots,
-        separation=roots,
-    )
-    for i, row in enumerate(columns.tolist()):
-        one = flow_of(
-            TubeEnds(
-                upstream_gas=row[0],
-                downstream_gas=row[1],
-                upstream_hydrostatic=row[2],
-                downstream_hydrostatic=row[3],
-                port_pressure=2.0,
-            ),
-            crest=crest,
-            primed=bool(primed[i]),
-        )
-        for field in fields(ColumnFlow):
-            assert getattr(at_once, field.name)[i] == getattr(one, field.name)
+    one_by_one = [conditions(plant[0], tuple(row), bool(wet)) for row, wet in zip(rows, primed, strict=True)]
+    np.testing.assert_array_equal(np.array(at_once, dtype=np.float64).T, np.array(one_by_one))
 
 
 def test_a_path_without_crest_is_always_primed() -> None:
-    path = TubePath(
-        density=1e3,
-        port_pressure=2.0,
-        hump_pressure=None,
-        trapped=False,
-        vapour_pressure=-1.0,
-        released=0.0,
-        froude_velocity=0.0,
-    )
-    assert path.crest is None
-    assert can_flow(ends=ENDS, crest=path.crest, primed=False)
-    assert replace(path, hump_pressure=9.0).crest is not None
+    assert can_flow(LEVEL, ENDS, False)
+    assert flow_of(LEVEL, ENDS, primed=False).primed
 
 
 def test_hydrostatic_pressure_of_a_film_and_its_inverse() -> None:

@@ -15,7 +15,6 @@ from ringbalance.controller.eccentric_mass import study
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.reports import eccentric_evidence
 from ringbalance.reports.eccentric_evidence import parameters
-from ringbalance.reports.figures.eccentric import sampled_poles
 from ringbalance.reports.pages.eccentric import SECTIONS
 from ringbalance.reports.render import render
 from ringbalance.reports.report import write_report
@@ -150,10 +149,12 @@ def test_every_value_has_its_origin(scene: EccentricScene) -> None:
         assert arm.endswith("m")
 
 
-def test_unstable_loops_are_named() -> None:
-    loop = {"name": "speed control", "poles": [[-1.3, 0.0]], "stable": False}
-    assert "unstable: speed control" in sampled_poles([loop]).caption
-    assert "stable" in sampled_poles([{**loop, "poles": [[0.5, 0.1]], "stable": True}]).caption
+@pytest.mark.usefixtures("unwritten")
+def test_unstable_loops_are_named(evidence: Record) -> None:
+    changed = json.loads(json.dumps(evidence))
+    assert "All lie within: stable." in render(changed)["report.html"]
+    changed["tuning"]["loops"][0] |= {"name": "speed control", "poles": [[-1.3, 0.0]], "stable": False}
+    assert "unstable: speed control." in render(changed)["report.html"]
 
 
 @pytest.mark.usefixtures("unwritten")

@@ -8,8 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from ringbalance.reports import extremes_cli
-from ringbalance.reports.pages import extremes, sloshing
+from ringbalance.reports.pages import chamber, extremes
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene
 
@@ -20,7 +19,7 @@ def meeting(first: list[float], third: list[float], met: list[int]) -> Record:
     """Fills at which mode 3 meets the speed, of three modes at three fills."""
     ratios = np.array([first, [0.8, 1.2, 1.5], third])
     fills = np.array([0.1, 0.3, 0.5])
-    avoided = {each["mode"]: each for each in sloshing.to_avoid(ratios, fills, met, imported=False)}
+    avoided = {each["mode"]: each for each in chamber._to_avoid(ratios, fills, met, imported=False)}
     assert 2 not in avoided
     return avoided.get(3, {})
 
@@ -38,14 +37,14 @@ def test_a_mode_that_only_may_meet_the_speed_is_named() -> None:
 
 def test_the_fill_at_which_the_swing_doubles_is_found() -> None:
     fills = np.array([0.1, 0.3, 0.5])
-    assert sloshing.nearing(fills, np.array([0.2, 1.0, 4.0])) == 0.5
-    assert sloshing.nearing(fills, np.array([3.0, 3.0, 4.0])) == 0.1
+    assert chamber._nearing(fills, np.array([0.2, 1.0, 4.0])) == 0.5
+    assert chamber._nearing(fills, np.array([3.0, 3.0, 4.0])) == 0.1
 
 
 def test_no_gravity_no_waves(vertical_scene: Scene) -> None:
     work = Work(scene=vertical_scene, calibration=cast(Any, None), level="light")
-    assert sloshing.SECTION.collect(work) is None
-    assert sloshing.SECTION.view({}) is None
+    assert chamber.WAVES.collect(work) is None
+    assert chamber.WAVES.view({}) is None
 
 
 @pytest.fixture
@@ -86,15 +85,3 @@ def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
 
 def test_extremes_that_were_not_run_say_so() -> None:
     assert extremes.SECTION.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}
-
-
-def test_a_table_named_in_a_message_is_not_taken_for_markup(capsys: pytest.CaptureFixture[str]) -> None:
-    told = {
-        "judged": 3,
-        "endings": {"solved": 2, "refused with a message": 1},
-        "worst_residual": 1e-13,
-        "worst_error_over_half_width": 0.8,
-        "violations": [],
-    }
-    extremes_cli._show(told, extremes.axis_rows(table()))
-    assert "[rotor]" in capsys.readouterr().out

@@ -18,7 +18,7 @@ from ringbalance.reports.pages.requirements import (
     requirements,
 )
 from ringbalance.reports.prose import untraced
-from ringbalance.reports.summary import OPEN
+from ringbalance.results.requirements import OPEN
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista
+from block_discs import imported
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reports.pictures.fields import ImportedField, shown_field
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.block_chambers import imported
 
 _FILL = 0.4
 

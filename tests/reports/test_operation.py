@@ -9,18 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.reports.figures.operation import (
-    _clearest,
-    operating_map,
-    reachable,
-    requirement_bars,
-    residual_polar,
-    settling_histogram,
-    tornado,
-)
-from ringbalance.reports.figures.style import NARROW, Drawing
-from ringbalance.reports.pages.loop import LOOP
-from ringbalance.reports.pages.operation import SECTION, _letter_radius, disc_section
+from ringbalance.reports.figure import NARROW, Drawing
+from ringbalance.reports.pages.loop import LOOP, _settling_histogram
+from ringbalance.reports.pages.operation import SECTION, _disc_section, _letter_radius, _operating_map
+from ringbalance.reports.pages.requirements import requirement_bars
+from ringbalance.reports.pages.standing import CONDITIONS
+from ringbalance.reports.run_figures import _clearest, _reachable, residual_polar
 from ringbalance.reports.section import Work
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.verification.loops import calibration_of
@@ -72,19 +66,17 @@ def test_liquid_spills_between_the_priming_pressure_and_a_full_bore(work: Work, 
 
 
 def test_each_area_of_the_map_is_named_in_words(collected: Record) -> None:
-    drawing = operating_map(collected)
+    drawing = _operating_map(collected)
     there = {collected["regimes"][int(sign)] for row in collected["regime"] for sign in row}
     assert there <= {*texts(drawing), "cannot be told"}
-    assert collected["point"]["regime"] in drawing.caption
 
 
 def test_the_section_carries_its_dimensions(collected: Record) -> None:
     disc = {**collected["disc"], "free_surface_radius_m": 0.0401, "origins": {"bore": "assumed"}}
-    shown = " ".join(texts(disc_section(disc)))
+    shown = " ".join(texts(_disc_section(disc)))
     for part in ("R₂ 44.50", "R₁ 20.50", "R₁′ 40.10", "t 2.78", "B 62.00", "θ 90.0°", "rₘ 31.5", "port 44.5"):
         assert part in shown
-    assert disc_section(disc).caption.endswith("Assumed: bore.")
-    straight = " ".join(texts(disc_section({**disc, "crest_radius_m": None})))
+    straight = " ".join(texts(_disc_section({**disc, "crest_radius_m": None})))
     assert "rₘ" not in straight
 
 
@@ -95,13 +87,17 @@ def test_the_tornado_begins_with_the_largest_cause() -> None:
         "model": 0.2,
         "inputs": {"tube.bore": 0.5, "rotor.speed": -0.3, "disc.outer_radius": 0.0},
     }
-    drawing = tornado({"velocity": budget, "lambda": budget}, {"velocity": "Velocity"})
-    assert drawing is not None
-    shown = texts(drawing)
+    budgets = {"velocity": budget, "lambda": {**budget, "value": 0.0}}
+    view = CONDITIONS.view({"calibration": {"budgets": budgets}, "verification": []})
+    assert view is not None
+    shown = texts(view["tornado"])
     places = [shown.index(name) for name in ("bore", "speed", "the model", "numerics")]
     assert places == sorted(places)
     assert "λ" not in " ".join(shown)
-    assert tornado({}, {"velocity": "Velocity"}) is None
+    assert view["largest"] == {"Velocity": "bore"}
+    bare = CONDITIONS.view({"calibration": {}, "verification": []})
+    assert bare is not None
+    assert bare["tornado"] is None
 
 
 def test_runs_that_never_settle_have_a_bar_of_their_own() -> None:
@@ -113,8 +109,7 @@ def test_runs_that_never_settle_have_a_bar_of_their_own() -> None:
         "not_settled": 0.6,
         "time_limit_s": 20.0,
     }
-    drawing = settling_histogram([sample])
-    assert drawing is not None
+    drawing = _settling_histogram([sample])
     assert {"never", "60\u202f%"} <= set(texts(drawing))
     heights = [abs(y) for y in bar_heights(drawing)]
     assert max(heights) == pytest.approx(2 * heights[0], rel=0.02)
@@ -138,7 +133,6 @@ def test_the_residual_ends_within_its_circle() -> None:
     reach = {"vibration_m": 1.1e-5, "direction_rad": -0.3, "pairs": 2}
     drawing = residual_polar(run, reach)
     assert {"whole run", "near the limit"} <= set(texts(drawing))
-    assert "from 10\u202fµm (ring) to 0.020\u202fµm (dot)" in drawing.caption
 
 
 def test_the_label_of_a_ring_keeps_away_from_what_is_dashed_and_from_the_run() -> None:
@@ -153,7 +147,7 @@ def test_the_label_of_a_ring_keeps_away_from_what_is_dashed_and_from_the_run() -
 
 @pytest.mark.parametrize(("pairs", "corners"), [(1, 2), (2, 4), (3, 6)])
 def test_pairs_together_cancel_the_sum_of_what_each_does(pairs: int, corners: int) -> None:
-    found = reachable(1.0, 0.4, pairs)
+    found = _reachable(1.0, 0.4, pairs)
     assert len(found) == corners
     # The farthest corner of n equal vectors spread over half a turn lies at 1/sin(pi/2n).
     assert np.abs(found).max() == pytest.approx(1 / math.sin(math.pi / 2 / pairs))
@@ -174,7 +168,7 @@ def test_a_requirement_is_judged_in_words(reached: float, high: float, number: s
 
 
 def test_text_is_no_smaller_than_eight_points_in_print(collected: Record) -> None:
-    drawing = operating_map(collected)
+    drawing = _operating_map(collected)
     sizes = [float(size) for size in re.findall(r"font(?:-size)?: (?:bold )?([\d.]+)px", drawing.svg)]
     assert sizes
     assert min(sizes) * COLUMN / (72 * NARROW) >= 8

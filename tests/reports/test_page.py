@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from ringbalance.reports.figures.style import DARK, LIGHT
+from ringbalance.reports.figure import DARK, LIGHT
 from ringbalance.reports.pictures.style import THEMES
 from ringbalance.reports.render import render
 
@@ -148,6 +148,9 @@ def test_tables_and_drawings_can_be_read_aloud(pages: dict[str, str], name: str)
     tags = read(pages[name]).tags
     assert all(attributes.get("scope") for tag, attributes in tags if tag == "th")
     assert all(a.get("aria-label") or a.get("aria-hidden") for tag, a in tags if tag == "svg")
+    told = [a["aria-labelledby"] for tag, a in tags if tag == "div" and a.get("role") == "img"]
+    assert set(told) <= {*ids_of(pages[name])}
+    assert len(told) == len([a for tag, a in tags if tag == "div" and a.get("class") == "drawing"]) > 0
     assert [a.get("lang") for tag, a in tags if tag == "html"] == ["en"]
     assert all(a.get("aria-labelledby") for tag, a in tags if tag == "section")
 

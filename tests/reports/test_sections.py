@@ -15,11 +15,10 @@ import pytest
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reports.figures.style import Drawing
+from ringbalance.reports.figure import Drawing
 from ringbalance.reports.pages import drag_coefficient as fifty
-from ringbalance.reports.pages import eccentric
+from ringbalance.reports.pages import eccentric, tube
 from ringbalance.reports.pages import paper_figures as paper_again
-from ringbalance.reports.pages import siphon_crest as hump
 from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.prose import untraced
 from ringbalance.reports.render import render
@@ -56,7 +55,7 @@ def test_a_section_without_evidence_stays_away(annex: str) -> None:
 
 
 def test_drawings_are_found_however_deep() -> None:
-    one, two = (Drawing(name=name, svg="", alt="", caption="") for name in "ab")
+    one, two = (Drawing(name=name, svg="") for name in "ab")
     assert drawings_in({"x": [one, {"y": (two, None, "text")}], "z": 3}) == [one, two]
 
 
@@ -94,7 +93,7 @@ def test_where_nothing_flows_the_page_says_so(evidence: Record, fifty_record: Re
     dry["apparent"] = None
     for record in dry["liquids"]:
         record["runs"] = False
-        record["verdict"] = fifty.verdict_on_fifty(record)
+        record["verdict"] = fifty._verdict_on_fifty(record)
     page = render({**evidence, "fifty": dry})["annex.html"]
     assert "no k can be given" in page
     assert "there is no map to draw" in page
@@ -111,12 +110,12 @@ def test_a_prescribed_k_is_named(evidence: Record, fifty_record: Record) -> None
 def test_the_velocity_decides_whether_fifty_is_right() -> None:
     record = {"runs": True, "velocity_m_s": 5.0, "velocity_uncertainty": 0.5}
     for paper, verdict in ((5.4, "right"), (4.6, "right"), (5.6, "too low"), (4.4, "too high")):
-        assert fifty.verdict_on_fifty({**record, "velocity_paper_m_s": paper}) == verdict
+        assert fifty._verdict_on_fifty({**record, "velocity_paper_m_s": paper}) == verdict
 
 
 @pytest.fixture(scope="module")
 def hump_record(work: Work) -> Record:
-    record = hump.SECTION.collect(work)
+    record = tube.CREST.collect(work)
     assert record is not None
     return record
 
@@ -132,7 +131,7 @@ def test_every_regime_that_is_found_is_drawn(evidence: Record, hump_record: Reco
 
 
 def test_a_margin_within_its_half_width_decides_nothing() -> None:
-    assert [hump.column_code(*each) for each in ((2.0, 3.0), (3.0, 2.0), (-3.0, 2.0), (None, None))] == [
+    assert [tube._column_code(*each) for each in ((2.0, 3.0), (3.0, 2.0), (-3.0, 2.0), (None, None))] == [
         "undecided",
         "holds",
         "separates",
@@ -142,8 +141,8 @@ def test_a_margin_within_its_half_width_decides_nothing() -> None:
 
 def test_a_tube_without_a_hump_has_no_such_section(evidence: Record, work: Work) -> None:
     straight = replace(work, scene=replace(work.scene, tube=replace(work.scene.tube, hump_radius=None)))
-    assert hump.SECTION.collect(straight) is None
-    assert hump.SECTION.view(evidence) is None
+    assert tube.CREST.collect(straight) is None
+    assert tube.CREST.view(evidence) is None
 
 
 def test_the_figures_of_sections_carry_no_colour_of_their_own(
@@ -151,7 +150,7 @@ def test_the_figures_of_sections_carry_no_colour_of_their_own(
 ) -> None:
     views = [
         fifty.SECTION.view({**evidence, "fifty": fifty_record}),
-        hump.SECTION.view({**evidence, "hump": hump_record}),
+        tube.CREST.view({**evidence, "hump": hump_record}),
     ]
     for drawing in drawings_in(views):
         bare = re.sub(r'(href="|url\()#[^")]+', "", drawing.svg)
@@ -166,11 +165,11 @@ def inside_record(work: Work) -> Record:
 
 
 def test_a_field_is_packed_to_four_digits() -> None:
-    assert inside.packed([[1.23456, 2e-7], [0.0, -3.0]]) == "1.235 2e-07 0 -3"
+    assert inside._packed([[1.23456, 2e-7], [0.0, -3.0]]) == "1.235 2e-07 0 -3"
 
 
 def test_the_three_dimensional_check_tells_when_it_was_run(evidence: Record) -> None:
-    assert inside.three_dimensional_check(evidence) is None
+    assert inside._three_dimensional_check(evidence) is None
     case = {
         "id": "bent_tube_3d",
         "kind": "solution_verification",
@@ -179,7 +178,7 @@ def test_the_three_dimensional_check_tells_when_it_was_run(evidence: Record) -> 
         "status": "heavy: run with --level heavy",
         "quantities": [],
     }
-    check = inside.three_dimensional_check({**evidence, "verification": [case]})
+    check = inside._three_dimensional_check({**evidence, "verification": [case]})
     assert check is not None
     assert (check["when"], check["hash"]) == ("", "")
     assert "heavy" in check["why_not_run"]
@@ -187,7 +186,7 @@ def test_the_three_dimensional_check_tells_when_it_was_run(evidence: Record) -> 
     run["quantities"] = [
         {"name": "k", "unit": "1", "value": 12.3, "reference": 12.1, "uncertainty": 0.4, "verdict": "passed"}
     ]
-    check = inside.three_dimensional_check({**evidence, "verification": [run]})
+    check = inside._three_dimensional_check({**evidence, "verification": [run]})
     assert check is not None
     assert (check["when"], check["hash"]) == ("2031-05-06", "efefefefefef")
     assert untraced(check["rows"][0]["value"]).startswith("12.3")
@@ -219,7 +218,7 @@ def test_half_the_fitted_constant_gives_the_literal_reading_the_same_runs(again:
     scene = loop_scene(paper_scene(), kind="target_vector", proportional=0.16e6, integral_time=None)
     model = paper_model(scene)
     half = replace(scene.rotor, influence_coefficient=scene.rotor.influence_coefficient / 2)
-    literal = simulate(replace(scene, rotor=half), replace(model, moment=paper_again.literal_moment(model)))
+    literal = simulate(replace(scene, rotor=half), replace(model, moment=paper_again._literal_moment(model)))
     own = simulate(scene, model)
     np.testing.assert_allclose(literal.amplitude, own.amplitude, rtol=1e-9, atol=1e-15)
     reading = again["reading"]
@@ -232,7 +231,7 @@ def test_half_the_fitted_constant_gives_the_literal_reading_the_same_runs(again:
 
 def test_only_the_papers_moment_has_a_literal_reading(work: Work) -> None:
     with pytest.raises(ValueError, match="only the paper's model"):
-        paper_again.literal_moment(work.calibration.model)
+        paper_again._literal_moment(work.calibration.model)
 
 
 def test_evidence_is_in_the_page_s_order_whoever_collected_it() -> None:

@@ -172,7 +172,7 @@ def test_a_sheet_shows_the_figures_of_a_run(
     drawn = ElementTree.fromstring((tmp_path / "run.svg").read_text())
     told = [figure.attrib["aria-label"] for figure in drawn.findall("{http://www.w3.org/2000/svg}svg")]
     assert len(told) == 4
-    for words in ("amplitude", "Valve-open times", "Fill ratios", "vector"):
+    for words in ("amplitude", "valve open", "fill ratios", "polar"):
         assert any(words in text for text in told)
     below = [float(figure.attrib["y"]) for figure in drawn.findall("{http://www.w3.org/2000/svg}svg")]
     assert below == sorted(below)

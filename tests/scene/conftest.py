@@ -47,6 +47,12 @@ def paper_document() -> Document:
 
 
 @pytest.fixture
+def driven_document() -> Document:
+    """The scene of the paper on eccentric masses, to be changed at will."""
+    return tomllib.loads(bundled_scene("eccentric_mass_paper").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
 def newcomer_document() -> Document:
     """The least that a scene needs."""
     return {

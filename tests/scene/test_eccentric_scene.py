@@ -54,12 +54,6 @@ def _keys(table: str) -> set[str]:
 
 
 @pytest.fixture
-def driven_document() -> dict[str, Any]:
-    """The paper's scene, to be changed at will."""
-    return tomllib.loads(bundled_scene("eccentric_mass_paper").read_text(encoding="utf-8"))
-
-
-@pytest.fixture
 def least_document(driven_document: dict[str, Any]) -> dict[str, Any]:
     """The least that such a scene needs."""
     needed = {
@@ -145,100 +139,6 @@ def test_a_rotor_without_damping_or_speed_still_has_defaults(
     least_document["rotor"]["speed_profile"] = [{"time": "0 s", "speed": "0 rpm"}]
     tuning = load(least_document).fine_tuning
     assert (tuning.wait, tuning.average) == (30.0, 1.0)
-
-
-FAULTS: Mapping[str, tuple[str, Any, str, str]] = {
-    "imbalance heavier than the rotor": (
-        "imbalance.mass",
-        "6 kg",
-        "part of the rotor's mass (5 kg)",
-        "at most",
-    ),
-    "more uncertain than it is large": (
-        "uncertainty.rotor",
-        {"mass": "6 kg"},
-        "the uncertainty of mass is larger than mass itself",
-        "below 100 %",
-    ),
-    "uncertainty of a list": (
-        "uncertainty.masses",
-        {"friction_arm": "11 mm"},
-        "the uncertainty of friction_arm is larger",
-        "at most the quantity",
-    ),
-    "masses too long": ("masses.arc_length", "800 mm", "do not fit on the track", "722.566 mm"),
-    "masses overlap": ("masses.initial_angle", ["0 deg", "350 deg"], "they are 10 deg apart", "12.4556 deg"),
-    "one angle": ("masses.initial_angle", ["0 deg"], "not a list of 2", '["0 deg", "180 deg"]'),
-    "friction as a number": (
-        "masses.friction_arm",
-        [0.01, 0.01],
-        "entry 1: a bare number has no unit",
-        "a length",
-    ),
-    "negative friction": (
-        "masses.friction_arm",
-        ["1 mm", "-1 mm"],
-        "entry 2: it must be at least 0",
-        "a length",
-    ),
-    "empty profile": ("rotor.speed_profile", [], "has no entry", "in order of time"),
-    "profile that is a number": ("rotor.speed_profile", 100, "it is not a list", "{ time ="),
-    "profile backwards": (
-        "rotor.speed_profile",
-        [{"time": "5 s", "speed": "1 rpm"}, {"time": "5 s", "speed": "2 rpm"}],
-        "entry 2 (5 s) does not come after the one before",
-        "in order of time",
-    ),
-    "mass as a length": ("rotor.mass", "5 mm", '"mm" is a unit of length, not of mass', "kg"),
-    "stiffness of damping": ("rotor.stiffness", "10 N*s/m", "unit of damping coefficient, not of", "N/m"),
-    "no resistance": ("motor.resistance", "0 ohm", "above 0", "ohm"),
-    "two gears": ("motor.teeth", [10, 40], "not a list of 3", "[10, 40, 400]"),
-    "half a tooth": ("motor.teeth", [10, 40.5, 400], "entry 2: it is not a whole number", "from 1 to"),
-    "frame": ("sensor.frame", "fixed", "not one of the known words", '"laboratory"'),
-    "filter out of step": ("imbalance_filter.step", "1.5 ms", "not a whole multiple", "0.001 s, 0.002 s"),
-    "regulator faster than the sensor": ("lqr.step", "0.5 ms", "not a whole multiple", "0.001 s"),
-    "gate of nothing": ("friction_filter.gate", 0, "above 0", "a share"),
-    "tuning backwards": ("fine_tuning.stop", "5 deg", "not be longer than the first", "at most 4 deg"),
-    "limit in the noise": ("supervisor.limit", "0.05 mm", "is below the sensor noise", "above 0.1 mm"),
-    "a liquid ring's table": ("disc", {"bore": "1 mm"}, "unknown table", "rotor, imbalance, masses"),
-    "misspelt key": ("masses.guide_radus", "1 m", 'did you mean "guide_radius"', "arc_length"),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS.values(), ids=list(FAULTS))
-def test_a_fault_is_named_alone(
-    fault: tuple[str, Any, str, str], driven_document: dict[str, Any], load: Load
-) -> None:
-    path, value, problem, allowed = fault
-    table, _, key = path.rpartition(".")
-    (driven_document[table] if table else driven_document)[key] = value
-    with pytest.raises(SceneError) as caught:
-        load(driven_document)
-    (found,) = caught.value.faults
-    assert (found.table, found.key) == ((table, key) if table else (key, ""))
-    assert problem in found.problem
-    assert allowed in found.allowed
-    assert len(str(caught.value).splitlines()) == 1
-
-
-def test_all_faults_in_one_go_and_in_order(driven_document: dict[str, Any], load: Load) -> None:
-    driven_document["lqr"]["state_weight"] = -1
-    driven_document["rotor"]["mass"] = "5"
-    del driven_document["motor"]["teeth"]
-    del driven_document["imbalance"]
-    with pytest.raises(SceneError) as caught:
-        load(driven_document)
-    places = [(fault.table, fault.key) for fault in caught.value.faults]
-    assert places == [("rotor", "mass"), ("imbalance", ""), ("motor", "teeth"), ("lqr", "state_weight")]
-
-
-def test_a_misspelt_balancer_is_not_taken_for_a_liquid_ring(
-    driven_document: dict[str, Any], load: Load
-) -> None:
-    driven_document["balancer"] = "eccentric_masses"
-    with pytest.raises(SceneError, match='did you mean "eccentric_mass"') as caught:
-        load(driven_document)
-    assert [fault.key for fault in caught.value.faults] == ["balancer"]
 
 
 def test_each_kind_is_distinguished_from_the_other(paper_scene: Scene) -> None:

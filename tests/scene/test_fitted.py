@@ -12,7 +12,7 @@ from ringbalance.controller.eccentric_mass.scene_records import eccentric_drawn,
 from ringbalance.scene import SceneError, bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.scene.uncertain import NORMAL_95, half_widths
 
 BORE = {"quantity": "tube.bore", "unit": "mm", "standard_deviation": 0.02, "correlations": [1.0, 0.9]}

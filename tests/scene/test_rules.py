@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from ringbalance.scene.kinds import Finding, limit_above_noise
 from ringbalance.scene.models import Bend
 from ringbalance.scene.rules import shape, working
-from ringbalance.scene.rules.check import Finding
 
 RULES = {each.rule.__name__.removeprefix("_"): each.rule for each in (*shape.CHECKS, *working.CHECKS)}
 BENDS = (Bend(angle=1.5, radius=0.004), Bend(angle=1.0, radius=0.002))
@@ -35,7 +35,7 @@ BENDS = (Bend(angle=1.5, radius=0.004), Bend(angle=1.0, radius=0.002))
         RULES["liquid_stays_liquid"](1e5, 1e5),
         RULES["temperature_below_boiling"](373.0, 1e5, 1e5),
         RULES["gas_times_in_order"](0.1, 0.1),
-        RULES["limit_above_noise"](1e-8, 1e-8),
+        limit_above_noise("amplitude_noise", "um")(1e-8, 1e-8),
         RULES["sequence_complete"](("A", "C", "B", "E"), 4),
     ],
 )
@@ -107,12 +107,3 @@ def test_what_lies_at_the_surface_is_found_by_its_fill(rule: str, radius: float,
     below, above = (RULES[rule](radius, fill * factor, *chamber) for factor in (1 - 1e-6, 1 + 1e-6))
     assert (above is None) == (rule == "port_under_liquid")
     assert (below is None) == (rule == "inlet_above_liquid")
-
-
-def test_the_fill_that_a_message_names_is_enough() -> None:
-    chamber = (0.0205, 0.0445, math.pi / 2, 0.002777)
-    found = RULES["port_under_liquid"](0.040, 0.2, *chamber)
-    assert found is not None
-    named = float(found.allowed.split()[-1])
-    assert RULES["port_under_liquid"](0.040, 1.01 * named / 2, *chamber) is None
-    assert RULES["port_under_liquid"](0.0445, 1e-6, *chamber) is None

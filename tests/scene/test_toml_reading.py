@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from ringbalance.scene import SceneError, load_scene
-from ringbalance.scene.toml_reading import MOST_PARTS, read_toml
+from ringbalance.scene.toml import MOST_PARTS, read_toml
 
 
 @pytest.mark.parametrize("part", ["a", '"a"', "'a b'", "a ", "1"])

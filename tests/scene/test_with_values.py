@@ -18,7 +18,7 @@ from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.scene import AnyScene, Scene, SceneError, bundled_scene, load_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.scene.units import DIMENSIONS, parse_quantity
 
 PAPER, DRIVEN = "liquid_ring_paper", "eccentric_mass_paper"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import pytest
@@ -72,13 +72,11 @@ class MadeUpCode:
         Found(value=found.value + 1) if defect == "off_by_one" else found
     )
 
-    def reference(self, scene: Scene) -> Mapping[str, Reference]:  # noqa: ARG002
-        return {"answer": Reference(value=10.0)}
-
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
         thicker = scene.disc.plate_thickness == 0.004
         found = Found(value=20.0) if thicker else self.defect(self.found, defect, scene)
-        return Evidence(found={"answer": found}, numbers={"doubt": 0.0123})
+        against = {"answer": Reference(value=10.0)}
+        return Evidence(found={"answer": found}, reference=against, numbers={"doubt": 0.0123})
 
 
 @pytest.fixture

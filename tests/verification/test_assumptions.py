@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -15,7 +14,6 @@ from ringbalance.verification.assumptions import assumptions_of
 from ringbalance.verification.case import CaseDefinition, RestsOn
 from ringbalance.verification.catalogue import case_code, load_case
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference
-from ringbalance.verification.result import references
 from ringbalance.verification.runner import run_definition
 from ringbalance.verification.verdicts import Metric, Verdict, judge_quantity
 
@@ -65,20 +63,16 @@ def test_half_a_range_is_refused() -> None:
 class Thick:
     """Ten, and as much more as the plates are thicker than those of the paper."""
 
-    reference: Any
-
     def __init__(self, *, per_mm: float, offset: float = 0.0, shared: bool = False) -> None:
         self.per_mm, self.offset, self.shared = per_mm, offset, shared
-
-    def reference_of(self, scene: Scene) -> float:
-        return 10.0 + (self._more(scene) if self.shared else 0.0)
 
     def _more(self, scene: Scene) -> float:
         return self.per_mm * (1e3 * scene.disc.plate_thickness - 2.777)
 
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
         found = Found(value=10.0 + self.offset + self._more(scene))
-        return Evidence(found={"answer": found}, numbers={"doubt": 0.0})
+        reference = Reference(value=10.0 + (self._more(scene) if self.shared else 0.0))
+        return Evidence(found={"answer": found}, reference={"answer": reference}, numbers={"doubt": 0.0})
 
 
 RESTS = (
@@ -104,8 +98,7 @@ def test_a_claim_is_decided_where_it_is_so_over_the_whole_range(
 ) -> None:
     """Over 0.2 mm either way; a departure of 5 % of ten is what the case lets pass."""
     definition = CaseDefinition.parse(claim_text.replace("[[quantity]]", RESTS, 1), source="x")
-    code: Any = Thick(per_mm=per_mm, offset=offset, shared=shared)
-    code.reference = lambda scene: {"answer": Reference(value=code.reference_of(scene))}
+    code = Thick(per_mm=per_mm, offset=offset, shared=shared)
     result = run_definition(definition, code, scene=paper_scene)
     assert result.verdict == expected
     assert [one.path for one in result.assumptions] == ["disc.plate_thickness"]
@@ -183,7 +176,8 @@ def test_no_verdict_rests_on_an_assumption_that_it_does_not_name(paper_scene: Sc
     code = case_code(case)
     errors = []
     for scene in (paper_scene, changed):
-        found, against = code.compute(scene, "light").found, references(code, scene)
+        evidence = code.compute(scene, "light")
+        found, against = evidence.found, evidence.reference
         errors.append(
             {n: one.value - (against[n].value if n in against else 0.0) for n, one in found.items()}
         )

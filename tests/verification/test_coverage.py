@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.verification.cases.coverage import case
+from ringbalance.verification.cases import uncertainties as case
 
 
 def test_samples_are_the_same_every_time_and_differ_from_one_another() -> None:

@@ -16,7 +16,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.verification.extremes import design as extremes_design
 from ringbalance.verification.extremes import point as extremes_point
 from ringbalance.verification.extremes.axes import AXES, fitted, varied
@@ -298,7 +298,7 @@ def test_a_belief_about_the_rotor_follows_the_rotor(document: dict[str, Any], pa
 def test_everything_is_reported(base: Base, counting: list[Point]) -> None:
     size = Size(points=10, sweep=5, fineness=1.0)
     found = find_extremes(base, size=size)
-    told = found.document()
+    told = found.to_dict()
     assert len(counting) == told["judged"] == 10 + 5 * len(AXES)
     assert found.broken() == 0
     assert sum(told["endings"].values()) == told["judged"]

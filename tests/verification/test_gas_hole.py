@@ -7,11 +7,11 @@ import dataclasses
 import pytest
 
 from ringbalance.scene.models import Scene
-from ringbalance.verification.cases.claim_18_gas_hole.case import compute
+from ringbalance.verification.cases.gas_line import gas_hole
 
 
 def safe_fill(scene: Scene, state: str) -> float:
-    return compute(scene, "light").found[f"margin_{state}"].value + scene.disc.max_fill_ratio
+    return gas_hole(scene, "light").found[f"margin_{state}"].value + scene.disc.max_fill_ratio
 
 
 def test_a_nearly_rectangular_chamber_is_safe_up_to_one_half(paper_scene: Scene) -> None:
@@ -30,7 +30,7 @@ def test_a_nearly_rectangular_chamber_is_safe_up_to_one_half(paper_scene: Scene)
 
 def test_running_the_safe_fill_is_what_lies_outside_the_hole(paper_scene: Scene) -> None:
     disc = paper_scene.disc
-    evidence = compute(paper_scene, "light")
+    evidence = gas_hole(paper_scene, "light")
     radius = evidence.numbers["best_radius"]
     bare = dataclasses.replace(disc, plate_thickness=0.0)
     outside = (bare.outer_radius**2 - radius**2) / (bare.outer_radius**2 - bare.inner_radius**2)

@@ -12,7 +12,7 @@ from scipy.integrate import dblquad
 
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, surface_radius
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.cases.manufactured_flow import case
+from ringbalance.verification.cases import sections as case
 from ringbalance.verification.evidence import input_uncertainty
 from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
 from ringbalance.verification.reference.gravity import exact_ring

@@ -73,9 +73,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     printed = json.loads(capsys.readouterr().out)
     assert json.loads((tmp_path / "trade.json").read_text()) == printed
     assert main(["trade", path, "--level", "light"]) == 0
-    shown = capsys.readouterr().out
-    assert "designs a second" in shown
-    assert "the finest is known to" in shown
+    assert "designs a second" in capsys.readouterr().out
 
 
 def test_a_scene_that_cannot_be_used_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,7 +21,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import beside
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.verification.extremes.axes import AXES, fitted, varied
 from ringbalance.verification.extremes.point import (
     GAS_TIME,

@@ -21,7 +21,7 @@ from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.toml_writing import toml_bytes
+from ringbalance.scene.toml import toml_bytes
 from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
 
 PERIODS: Final = 20

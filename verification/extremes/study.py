@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.results.result import CommandResult
+from ringbalance.results.numbers import number
+from ringbalance.results.result import Cells, Result, Rows, Table
+from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import AXES, Axis
@@ -160,7 +162,7 @@ def _with(sweep: Sweep, place: int, value: float, judgement: Judgement) -> Sweep
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Extremes(CommandResult):
+class Extremes(Result):
     """What was found."""
 
     points: tuple[Point, ...]
@@ -173,19 +175,42 @@ class Extremes(CommandResult):
         """Judgements of the designed set and the sweeps."""
         return self.judgements + tuple(j for sweep in self.sweeps for j in sweep.judgements)
 
-    def lines(self) -> Iterator[str]:
-        """For a terminal: how the points ended."""
-        everything = self.everything
-        yield f"Limits of validity: {len(everything)} points"
-        yield ", ".join(f"{count} {ending}" for ending, count in counted(everything).items() if count)
-        yield f"invariants violated at {self.broken()} points"
-        yield f"largest residual {max((j.residual for j in everything), default=0.0):.2g}"
+    def rows(self) -> Rows:
+        """How the points ended, and where along each axis."""
+        everything, worst = self.everything, max((j.worst_ratio for j in self.everything), default=-1.0)
+        residual = max((j.residual for j in everything), default=0.0)
+        return Rows(
+            title=f"Limits of validity: {len(everything)} points",
+            quantities=(
+                Quantity(key="broken", name="points with a violated invariant", value=float(self.broken())),
+                Quantity(key="worst_residual", name="largest residual", value=residual, digits=2),
+                Quantity(
+                    key="worst_error_over_half_width",
+                    name="largest error over its half-width",
+                    value=None if worst < 0 else worst,
+                    digits=2,
+                ),
+            ),
+            facts=[(ending, str(count)) for ending, count in counted(everything).items() if count],
+            findings=tuple(
+                Finding(
+                    code="invariant_violated",
+                    values={
+                        "violations": each["violations"],
+                        "point": ", ".join(f"{axis} {value:.4g}" for axis, value in each["point"].items()),
+                    },
+                )
+                for each in _violations(self)
+            ),
+            tables=(
+                Table(
+                    heads=("input", "stretch", "answer", "loop", "said"),
+                    rows=axis_rows(self.tables()["axes"]),
+                ),
+            ),
+        )
 
-    def to_dict(self) -> dict[str, Any]:
-        """See `document`."""
-        return self.document()
-
-    def document(self) -> Record:
+    def to_dict(self) -> Record:
         """What was found as plain numbers, lists and texts."""
         everything = self.everything
         return {
@@ -216,6 +241,29 @@ class Extremes(CommandResult):
     def broken(self) -> int:
         """Number of points, of all looked at, at which anything was not as it should be."""
         return sum(bool(j.violations) for j in self.everything)
+
+
+def axis_rows(columns: Record) -> list[Cells]:
+    """The stretches of every axis: its title (at its first), stretch, answer, loop and message."""
+    before = ["", *columns["axis"]]
+    return [
+        (
+            "" if title == before[index] else title,
+            _stretch(columns["from"][index], columns["to"][index], columns["unit"][index]),
+            str(columns["ending"][index]).removesuffix(" with a message"),
+            str(columns["loop"][index]).replace("_", " "),
+            # The first line of a message, without the name of a file that nobody has.
+            str(columns["said"][index]).split("\n")[0].split(".toml: ", 1)[-1],
+        )
+        for index, title in enumerate(columns["axis"])
+    ]
+
+
+def _stretch(low: float, high: float, unit: str) -> str:
+    """First and last value, or the one where both are the same."""
+    first, last = (number(float(end), digits=3) for end in (low, high))
+    ends = first if first == last else f"{first} to {last}"
+    return ends if unit == "1" else f"{ends} {unit.replace('^2', '²')}"
 
 
 def find_extremes(
@@ -252,14 +300,17 @@ def counted(judgements: Sequence[Judgement]) -> dict[str, int]:
 
 
 def _violations(extremes: Extremes) -> list[Record]:
-    found = [
-        {"point": dict(point), "violations": list(judgement.violations)}
-        for point, judgement in zip(extremes.points, extremes.judgements, strict=True)
-        if judgement.violations
+    alone = [
+        ({sweep.axis.name: float(value)}, judgement)
+        for sweep in extremes.sweeps
+        for value, judgement in zip(sweep.values, sweep.judgements, strict=True)
     ]
-    alone = extremes.everything[len(extremes.points) :]
-    found += [{"point": {}, "violations": list(j.violations)} for j in alone if j.violations]
-    return found[:MOST_SHOWN]
+    places = [*zip(extremes.points, extremes.judgements, strict=True), *alone]
+    return [
+        {"point": dict(point), "violations": list(judgement.violations)}
+        for point, judgement in places
+        if judgement.violations
+    ][:MOST_SHOWN]
 
 
 def _sweep(sweep: Sweep) -> Record:

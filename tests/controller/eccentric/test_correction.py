@@ -8,16 +8,15 @@ import math
 import numpy as np
 import pytest
 
-from ringbalance.controller.eccentric_mass.document import eccentric_document
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
     eccentric_drawn,
     eccentric_scene,
 )
-from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.verification.eccentric_scenes import at_constant_speed, changed
 

@@ -10,24 +10,22 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
-from ringbalance.controller.eccentric_mass.strategy.lqr_law import friction_torque
-from ringbalance.controller.eccentric_mass.strategy.settings import DriveLaw
-from ringbalance.controller.eccentric_mass.strategy.targets import target_angles
+from ringbalance.controller.eccentric_mass.settings import DriveLaw
+from ringbalance.controller.eccentric_mass.step import friction_torque
+from ringbalance.controller.eccentric_mass.targets import target_angles
 from ringbalance.scene import bundled_scene, load_scene
-from ringbalance.scene.units import FieldError
-from ringbalance.verification.cases.driven_bound.case import motion_bound
-from ringbalance.verification.cases.driven_fig4_imbalance.case import (
+from ringbalance.verification.cases.driven_balancing import BalancingFigure, motion_bound, run_up
+from ringbalance.verification.cases.driven_estimation import (
     estimate_imbalance,
     figure_four,
+    friction_runs,
+    friction_time,
     imbalance_record,
 )
-from ringbalance.verification.cases.driven_fig5_friction.case import friction_runs, friction_time
-from ringbalance.verification.cases.driven_fig6_effort.case import efforts, growth, printed_compensation
-from ringbalance.verification.cases.driven_fig7_positioning.case import BalancingFigure
-from ringbalance.verification.cases.driven_fig9_run_up.case import compute as run_up
+from ringbalance.verification.cases.driven_positioning import efforts, growth, printed_compensation
 from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 
 
@@ -194,22 +192,3 @@ def test_the_printed_compensation_takes_the_angle_for_the_rate(scene: EccentricS
     # At rest, a radian away from the goal, only one of them pushes.
     assert friction_torque(law, arm, 0.0, speed, 0.0, 1.0) > 0
     assert printed_compensation(law, arm, speed, angle, 0.0) == 0
-
-
-def test_changed_keeps_the_rest(scene: EccentricScene) -> None:
-    assert changed(scene, "lqr", state_weight=2.0) == replace(scene, lqr=replace(scene.lqr, state_weight=2.0))
-
-
-def test_changed_validates_and_keeps_derived_values_up_to_date(scene: EccentricScene) -> None:
-    assert changed(scene, "rotor", stiffness=1300.0).imbalance_filter.assumed_stiffness == 1300.0
-    wrong: dict[str, dict[str, float]] = {
-        "rotor": {"damping": -1.0},
-        "masses": {"mass": 0.0},
-        "imbalance": {"phase": math.nan},
-        "run": {"time_limit": -2.0},
-    }
-    for table, values in wrong.items():
-        with pytest.raises(FieldError):
-            changed(scene, table, **values)
-    with pytest.raises(FieldError, match="finite"):
-        changed(scene, "masses", initial_angle=(0.0, math.inf))

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from ringbalance.controller.eccentric_mass.strategy.targets import (
+from ringbalance.controller.eccentric_mass.targets import (
     MOVES,
     Tuning,
     separation,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric_mass.estimation.friction_filter import (
+from ringbalance.controller.eccentric_mass.friction_filter import (
     FrictionEstimate,
     FrictionNoise,
     TrackModel,

@@ -9,10 +9,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag, expm
 
-from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
+from ringbalance.controller.eccentric_mass.imbalance_filter import (
+    FilterMatrices,
     ImbalanceEstimate,
     MassInput,
+    ProcessNoise,
+    WhirlModel,
+    _process_covariance,
     correct,
+    euler_transition,
+    filter_matrices,
     imbalance_deviation,
     imbalance_history,
     locked_masses,
@@ -21,14 +27,6 @@ from ringbalance.controller.eccentric_mass.estimation.imbalance_filter import (
     predicted_deviation,
     start_estimate,
     turned_back,
-)
-from ringbalance.controller.eccentric_mass.estimation.imbalance_model import (
-    FilterMatrices,
-    ProcessNoise,
-    WhirlModel,
-    _process_covariance,
-    euler_transition,
-    filter_matrices,
     whirl_transition,
 )
 from ringbalance.scene.arrays import ComplexArray, FloatArray

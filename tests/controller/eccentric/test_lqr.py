@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_continuous_are
 
-from ringbalance.controller.eccentric_mass.estimation.friction_filter import TrackModel
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.remedies import found_beforehand
+from ringbalance.controller.eccentric_mass.advice import found_beforehand
+from ringbalance.controller.eccentric_mass.friction_filter import TrackModel
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
-from ringbalance.controller.eccentric_mass.strategy.settings import lqr_gain
+from ringbalance.controller.eccentric_mass.settings import lqr_gain
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.verification.eccentric_scenes import changed

@@ -11,17 +11,19 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant import integrate
-from ringbalance.controller.eccentric_mass.plant.open_loop import run_plant, run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters, speed_at, turned
-from ringbalance.controller.eccentric_mass.plant.plant import (
+from ringbalance.controller.eccentric_mass import integration
+from ringbalance.controller.eccentric_mass.integration import run_plant, run_steps
+from ringbalance.controller.eccentric_mass.plant import (
     LOCKED,
     SLIDING,
     STUCK,
+    PlantParameters,
     drive_of,
     electrical_energy,
     rest_state,
+    speed_at,
     stuck_flags,
+    turned,
 )
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.scene import bundled_scene, load_scene
@@ -222,7 +224,9 @@ def test_the_order_is_five(parameters: PlantParameters) -> None:
         from_plant = drive_of(smooth, np.array([1.0, -2.0]), 3.0)
         for place in range(count):
             stuck = stuck_flags(SLIDING)
-            integrate._advance(smooth, state, stuck, 12.0 + 3.0 * place * step, from_plant, step, work, trial)
+            integration._advance(
+                smooth, state, stuck, 12.0 + 3.0 * place * step, from_plant, step, work, trial
+            )
         return state
 
     steps = np.array([1 / 80, 1 / 160, 1 / 320])
@@ -298,7 +302,7 @@ def test_python_and_compiled_agree(parameters: PlantParameters) -> None:
     command = np.array([2.0, -0.3])
     for place in range(20):
         given = (parameters, state, stuck, command, 12.0 + 0.01 * place, 2.0, 1e-2)
-        plain_state, plain_stuck = integrate.plant_step.py_func(*given)  # type: ignore[attr-defined]
-        state, stuck = integrate.plant_step(*given)
+        plain_state, plain_stuck = integration.plant_step.py_func(*given)  # type: ignore[attr-defined]
+        state, stuck = integration.plant_step(*given)
         np.testing.assert_allclose(plain_state, state, rtol=1e-11, atol=1e-13)
         np.testing.assert_array_equal(plain_stuck, stuck)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant.open_loop import _PlantRun, run_plant
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.integration import _PlantRun, run_plant
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray

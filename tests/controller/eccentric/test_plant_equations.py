@@ -9,8 +9,13 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import BACKWARDS, FORWARDS, Drive, write_derivative
+from ringbalance.controller.eccentric_mass.plant import (
+    BACKWARDS,
+    FORWARDS,
+    Drive,
+    PlantParameters,
+    write_derivative,
+)
 
 T = sp.Symbol("t")
 M_R, M_IM, R_IM, PHASE = sp.symbols("m_r m_im r_im phi_m", positive=True)

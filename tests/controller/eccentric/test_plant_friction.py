@@ -13,10 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric_mass.plant.integrate import held_step, plant_step
-from ringbalance.controller.eccentric_mass.plant.open_loop import run_steps
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.plant.plant import (
+from ringbalance.controller.eccentric_mass.integration import held_step, plant_step, run_steps
+from ringbalance.controller.eccentric_mass.plant import (
     BACKWARDS,
     FORWARDS,
     HELD,
@@ -24,6 +22,7 @@ from ringbalance.controller.eccentric_mass.plant.plant import (
     SLIDING,
     STUCK,
     Drive,
+    PlantParameters,
     _Torques,
     angular_accelerations,
     drive_of,

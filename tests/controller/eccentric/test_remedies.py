@@ -12,19 +12,18 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from ringbalance.controller.eccentric_mass.document import eccentric_document
-from ringbalance.controller.eccentric_mass.plant.open_loop import check_substeps, longest_run
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.remedies import (
+from ringbalance.controller.eccentric_mass.advice import (
     _friction_floor,
     _more_time,
     _slower_walks,
     found_beforehand,
 )
+from ringbalance.controller.eccentric_mass.integration import check_substeps, longest_run
+from ringbalance.controller.eccentric_mass.plan import Stage
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun, Remedy
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, Remedy, eccentric_document
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
-from ringbalance.controller.eccentric_mass.strategy.plan import Stage
 from ringbalance.scene import SceneError, bundled_scene, load_scene
 from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 

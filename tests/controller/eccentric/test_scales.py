@@ -10,16 +10,16 @@ import pytest
 from scipy.stats import binom, chi2
 
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.eccentric_mass.document import eccentric_document
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.run_record import eccentric_document
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
     eccentric_drawn,
     eccentric_scene,
 )
-from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed

@@ -14,15 +14,18 @@ import pytest
 from rich.console import Console
 
 import ringbalance
-from ringbalance.controller.eccentric_mass.document import eccentric_document
-from ringbalance.controller.eccentric_mass.plant.parameters import PlantParameters
-from ringbalance.controller.eccentric_mass.remedies import expected_deviation
+from ringbalance.controller.eccentric_mass.advice import expected_deviation
+from ringbalance.controller.eccentric_mass.plan import EccentricMeasurement
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, EccentricRun
+from ringbalance.controller.eccentric_mass.run_record import (
+    EccentricOutcome,
+    EccentricRun,
+    eccentric_document,
+)
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
-from ringbalance.controller.eccentric_mass.strategy.plan import EccentricMeasurement
-from ringbalance.controller.eccentric_mass.strategy.settings import StrategySettings
-from ringbalance.controller.eccentric_mass.strategy.step import strategy_start, strategy_step
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.step import strategy_start, strategy_step
 from ringbalance.reports.simulate_cli import simulate as command
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed

@@ -13,11 +13,11 @@ from ringbalance.controller.eccentric_mass import study as study_module
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.controller.eccentric_mass.study import (
     DRAWS,
-    EccentricRequirement,
     _EccentricStudy,
     eccentric_study,
     interval,
 )
+from ringbalance.results.requirements import Requirement
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.eccentric_scenes import changed
@@ -78,7 +78,7 @@ def uncertain(
     )
 
 
-def rows_of(scene: EccentricScene, *, draws: int = DRAWS) -> dict[str, EccentricRequirement]:
+def rows_of(scene: EccentricScene, *, draws: int = DRAWS) -> dict[str, Requirement]:
     """Requirements by quantity; few drawn runs do where the runs with one input moved are looked at."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "DRAWS", draws)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.controller.eccentric_mass.strategy.targets import assign, target_angles, wrapped
+from ringbalance.controller.eccentric_mass.targets import assign, target_angles, wrapped
 
 MOMENT = 0.0414
 GAP = 0.217

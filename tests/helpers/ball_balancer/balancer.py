@@ -18,18 +18,20 @@ from ringbalance.controller.balancer import (
     Input,
     Outcomes,
     Progress,
-    Run,
     Setting,
+    TracedRun,
     inputs_of,
     outcomes_of,
+    requirements_of,
     rotor_fault,
     vibrating,
-    with_settings,
 )
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
+from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.paths import with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 INSTANTS = 2001
@@ -121,9 +123,7 @@ class BallBalancer:
 
     def inputs(self) -> tuple[Input, ...]:
         """Those of the scene."""
-        values = {each.path: each.value for each in inputs_of(self.scene, {})}
-        widths = {each.quantity: each.absolute(values[each.quantity]) for each in self.scene.uncertainty}
-        return inputs_of(self.scene, widths)
+        return inputs_of(self.scene)
 
     def settings(self) -> tuple[Setting, ...]:
         """The drag, by the choice of the oil."""
@@ -139,16 +139,22 @@ class BallBalancer:
         progress: Progress | None = None,
     ) -> Outcomes:
         """One run a draw; a drawn device starts with its balls anywhere."""
-        scene = with_settings(self.scene, settings)
-        rows: list[tuple[Run, float | None, float, float, float]] = []
+        scene = with_values_at(self.scene, settings)
+        runs = []
         for place, number in enumerate(draws.numbers):
             if progress is not None:
                 progress(place * scene.run.time_limit, len(draws.numbers) * scene.run.time_limit)
             run = _rolled(self._drawn(scene, number) if draws.devices else scene)
-            worst = float(np.max(run.amplitude))
-            rows.append((run, run.settling_time, float(run.amplitude[-1]), 0.0, worst))
-        found = outcomes_of(rows)
-        return found if trace else replace(found, runs=())
+            runs.append(
+                TracedRun(
+                    run=run,
+                    settling_time=run.settling_time,
+                    final_amplitude=float(run.amplitude[-1]),
+                    energy=0.0,
+                    worst_amplitude=float(np.max(run.amplitude)),
+                )
+            )
+        return outcomes_of(runs, trace=trace)
 
     def _drawn(self, scene: BallScene, number: int) -> BallScene:
         random = np.random.default_rng([scene.run.seed, number])
@@ -159,7 +165,7 @@ class BallBalancer:
         }
         one, other = random.uniform(-math.pi, math.pi, 2).tolist()
         balls = replace(scene.balls, initial_angle=(one, other))
-        return with_settings(replace(scene, balls=balls), values)
+        return with_values_at(replace(scene, balls=balls), values)
 
     def rotor(self) -> CommonRotor:
         """The scene's."""
@@ -219,10 +225,26 @@ class BallBalancer:
             if progress is not None:
                 progress(f"drag {value:.3g} N*s/m")
             outcomes = self.run({drag.path: value}, Draws.first(8))
-            scene = with_settings(self.scene, {drag.path: value})
+            scene = with_values_at(self.scene, {drag.path: value})
             found.append(BallTuning(scene=scene, times=summary(outcomes.settling_time.tolist())))
         return max(
             found, key=lambda each: (each.times.settled.value, -(each.times.quantiles["p50"] or math.inf))
+        )
+
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Both balls side by side, their size left out."""
+        reach = 2 * self.scene.balls.mass * self.scene.balls.race_radius
+        return (Quantity(key="reach", name="usable moment in any direction", unit="kg m", value=reach),)
+
+    def requirements(self) -> tuple[Requirement, ...]:
+        """Those that any balancer has."""
+        scene, (reach,) = self.scene, self.quantities()
+        return requirements_of(
+            self,
+            unbalance=scene.rotor.unbalance,
+            reach=reach.value or 0.0,
+            residual=scene.vibration.limit,
+            settling_time=self.span(),
         )
 
     def rows(self, run: BallRun) -> Rows:

@@ -16,9 +16,8 @@ from ringbalance.scene.keys.fields import (
     quantity,
 )
 from ringbalance.scene.keys.schema import Schema, Table
-from ringbalance.scene.kinds import SceneKind
+from ringbalance.scene.kinds import SceneKind, reader_of
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.rules.check import reader_of
 
 
 @dataclass(frozen=True, kw_only=True)

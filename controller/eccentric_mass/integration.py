@@ -1,0 +1,468 @@
+"""The plant in time: steps of fifth order, cut where a mass stops, sticks or breaks away.
+
+Between such events the motion is smooth and a Runge-Kutta step of Dormand and Prince's fifth-order formula
+carries it; within the step that holds an event the event's time is found by bisection to the last digits,
+the mass is set to rest there, and the friction law gives what follows.  The step given is divided until it
+is short against every rate of the plant.  While friction holds both masses at
+constant speed the step has a closed form.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import time
+from collections.abc import Callable, Iterator
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.plant import (
+    HELD,
+    LOCKED,
+    SIZE,
+    SLIDING,
+    STUCK,
+    Drive,
+    PlantParameters,
+    angular_accelerations,
+    drive_of,
+    loads,
+    motions,
+    rest_state,
+    slips,
+    speed_at,
+    stuck_flags,
+    write_derivative,
+)
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.platform.compiled import compiled
+from ringbalance.scene.units import format_quantity
+
+LONGEST: Final = 0.1
+"""Greatest product of a substep and the plant's fastest rate."""
+_STAGES: Final = 6
+_BISECTIONS: Final = 40
+_MOST_EVENTS: Final = 64
+_COUPLING: Final = np.array(
+    [
+        [0, 0, 0, 0, 0],
+        [1 / 5, 0, 0, 0, 0],
+        [3 / 40, 9 / 40, 0, 0, 0],
+        [44 / 45, -56 / 15, 32 / 9, 0, 0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+    ]
+)
+"""Weights of the earlier stages, a row for each of the six stages of the formula of order 5.
+
+Source: Dormand and Prince, "A family of embedded Runge-Kutta formulae", J. Comp. Appl. Math. 6 (1980).
+"""
+_TIMES: Final = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0])
+"""Of the stages, as fractions of the step."""
+_WEIGHTS: Final = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
+"""Of the stages in the result of order 5."""
+_APART: Final = 1e-6
+"""Least distance of both roots, relative, which divides by it."""
+
+
+@compiled
+def _smooth(
+    parameters: PlantParameters,
+    state: FloatArray,
+    speed: float,
+    drive: Drive,
+    motion: tuple[int, int],
+    step: float,
+    work: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write the state one step later, the motions of the masses staying as they are.
+
+    `work` has one row for each stage and one for the argument of the next.
+    """
+    argument = work[_STAGES]
+    for stage in range(_STAGES):
+        for place in range(SIZE):
+            total = 0.0
+            for earlier in range(stage):
+                total += _COUPLING[stage, earlier] * work[earlier, place]
+            argument[place] = state[place] + step * total
+        then = speed + drive.rate * step * _TIMES[stage]
+        write_derivative(parameters, argument, then, drive, motion, work[stage])
+    for place in range(SIZE):
+        total = 0.0
+        for stage in range(_STAGES):
+            total += _WEIGHTS[stage] * work[stage, place]
+        out[place] = state[place] + step * total
+
+
+@compiled
+def _broken(
+    parameters: PlantParameters,
+    state: FloatArray,
+    stuck: IntArray,
+    speed: float,
+    drive: Drive,
+    motion: tuple[int, int],
+) -> bool:
+    """Whether a mass no longer moves, or is no longer held, as `motion` says."""
+    if motion[0] * state[6] < 0.0 or motion[1] * state[7] < 0.0:
+        return True
+    held_1 = motion[0] == HELD and stuck[0] != LOCKED
+    held_2 = motion[1] == HELD and stuck[1] != LOCKED
+    if not held_1 and not held_2:
+        return False
+    torques = loads(parameters, state, speed, drive).torques
+    one, two = angular_accelerations(torques, motion[0], motion[1])
+    return (held_1 and slips(torques, 0, two)) or (held_2 and slips(torques, 1, one))
+
+
+@compiled
+def _first_event(
+    parameters: PlantParameters,
+    state: FloatArray,
+    stuck: IntArray,
+    speed: float,
+    drive: Drive,
+    motion: tuple[int, int],
+    step: float,
+    work: FloatArray,
+    out: FloatArray,
+) -> float:
+    """Time just after the first event within a step; the state there is written."""
+    before, after = 0.0, step
+    for trial in range(_BISECTIONS + 1):
+        middle = 0.5 * (before + after)
+        last = trial == _BISECTIONS or not before < middle < after
+        time = after if last else middle
+        _smooth(parameters, state, speed, drive, motion, time, work, out)
+        if last:
+            break
+        if _broken(parameters, out, stuck, speed + drive.rate * middle, drive, motion):
+            after = middle
+        else:
+            before = middle
+    for mass in range(2):
+        if motion[mass] * out[6 + mass] < 0.0:
+            out[6 + mass] = 0.0
+    return after
+
+
+@compiled
+def _advance(
+    parameters: PlantParameters,
+    state: FloatArray,
+    stuck: IntArray,
+    speed: float,
+    drive: Drive,
+    step: float,
+    work: FloatArray,
+    trial: FloatArray,
+) -> None:
+    """Carry state and flags through one substep, event by event, in place."""
+    done = 0.0
+    for event in range(_MOST_EVENTS):
+        now = speed + drive.rate * done
+        motion = motions(loads(parameters, state, now, drive).torques, state, stuck)
+        for mass in range(2):
+            if stuck[mass] != LOCKED:
+                stuck[mass] = STUCK if motion[mass] == HELD else SLIDING
+        left = step - done
+        _smooth(parameters, state, now, drive, motion, left, work, trial)
+        cut = event < _MOST_EVENTS - 1 and _broken(
+            parameters, trial, stuck, now + drive.rate * left, drive, motion
+        )
+        if cut:
+            done += _first_event(parameters, state, stuck, now, drive, motion, left, work, trial)
+        # An element at a time: numba compiles array assignment ten times as long.
+        for place in range(SIZE):
+            state[place] = trial[place]
+        if not cut or done >= step:
+            return
+
+
+@compiled
+def fastest_rate(parameters: PlantParameters, speed: float) -> float:
+    """Bound on any rate, rad/s: |W| + sqrt(K_B/M) + C_B/M + C_add/(J + J_add - 2 b^2/M)."""
+    least = parameters.inertia + parameters.drive_inertia - 2 * parameters.moment**2 / parameters.mass
+    rotor = math.sqrt(parameters.stiffness / parameters.mass) + parameters.damping / parameters.mass
+    return abs(speed) + rotor + parameters.drive_damping / least
+
+
+@compiled
+def substeps(parameters: PlantParameters, speed: float, rate: float, step: float) -> int:
+    """Number of substeps that keeps each short against every rate of the plant. Returns: At least 1."""
+    fastest = fastest_rate(parameters, max(abs(speed), abs(speed + rate * step)))
+    return max(1, math.ceil(fastest * step / LONGEST))
+
+
+@compiled
+def plant_step(
+    parameters: PlantParameters,
+    state: FloatArray,
+    stuck: IntArray,
+    command: FloatArray,
+    speed: float,
+    speed_rate: float,
+    step: float,
+) -> tuple[FloatArray, IntArray]:
+    """Carry the plant through one step, voltages held and the rotor's speed linear in time.
+
+    Returns: State and flags at the end, as new arrays.
+    Range: the masses are points on the track; that they could touch is for the caller to prevent.
+    Source: Dormand and Prince (1980), the fifth-order formula.
+    """
+    after, flags = state.copy(), stuck.copy()
+    for mass in range(2):
+        if flags[mass] == LOCKED:
+            after[6 + mass] = 0.0
+    drive = drive_of(parameters, command, speed_rate)
+    if held_step(parameters, after, flags, speed, drive, step):
+        return after, flags
+    parts = substeps(parameters, speed, speed_rate, step)
+    short = step / parts
+    work, trial = np.empty((_STAGES + 1, SIZE)), np.empty(SIZE)
+    for part in range(parts):
+        now = speed + speed_rate * short * part
+        _advance(parameters, after, flags, now, drive, short, work, trial)
+    return after, flags
+
+
+@compiled
+def held_step(
+    parameters: PlantParameters,
+    state: FloatArray,
+    stuck: IntArray,
+    speed: float,
+    drive: Drive,
+    step: float,
+) -> bool:
+    """Carry the rotor through one step, in place, if both masses are held for sure; say whether they are.
+
+    The deviation d = z - z_s from the steady whirl obeys M D'' + C_B D' + K_B D = 0 for D = d exp(j W t), so
+    d = d_1 exp((s_1 - j W) t) + d_2 exp((s_2 - j W) t), with s the roots of M s^2 + C_B s + K_B.  The track's
+    acceleration is -W^2 z_s + s_1^2 d_1 ... + s_2^2 d_2 ...; since no root grows, the sum of the magnitudes
+    bounds what friction has to hold from now on.
+    """
+    if drive.rate != 0.0 or speed == 0.0 or state[6] != 0.0 or state[7] != 0.0:
+        return False
+    mass, half = parameters.mass, 0.5 * parameters.damping / parameters.mass
+    root = cmath.sqrt(complex(half * half - parameters.stiffness / mass, 0.0))
+    first, second = root - half, -root - half
+    if abs(root) < _APART * abs(first) or second.real > 0.0 or first.real > 0.0:
+        return False
+    steady = _steady(parameters, state, speed, drive)
+    away, turning = complex(state[0], state[1]) - steady, complex(0.0, speed)
+    velocity = complex(state[2], state[3])
+    one = (velocity - (second - turning) * away) / (first - second)
+    two = away - one
+    pull = abs(first) ** 2 * abs(one) + abs(second) ** 2 * abs(two)
+    if not _hold_surely(parameters, state, stuck, speed, drive, steady, pull):
+        return False
+    one *= cmath.exp((first - turning) * step)
+    two *= cmath.exp((second - turning) * step)
+    place, pace = steady + one + two, (first - turning) * one + (second - turning) * two
+    state[0], state[1], state[2], state[3] = place.real, place.imag, pace.real, pace.imag
+    for i in range(2):
+        if stuck[i] != LOCKED:
+            stuck[i] = STUCK
+    return True
+
+
+@compiled
+def _steady(parameters: PlantParameters, state: FloatArray, speed: float, drive: Drive) -> complex:
+    moment = complex(drive.unbalance_x, drive.unbalance_y)
+    for i in range(2):
+        moment += parameters.moment * complex(math.cos(state[4 + i]), math.sin(state[4 + i]))
+    dynamic = complex(parameters.stiffness - parameters.mass * speed * speed, parameters.damping * speed)
+    # Without damping at the critical speed there is none: friction then holds nothing for sure.
+    return speed * speed * moment / dynamic if dynamic != 0 else complex(math.inf, 0.0)
+
+
+@compiled
+def _hold_surely(
+    parameters: PlantParameters,
+    state: FloatArray,
+    stuck: IntArray,
+    speed: float,
+    drive: Drive,
+    steady: complex,
+    pull: float,
+) -> bool:
+    """Whether friction holds both masses against drive, steady whirl and any deviation of that size."""
+    for i in range(2):
+        if stuck[i] == LOCKED:
+            continue
+        torque, arm = drive.torque_1, parameters.friction_arm_1
+        if i == 1:
+            torque, arm = drive.torque_2, parameters.friction_arm_2
+        across = steady.imag * math.cos(state[4 + i]) - steady.real * math.sin(state[4 + i])
+        load = abs(torque + parameters.moment * speed * speed * across) + parameters.moment * pull
+        if not load <= arm * parameters.moment * speed * speed:
+            return False
+    return math.isfinite(pull)
+
+
+MOST_SUBSTEPS: Final = 30_000_000
+"""About one minute, at 2 us each."""
+MOST_SAMPLES: Final = 2_000_000
+"""About 500 MB of histories."""
+
+
+def check_substeps(scene: EccentricScene) -> None:
+    """Refuse a scene whose run would take many minutes or much memory.
+
+    A substep lasts at most 0.1 / (|W| + sqrt(K_B / M) + C_B / M + C_add / J_least).
+    Raises: SceneError: more than `MOST_SAMPLES`, or more than `MOST_SUBSTEPS`; it names the key of the
+    fastest rate and what is allowed.
+    """
+    samples = scene.run.time_limit / scene.sensor.step + 1
+    if samples > MOST_SAMPLES:
+        longest = scene.sensor.step * (MOST_SAMPLES - 1)
+        problem = f"the run would take {samples:.3g} samples, and {MOST_SAMPLES:.3g} are the most"
+        value = format_quantity(scene.run.time_limit, "time", "s")
+        allowed = f"at most {longest:.4g} s, or a longer sensor.step"
+        raise SceneError([_fault(scene, ("run", "time_limit"), value, problem, allowed)])
+    count = _substeps(scene)
+    if count > MOST_SUBSTEPS:
+        key, value, allowed = _fastest(scene)
+        problem = (
+            f"the run would take {count:.3g} steps of the integration, and {MOST_SUBSTEPS:.3g} are the most"
+        )
+        raise SceneError([_fault(scene, key, value, problem, f"{allowed}, or a shorter run.time_limit")])
+
+
+def longest_run(scene: EccentricScene) -> float:
+    """Longest run.time_limit that `check_substeps` allows, s, if the speed stays what it is on average."""
+    by_samples = scene.sensor.step * (MOST_SAMPLES - 1)
+    return min(by_samples, scene.run.time_limit * MOST_SUBSTEPS / _substeps(scene))
+
+
+def _substeps(scene: EccentricScene) -> float:
+    parameters, step = PlantParameters.of(scene), scene.sensor.step
+    times, speeds = scene.rotor.profile
+    samples = scene.samples
+    # Not at every sample: close enough for a limit, and cheap.
+    at = np.linspace(0.0, scene.run.time_limit, min(samples, 10_000))
+    rates = np.abs(np.interp(at, times, speeds)) + fastest_rate(parameters, 0.0)
+    return samples * float(np.mean(np.maximum(np.ceil(rates * step / LONGEST), 1.0)))
+
+
+def _fastest(scene: EccentricScene) -> tuple[tuple[str, str], str, str]:
+    """Key, present value and limit of the largest of the rates that the steps follow from."""
+    plant, resistance = PlantParameters.of(scene), scene.motor.resistance
+    least = plant.inertia + plant.drive_inertia - 2 * plant.moment**2 / plant.mass
+    speed = max(abs(point.speed) for point in scene.rotor.speed_profile)
+    whirl, damped = math.sqrt(plant.stiffness / plant.mass), plant.damping / plant.mass
+    drive = plant.drive_damping / least
+    # Half of what the whole run may have: the other rates take their part.
+    rate = 0.5 * MOST_SUBSTEPS * LONGEST / scene.run.time_limit
+    most, lowest = "at most", "at least"
+    keys = [
+        (whirl, ("rotor", "stiffness"), plant.stiffness, most, plant.mass * rate**2, "stiffness", "N/m"),
+        (damped, ("rotor", "damping"), plant.damping, most, plant.mass * rate, "damping", "N*s/m"),
+        (speed, ("rotor", "speed_profile"), speed, most, rate, "speed", "rpm"),
+        (drive, ("motor", "resistance"), resistance, lowest, resistance * drive / rate, "resistance", "ohm"),
+    ]
+    _, key, value, bound, limit, dimension, unit = max(keys)
+    shown = format_quantity(limit, dimension, unit, digits=3)
+    return key, format_quantity(value, dimension, unit), f"{bound} {shown}"
+
+
+def _fault(scene: EccentricScene, key: tuple[str, str], value: str, problem: str, allowed: str) -> Fault:
+    return Fault(file=scene.file, table=key[0], key=key[1], value=value, problem=problem, allowed=allowed)
+
+
+_FIRST: Final = 64
+_MOST: Final = 10_000
+_SHORT: Final = 0.05
+"""A piece that took less is followed by one of twice the samples, s."""
+_LONG: Final = 0.2
+"""A piece that took more is followed by one of half the samples, s."""
+
+Progress = Callable[[float, float], None]
+"""Called with the simulated time and the time limit, s."""
+
+
+class _PlantRun(NamedTuple):
+    """History of the plant."""
+
+    time: FloatArray
+    """s, shape (steps + 1,)."""
+    speed: FloatArray
+    """W, rad/s, shape (steps + 1,)."""
+    state: FloatArray
+    """Shape (steps + 1, 8)."""
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """Zero-to-peak vibration sqrt(x^2 + y^2), m, shape (steps + 1,)."""
+        amplitude: FloatArray = np.hypot(self.state[:, 0], self.state[:, 1])
+        return amplitude
+
+
+@compiled
+def run_steps(
+    parameters: PlantParameters,
+    times: FloatArray,
+    speeds: FloatArray,
+    state: FloatArray,
+    stuck: IntArray,
+    commands: FloatArray,
+    step: float,
+    first: int = 0,
+) -> tuple[FloatArray, IntArray]:
+    """States, shape (steps + 1, 8), and flags, shape (steps + 1, 2), over steps of equal length."""
+    count = commands.shape[0]
+    states, flags = np.empty((count + 1, state.size)), np.empty((count + 1, 2), np.int64)
+    for place in range(count + 1):
+        for entry in range(state.size):
+            states[place, entry] = state[entry]
+        flags[place, 0], flags[place, 1] = stuck[0], stuck[1]
+        if place < count:
+            speed, rate = speed_at(times, speeds, (first + place) * step)
+            state, stuck = plant_step(parameters, state, stuck, commands[place], speed, rate, step)
+    return states, flags
+
+
+def run_plant(scene: EccentricScene, *, locked: bool = False, progress: Progress | None = None) -> _PlantRun:
+    """Run a scene's plant from rest, with its drives switched off.
+
+    Args: `locked`: whether both masses are clamped to the track. `progress`: called several times a second;
+    None for silence.
+    Raises: SceneError: a run that takes too many substeps.
+    """
+    check_substeps(scene)
+    step, count = scene.sensor.step, scene.samples - 1
+    times, speeds = scene.rotor.profile
+    parameters, flags = PlantParameters.of(scene), stuck_flags(LOCKED if locked else STUCK)
+    states = np.empty((count + 1, SIZE))
+    states[0] = rest_state(scene.masses.initial_angle)
+    for begin, end in stretches(count):
+        off = np.zeros((end - begin, 2))
+        states[begin : end + 1], passed = run_steps(
+            parameters, times, speeds, states[begin], flags, off, step, begin
+        )
+        flags = passed[-1]
+        if progress is not None:
+            progress(end * step, scene.run.time_limit)
+    elapsed: FloatArray = np.arange(len(states), dtype=np.float64) * step
+    return _PlantRun(elapsed, np.interp(elapsed, times, speeds), states)
+
+
+def stretches(samples: int) -> Iterator[tuple[int, int]]:
+    """Pieces of the samples by the caller's time for each: its first number and one past its last."""
+    begin, size = 0, _FIRST
+    while begin < samples:
+        end = min(begin + size, samples)
+        started = time.perf_counter()
+        yield begin, end
+        elapsed = time.perf_counter() - started
+        if elapsed > _LONG:
+            size = max(size // 2, 1)
+        elif elapsed < _SHORT:
+            size = min(2 * size, _MOST)
+        begin = end

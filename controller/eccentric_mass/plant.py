@@ -1,0 +1,402 @@
+"""The plant: rotor on its bearing, imbalance, two masses, motors, friction; in the frame that turns with it.
+
+With M = m_r + 2 m_b, b = m_b r_b, J = m_b r_b^2, U = m_im r_im, W the rotor's speed and W' its rate:
+
+    a_x = x'' - 2 W y' - W' y - W^2 x,    a_y = y'' + 2 W x' + W' x - W^2 y
+    M a_x + C_B (x' - W y) + K_B x = U (W^2 cos phi_m + W' sin phi_m)
+                                     + b sum[(W + phi_i')^2 cos phi_i + (W' + phi_i'') sin phi_i]
+    M a_y + C_B (y' + W x) + K_B y = U (W^2 sin phi_m - W' cos phi_m)
+                                     + b sum[(W + phi_i')^2 sin phi_i - (W' + phi_i'') cos phi_i]
+    J (phi_i'' + W') + b (-a_x sin phi_i + a_y cos phi_i) = u_i - friction_i
+
+The motor shaft turns n = N_3 / N_1 times as fast as the mass along the track.  Without inductance and with
+i = (V - K_m n phi') / R_m the torque on the mass is
+
+    u = n K_i V / R_m - n^2 K_i K_m / R_m phi' - J_add phi'',
+
+positive voltage driving the mass with the rotation.  The signs follow from K_i i = J_1 theta_1'' + T_1 on the
+motor shaft, T_2 = J_2 theta_2'' + T_3 on gear B, equal power at each mesh, and theta_1 = n phi; the inertia
+and the back-emf both oppose the motion.
+
+The imbalance mass is a part of m_r.  The state is [x, y, x', y', phi_1, phi_2, phi_1', phi_2'], angles not
+wrapped; beside it each mass is SLIDING, STUCK or LOCKED.  A locked mass is clamped to its track
+by a brake that no torque overcomes.
+
+Dry friction is a set-valued law: which masses are held, which slide, and which way.  A mass that slides is
+braked by mu_f b (W + phi')^2.  A mass at rest on its track is held by whatever torque it takes, up to
+mu_f b W^2; beyond that it breaks away in the direction of the torque.  Since phi'' enters both masses'
+equations, two masses at rest are looked at together: the mass matrix is positive definite, so exactly one of
+the nine combinations of held, forwards and backwards is consistent.
+
+Source: Eqs. (1) to (11) of the paper on eccentric masses, rederived; docs/eccentric-masses.md has the
+differences.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, Motor
+from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.scene.platform.compiled import compiled
+
+
+class PlantParameters(NamedTuple):
+    """Constants of rotor, masses and motors, SI."""
+
+    mass: float
+    """M = m_r + 2 m_b, kg."""
+    damping: float
+    """C_B, N s/m."""
+    stiffness: float
+    """K_B, N/m."""
+    unbalance: float
+    """U = m_im r_im, kg m."""
+    phase: float
+    """phi_m of the unbalance in the rotor's frame, rad."""
+    moment: float
+    """b = m_b r_b of one eccentric mass, kg m."""
+    inertia: float
+    """J = m_b r_b^2 of one eccentric mass, kg m^2."""
+    drive_inertia: float
+    """Motor and gear B reflected to phi, kg m^2."""
+    drive_damping: float
+    """Back-emf reflected to phi, N m s."""
+    drive_gain: float
+    """Torque on a mass per motor voltage, N m/V."""
+    friction_arm_1: float
+    """mu_f of the first mass, m."""
+    friction_arm_2: float
+    """mu_f of the second mass, m."""
+    gear_ratio: float
+    """Turns of the motor per turn of the mass, N_3 / N_1."""
+    back_emf_constant: float
+    """K_m, V s/rad."""
+    resistance: float
+    """R_m, ohm."""
+    maximum_voltage: float
+    """V; infinite for no limit."""
+
+    def influence(self, speed: float) -> complex:
+        """Steady vibration per unbalance.
+
+        alpha = W^2 / (K_B - M W^2 + j C_B W).
+        Returns: m/(kg m), complex: the lag is minus its phase.
+        Raises: ValueError: no damping, at the critical speed.
+        """
+        stiffness = complex(self.stiffness - self.mass * speed**2, self.damping * speed)
+        if stiffness == 0:
+            raise ValueError("a rotor without damping has no steady whirl at its critical speed")
+        return speed**2 / stiffness
+
+    def steady_whirl(self, speed: float, angles: Sequence[float]) -> complex:
+        """Displacement x + j y in the rotor's frame at constant speed, masses at rest on the track.
+
+        alpha (U exp(j phi_m) + b sum exp(j phi_i)).
+        Returns: m, complex; its magnitude is the zero-to-peak vibration.
+        Raises: ValueError: no damping, at the critical speed.
+        """
+        masses = sum(cmath.exp(1j * angle) for angle in angles)
+        moment = self.unbalance * cmath.exp(1j * self.phase) + self.moment * masses
+        return self.influence(speed) * moment
+
+    @classmethod
+    def of(cls, scene: EccentricScene) -> PlantParameters:
+        """Gather the plant's constants.
+
+        J_add = (J_1 + J_2 (N_1/N_2)^2) (N_3/N_1)^2, C_add = K_i K_m / R_m (N_3/N_1)^2,
+        B_add = K_i / R_m N_3/N_1.
+        Source: Appendix A of the paper on eccentric masses, rederived; its Eq. (A9) with all signs.
+        """
+        masses, rotor, imbalance, motor = scene.masses, scene.rotor, scene.imbalance, scene.motor
+        ratio = motor.teeth[2] / motor.teeth[0]
+        moment = masses.mass * masses.guide_radius
+        return cls(
+            mass=rotor.mass + 2 * masses.mass,
+            damping=rotor.damping,
+            stiffness=rotor.stiffness,
+            unbalance=imbalance.mass * imbalance.radius,
+            phase=imbalance.phase,
+            moment=moment,
+            inertia=moment * masses.guide_radius,
+            drive_inertia=_reflected_inertia(motor),
+            drive_damping=motor.torque_constant * motor.back_emf_constant / motor.resistance * ratio**2,
+            drive_gain=motor.torque_constant / motor.resistance * ratio,
+            friction_arm_1=masses.friction_arm[0],
+            friction_arm_2=masses.friction_arm[1],
+            gear_ratio=ratio,
+            back_emf_constant=motor.back_emf_constant,
+            resistance=motor.resistance,
+            maximum_voltage=math.inf if motor.maximum_voltage is None else motor.maximum_voltage,
+        )
+
+
+def _reflected_inertia(motor: Motor) -> float:
+    first, second, third = motor.teeth
+    return (motor.motor_inertia + motor.gear_inertia * (first / second) ** 2) * (third / first) ** 2
+
+
+@compiled
+def speed_at(times: FloatArray, speeds: FloatArray, time: float) -> tuple[float, float]:
+    """W, rad/s, and W', rad/s^2, just after a time; constant before the first corner and after the last."""
+    if time < times[0]:
+        return speeds[0], 0.0
+    for place in range(len(times) - 1):
+        if time < times[place + 1]:
+            rate = (speeds[place + 1] - speeds[place]) / (times[place + 1] - times[place])
+            return speeds[place] + rate * (time - times[place]), rate
+    return speeds[-1], 0.0
+
+
+@compiled
+def turned(times: FloatArray, speeds: FloatArray, time: float) -> float:
+    """Angle of the rotor, the integral of its speed from time zero. Returns: rad, not wrapped."""
+    angle: float = speeds[0] * min(time, times[0])
+    for place in range(len(times) - 1):
+        end = min(time, times[place + 1])
+        if end > times[place]:
+            now, _ = speed_at(times, speeds, times[place])
+            slope = (speeds[place + 1] - speeds[place]) / (times[place + 1] - times[place])
+            length = end - times[place]
+            angle += now * length + 0.5 * slope * length * length
+    angle += speeds[-1] * max(0.0, time - times[-1])
+    return angle
+
+
+SLIDING: Final = 0
+STUCK: Final = 1
+LOCKED: Final = 2
+
+HELD: Final = 0
+FORWARDS: Final = 1
+BACKWARDS: Final = -1
+
+_ROUNDING: Final = 1e-12
+
+
+class _Torques(NamedTuple):
+    """The equations of both masses once the rotor's accelerations are eliminated.
+
+    A phi'' = g - friction, with A = [[own, cross], [cross, own]].
+    """
+
+    own: float
+    """J + J_add - b^2 / M, kg m^2."""
+    cross: float
+    """-b^2 / M cos(phi_1 - phi_2), kg m^2."""
+    driving_1: float
+    """g of the first mass, all torques but friction, N m."""
+    driving_2: float
+    """g of the second mass, N m."""
+    friction_1: float
+    """mu_f b (W + phi')^2 of the first mass, N m."""
+    friction_2: float
+    """mu_f b (W + phi')^2 of the second mass, N m."""
+
+
+@compiled
+def angular_accelerations(torques: _Torques, first: int, second: int) -> tuple[float, float]:
+    """Solve for phi'' of both masses in given motions. Returns: phi_1'' and phi_2'', rad/s^2."""
+    net_1 = torques.driving_1 - first * torques.friction_1
+    net_2 = torques.driving_2 - second * torques.friction_2
+    if first == HELD:
+        return 0.0, 0.0 if second == HELD else net_2 / torques.own
+    if second == HELD:
+        return net_1 / torques.own, 0.0
+    determinant = torques.own * torques.own - torques.cross * torques.cross
+    one = (torques.own * net_1 - torques.cross * net_2) / determinant
+    two = (torques.own * net_2 - torques.cross * net_1) / determinant
+    return one, two
+
+
+@compiled
+def slips(torques: _Torques, mass: int, other_acceleration: float) -> bool:
+    """Whether a held mass breaks loose: |g - cross phi''_other| > mu_f b W^2."""
+    driving = torques.driving_1 if mass == 0 else torques.driving_2
+    most = torques.friction_1 if mass == 0 else torques.friction_2
+    return abs(driving - torques.cross * other_acceleration) > most * (1.0 + _ROUNDING)
+
+
+@compiled
+def _consistent(torques: _Torques, first: int, second: int, loose_1: bool, loose_2: bool) -> bool:
+    """Whether motions of masses at rest hold together; a mass that already moves is not asked."""
+    one, two = angular_accelerations(torques, first, second)
+    if loose_1 and first == HELD and slips(torques, 0, two):
+        return False
+    if loose_2 and second == HELD and slips(torques, 1, one):
+        return False
+    if loose_1 and first != HELD and first * one < 0.0:
+        return False
+    return not (loose_2 and second != HELD and second * two < 0.0)
+
+
+@compiled
+def _sliding(rate: float) -> int:
+    return FORWARDS if rate > 0.0 else BACKWARDS
+
+
+@compiled
+def motions(torques: _Torques, state: FloatArray, stuck: IntArray) -> tuple[int, int]:
+    """Which way each mass moves, or that it is held: HELD, FORWARDS or BACKWARDS."""
+    loose_1 = stuck[0] != LOCKED and state[6] == 0.0
+    loose_2 = stuck[1] != LOCKED and state[7] == 0.0
+    known_1 = HELD if stuck[0] == LOCKED else _sliding(state[6])
+    known_2 = HELD if stuck[1] == LOCKED else _sliding(state[7])
+    for turn_1 in range(3):
+        first = (HELD, FORWARDS, BACKWARDS)[turn_1] if loose_1 else known_1
+        for turn_2 in range(3):
+            second = (HELD, FORWARDS, BACKWARDS)[turn_2] if loose_2 else known_2
+            if _consistent(torques, first, second, loose_1, loose_2):
+                return first, second
+            if not loose_2:
+                break
+        if not loose_1:
+            break
+    # Only rounding can bring us here: the torques are at their bounds.
+    return (HELD if loose_1 else known_1), (HELD if loose_2 else known_2)
+
+
+SIZE: Final = 8
+
+
+class Drive(NamedTuple):
+    """What acts on the plant from outside while a step lasts."""
+
+    unbalance_x: float
+    """U cos phi_m, kg m."""
+    unbalance_y: float
+    """U sin phi_m, kg m."""
+    torque_1: float
+    """Of the first motor at standstill, B_add V, N m."""
+    torque_2: float
+    """Of the second motor at standstill, N m."""
+    rate: float
+    """W', rad/s^2, constant."""
+
+
+class _Loads(NamedTuple):
+    """Forces on rotor and masses in one state."""
+
+    force_x: float
+    """All but M a_x and b phi_i'' sin phi_i in the first equation, N."""
+    force_y: float
+    """Likewise in the second, N."""
+    torques: _Torques
+    """Of the masses."""
+
+
+@compiled
+def _limited(voltage: float, maximum: float) -> float:
+    """A voltage cut to what the supply can give, which may be infinite."""
+    return min(max(voltage, -maximum), maximum)
+
+
+@compiled
+def drive_of(parameters: PlantParameters, command: FloatArray, rate: float) -> Drive:
+    """Gather what acts on the plant from outside."""
+    most = parameters.maximum_voltage
+    return Drive(
+        parameters.unbalance * math.cos(parameters.phase),
+        parameters.unbalance * math.sin(parameters.phase),
+        parameters.drive_gain * _limited(command[0], most),
+        parameters.drive_gain * _limited(command[1], most),
+        rate,
+    )
+
+
+@compiled
+def loads(parameters: PlantParameters, state: FloatArray, speed: float, drive: Drive) -> _Loads:
+    """Forces on the rotor, and the masses' equations with the rotor's accelerations eliminated.
+
+    A phi'' = g - friction, with A_ij = (J + J_add) delta_ij - b^2 / M cos(phi_i - phi_j) and
+    g_i = u_i - J W' - b / M (-F_x sin phi_i + F_y cos phi_i).
+    """
+    b, rate = parameters.moment, drive.rate
+    cos_1, sin_1 = math.cos(state[4]), math.sin(state[4])
+    cos_2, sin_2 = math.cos(state[5]), math.sin(state[5])
+    square_1, square_2 = (speed + state[6]) ** 2, (speed + state[7]) ** 2
+    force_x = b * (square_1 * cos_1 + rate * sin_1 + square_2 * cos_2 + rate * sin_2)
+    force_y = b * (square_1 * sin_1 - rate * cos_1 + square_2 * sin_2 - rate * cos_2)
+    force_x += speed * speed * drive.unbalance_x + rate * drive.unbalance_y
+    force_y += speed * speed * drive.unbalance_y - rate * drive.unbalance_x
+    force_x -= parameters.damping * (state[2] - speed * state[1]) + parameters.stiffness * state[0]
+    force_y -= parameters.damping * (state[3] + speed * state[0]) + parameters.stiffness * state[1]
+    lever = b / parameters.mass
+    common = parameters.inertia * rate
+    torques = _Torques(
+        parameters.inertia + parameters.drive_inertia - b * lever,
+        -b * lever * (cos_1 * cos_2 + sin_1 * sin_2),
+        drive.torque_1
+        - parameters.drive_damping * state[6]
+        - common
+        - lever * (force_y * cos_1 - force_x * sin_1),
+        drive.torque_2
+        - parameters.drive_damping * state[7]
+        - common
+        - lever * (force_y * cos_2 - force_x * sin_2),
+        parameters.friction_arm_1 * b * square_1,
+        parameters.friction_arm_2 * b * square_2,
+    )
+    return _Loads(force_x, force_y, torques)
+
+
+@compiled
+def write_derivative(
+    parameters: PlantParameters,
+    state: FloatArray,
+    speed: float,
+    drive: Drive,
+    motion: tuple[int, int],
+    out: FloatArray,
+) -> None:
+    """Write the time derivative of the state for given motions of the masses."""
+    found = loads(parameters, state, speed, drive)
+    one, two = angular_accelerations(found.torques, motion[0], motion[1])
+    b, rate = parameters.moment, drive.rate
+    pull_x = b * (math.sin(state[4]) * one + math.sin(state[5]) * two)
+    pull_y = b * (math.cos(state[4]) * one + math.cos(state[5]) * two)
+    accelerated_x = (found.force_x + pull_x) / parameters.mass
+    accelerated_y = (found.force_y - pull_y) / parameters.mass
+    out[0] = state[2]
+    out[1] = state[3]
+    out[2] = accelerated_x + 2 * speed * state[3] + rate * state[1] + speed * speed * state[0]
+    out[3] = accelerated_y - 2 * speed * state[2] - rate * state[0] + speed * speed * state[1]
+    out[4] = state[6]
+    out[5] = state[7]
+    out[6] = one
+    out[7] = two
+
+
+def rest_state(angles: tuple[float, float]) -> FloatArray:
+    """The state of a rotor at its centre, in its own frame, with masses at rest on the track, shape (8,)."""
+    return np.array([0.0, 0.0, 0.0, 0.0, angles[0], angles[1], 0.0, 0.0])
+
+
+def stuck_flags(flag: int) -> IntArray:
+    """The same flag for both masses. Returns: Shape (2,)."""
+    return np.full(2, flag, dtype=np.int64)
+
+
+@compiled
+def electrical_energy(
+    parameters: PlantParameters, before: FloatArray, after: FloatArray, command: FloatArray, step: float
+) -> float:
+    """Energy that both motors take from the supply while their voltages are held.
+
+    E = sum V (V h - K_m n (phi(t + h) - phi(t))) / R_m, the exact integral of V i; negative when a motor
+    feeds back.
+    Returns: J.
+    Source: Kirchhoff's law for the motor without inductance, Eqs. (A1) to (A3) of the paper on eccentric
+    masses.
+    """
+    total = 0.0
+    for mass in range(2):
+        voltage = _limited(command[mass], parameters.maximum_voltage)
+        turned = parameters.gear_ratio * (after[4 + mass] - before[4 + mass])
+        total += voltage * (voltage * step - parameters.back_emf_constant * turned) / parameters.resistance
+    return total

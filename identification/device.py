@@ -1,0 +1,164 @@
+"""The device of a scene as predictions take it: its law, and the fills that injections leave behind.
+
+The law is the calibrated one without finite elements and uncertainties; injections run through the closed
+loop's own equations of motion, with the liquid's mass and its way up to the crest always, and the gas line
+and the lag of the valve where the scene gives them.  Which models serve the scene is decided once, so that a
+prediction is smooth in values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.terms import dynamics_of
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.reduced_model.injection.dynamics import WORKSPACE, X
+from ringbalance.reduced_model.injection.events import command
+from ringbalance.reduced_model.injection.march import advance
+from ringbalance.reduced_model.injection.pair import Motion, packed
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, nominal_law
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import Holding
+from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.fitted import START_ERROR
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import NORMAL_95
+
+RELATIVE_ERROR: Final = 1e-5
+"""Allowed to one step of an injection: the derivatives by differences are then within 1e-5 of those at a
+thousandth of it, below what counts as dependent."""
+_SETTLED: Final = 10.0
+"""s after a valve has closed: the gas has vented and the liquid rests, or has run back."""
+_KEPT: Final = 128
+_LEAST_LEFT: Final = 0.1
+"""Of a valve-open time, when the start of the flow is supposed late."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Models:
+    """Models that predictions of a scene and its neighbours take, by the scene's own tolerance."""
+
+    velocity: float
+    """Of a primed tube at equal fills, m/s."""
+    gas_pressure: float
+    """Of the scene that is fitted, gauge, Pa: by what another one's differs the gauge of the data is off."""
+    other: Callable[[CalibratedLaw], CalibratedLaw] | None = None
+    """Makes another law of the scene's, to be compared with it."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> Models:
+        """The models that `calibrate` takes."""
+        law = nominal_law(scene, gravity=scene.environment.gravity > 0)
+        return cls(
+            velocity=_primed_velocity(law, scene),
+            gas_pressure=scene.gas.pressure - scene.gas.gauge_correction,
+        )
+
+    def with_gauge_correction(self, scene: Scene) -> Scene:
+        """A fitted scene that says by how much the gauge of the data is off."""
+        off = scene.gas.pressure - self.gas_pressure
+        return replace(scene, gas=replace(scene.gas, gauge_correction=off))
+
+
+def _primed_velocity(law: CalibratedLaw, scene: Scene) -> float:
+    """Of a primed tube at equal fills under the scene's gas, m/s; zero where it is blocked."""
+    fill = scene.disc.initial_fill
+    return abs(float(law.evaluate(fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True).velocity))
+
+
+def runs_back(scene: Scene, _: Observations) -> str:
+    """Why no injection leaves a change behind; empty where the tube holds at equal fills."""
+    found = Holding.of(scene, fill_ratio=scene.disc.initial_fill).finding
+    return "" if found is None else f"by this scene no injection leaves a change behind: {found.text}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Device:
+    """Disc, tube and gas line of a scene."""
+
+    scene: Scene
+    models: Models
+
+    @cached_property
+    def law(self) -> CalibratedLaw:
+        """Flow law and moments.
+
+        Which flows carry the gas out of the crest is decided by the scene that is fitted: what a faster one
+        would tell of k by that rests on a Froude number that is not known so well.
+        """
+        law = nominal_law(self.scene, gravity=self.scene.environment.gravity > 0)
+        velocity = _primed_velocity(law, self.scene)
+        if velocity > 0 and self.models.velocity > 0:
+            froude = law.path.froude_velocity * velocity / self.models.velocity
+            law = replace(law, path=replace(law.path, froude_velocity=froude))
+        return law if self.models.other is None else self.models.other(law)
+
+    @cached_property
+    def _plant(self) -> npt.NDArray[np.void]:
+        gas = self.scene.gas
+        line = gas.conductance is not None and gas.critical_ratio is not None
+        terms = [INERTIA, HELD, *([FILLING] if line else []), *([LAG] if gas.valve_lag is not None else [])]
+        dynamics = dynamics_of(
+            scene=self.scene, model=BalancerModel.of(self.law), modelled=terms, checked=True
+        )
+        return dynamics.plant(total=2 * self.scene.disc.initial_fill, relative_error=RELATIVE_ERROR)
+
+    @cached_property
+    def _delay(self) -> float:
+        """By which the flow starts late, s: its error (95 %) is L/2u at equal fills."""
+        length = self.scene.tube.model_error(START_ERROR) / NORMAL_95 * self.scene.tube.length / 2
+        return length / velocity if (velocity := self.models.velocity) else 0.0
+
+    @cached_property
+    def _kept(self) -> dict[int, tuple[Observations, FloatArray]]:
+        return {}
+
+    def once(
+        self, observations: Observations, find: Callable[[Device, Observations], FloatArray]
+    ) -> FloatArray:
+        """What the device alone decides of a data set: predictions with another rotor take it again."""
+        # The entry keeps its data set alive, so that no other one can have the same identity.
+        if id(observations) not in self._kept:
+            self._kept[id(observations)] = observations, find(self, observations)
+        return self._kept[id(observations)][1]
+
+    def injected(self, *, fill: float, chamber: int, pressure: float, gas_time: float) -> float:
+        """Fill of chamber 0 of a pair at rest after gas into one of its chambers, and all that follows.
+
+        Args: `fill`: x of chamber 0 before. `chamber`: 0 or 1. `pressure`: of the supply, as the gauge shows
+            it, Pa.
+            `gas_time`: from the command to open to the command to close, s.
+        """
+        plant, work = self._plant, np.zeros(WORKSPACE)
+        plant["gas_pressure"] = pressure + self.scene.gas.pressure - self.models.gas_pressure
+        motion = packed(plant, fill=fill, primed=False, motion=Motion())
+        # Of a shorter time the model would have nothing left to start.
+        left = max(gas_time - self._delay, _LEAST_LEFT * gas_time)
+        command(plant[0], motion[0], chamber, left)
+        lag = float(plant["valve_lag"][0])
+        advance(plant[0], motion[0], lag + left + _SETTLED, work, 0, 0, work)
+        return float(motion["state"][0, X])
+
+    @classmethod
+    def of(cls, scene: Scene, models: Models) -> Device:
+        """The device of a scene, with the geometry's lambda.
+
+        Scenes that differ in rotor, sensor, controller or the factor on lambda alone share theirs.
+        """
+        rotor = replace(
+            scene.rotor, influence_coefficient=1.0, lag_angle=0.0, initial_amplitude=0.0, initial_phase=0.0
+        )
+        disc = replace(scene.disc, lambda_factor=None)
+        return _device(replace(scene, rotor=rotor, disc=disc), models)
+
+
+@lru_cache(maxsize=_KEPT)
+def _device(scene: Scene, models: Models) -> Device:
+    return Device(scene=scene, models=models)

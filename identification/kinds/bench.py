@@ -1,0 +1,287 @@
+"""What is measured on test benches without a balancer, and how the program predicts it with no scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.identification.kinds.kind import Kind, Observations, column, positive
+from ringbalance.physics.gas import HEAT_CAPACITY_RATIO, GasLine
+from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
+from ringbalance.physics.sloshing_system import sloshing_system
+from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
+from ringbalance.physics.tube.local_losses import entrance_loss, exit_loss
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc, Tube
+
+_WIDEST: Final = 20.0
+"""Long over short side of a duct that is accepted."""
+_TERMS: Final = 100
+"""Up to which odd terms of a series are summed that fall like 1/n^5."""
+_LAMINAR: Final = 100.0
+"""Critical Re over the usual one, for flow that is known to be laminar."""
+CONDUCTANCE_UNCERTAINTY: Final = 0.1
+"""U (95 %), relative, of a conductance computed from an opening's area: its discharge coefficient."""
+_CRITICAL_RATIO: Final = 0.5
+"""b of a sharp opening, where the data do not give one."""
+_STEPS: Final = 2000
+_RADIUS: Final = 1e4
+"""Of the chamber, in widths of the tank."""
+_CELLS: Final = (8, 16)
+
+
+Stated = tuple[FloatArray, FloatArray]
+"""What is predicted of each row, SI, and the expanded uncertainty (95 %) that the program states of it."""
+
+
+def laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
+    """Laminar friction of rectangular ducts over that of a tube of their hydraulic diameter; 0 for tubes.
+
+    f Re = 96/[(1 + 1/a)^2 (1 - 192/(pi^5 a) sum tanh(n pi a/2)/n^5)] over odd n, against 64.
+    Source: Fourier series of the velocity across the short side.
+    """
+    a, n = np.maximum(aspect_ratio, 1.0), np.arange(1, _TERMS, 2)
+    terms = np.sum(np.tanh(np.pi / 2 * n * a[:, None]) / n**5, axis=1)
+    ratio = 1.5 / ((1 + 1 / a) ** 2 * (1 - 192 / (np.pi**5 * a) * terms))
+    return np.where(aspect_ratio > 0, ratio, 1.0)
+
+
+def _friction(data: Observations) -> Stated:
+    none = np.zeros(len(data))
+    aspect, roughness = (data.columns.get(name, none) for name in ("aspect_ratio", "relative_roughness"))
+    reynolds, ratio = data.columns["reynolds"], laminar_ratio(aspect)
+
+    def each(formula: Callable[..., Any]) -> FloatArray:
+        """One wall after the other."""
+        found = np.empty_like(reynolds)
+        for wall in np.unique(roughness):
+            here = roughness == wall
+            found[here] = formula(
+                reynolds=reynolds[here], relative_roughness=float(wall), laminar_ratio=ratio[here]
+            )
+        return found
+
+    return each(friction_factor), each(friction_uncertainty)
+
+
+def _pressure(data: Observations) -> Stated:
+    """(rho u^2/2) (k + 1) with k of friction, entrance and exit; no bend, no rotation."""
+    columns = {"laminar": np.zeros(len(data)), **data.columns}
+    reynolds, slenderness = tube_numbers(data)
+    critical = np.where(columns["laminar"] > 0, _LAMINAR, 1.0)
+    rows = zip(slenderness, reynolds, critical, strict=True)
+    k, half_width = np.array([tube_loss(*(float(value) for value in row)) for row in rows]).T
+    velocity = reynolds * columns["kinematic_viscosity"] / columns["bore"]
+    dynamic = columns["density"] * velocity**2 / 2
+    return dynamic * (k + 1), dynamic * half_width
+
+
+def tube_numbers(data: Observations) -> tuple[FloatArray, FloatArray]:
+    """Re and L/d of each point."""
+    columns = data.columns
+    velocity = columns["flow"] / (np.pi / 4 * columns["bore"] ** 2)
+    return velocity * columns["bore"] / columns["kinematic_viscosity"], columns["length"] / columns["bore"]
+
+
+def tube_loss(slenderness: float, reynolds: float, critical: float) -> tuple[float, float]:
+    """k of a smooth tube with a rounded entrance, and its expanded uncertainty (95 %).
+
+    Args: `slenderness`: L/d. `critical`: critical Re over the usual one.
+    """
+    tube = _tube(slenderness)
+    friction = {"reynolds": reynolds, "relative_roughness": 0.0, "critical_ratio": critical}
+    terms: list[tuple[FloatArray, FloatArray]] = [
+        (slenderness * friction_factor(**friction), slenderness * friction_uncertainty(**friction)),
+        entrance_loss(tube=tube, reynolds=reynolds, critical_ratio=critical),
+        exit_loss(tube=tube, reynolds=reynolds, critical_ratio=critical),
+    ]
+    values, half_widths = np.array(terms, dtype=np.float64).T
+    return float(np.sum(values)), float(np.linalg.norm(half_widths))
+
+
+def _tube(slenderness: float) -> Tube:
+    return Tube(
+        bore=1.0,
+        port_radius=0.0,
+        hump_radius=None,
+        hump_position=0.5,
+        hump_shape="arc",
+        hump_gas="vented",
+        length=slenderness,
+        roughness=0.0,
+        entrance="rounded",
+        entrance_radius=1.0,
+        bends=(),
+        extra_loss=0.0,
+        drag_coefficient=None,
+    )
+
+
+def _vessel_time(data: Observations) -> Stated:
+    """Times of a gas vessel: middle of both limits, stated as wide as these and the conductance leave it.
+
+    Gas that exchanges heat with the walls lies between isothermal and adiabatic. With tau of `GasLine`,
+    filling takes 1/gamma of the isothermal time when adiabatic; venting has dp/dt = -gamma (p/tau)
+    sqrt(T/T_0) phi with T/T_0 = (p/p_start)^((gamma - 1)/gamma), integrated here.
+    """
+    columns = {"critical_ratio": np.full(len(data), _CRITICAL_RATIO), **data.columns}
+    names = ("pressure", "start_pressure", "far_pressure", "temperature", "volume", "conductance")
+    rows = zip(*(columns[name] for name in (*names, "critical_ratio")), strict=True)
+    limits = np.array([_limits(*(float(value) for value in row)) for row in rows])
+    middle = limits.mean(axis=1)
+    half = np.abs(limits[:, 1] - limits[:, 0]) / 2
+    return middle, np.hypot(half, CONDUCTANCE_UNCERTAINTY * middle)
+
+
+def _no_duct(_: object, data: Observations) -> str:
+    aspect = data.columns.get("aspect_ratio", np.zeros(1))
+    return (
+        "aspect_ratio is long over short side, from 1 on, or 0" if np.any((aspect > 0) & (aspect < 1)) else ""
+    )
+
+
+def _not_between(_: object, data: Observations) -> str:
+    reached, start, far = (data.columns[name] for name in ("pressure", "start_pressure", "far_pressure"))
+    between = np.all((reached - start) * (far - reached) > 0)
+    return "" if between else "pressure must lie between start_pressure and far_pressure in every row"
+
+
+def _limits(
+    pressure: float, start: float, far: float, temperature: float, volume: float, conductance: float, b: float
+) -> tuple[float, float]:
+    """Isothermal and adiabatic time from the start to a pressure, s."""
+    filling = far > start
+    line = GasLine(
+        supply_pressure=far if filling else start,
+        ambient_pressure=start if filling else far,
+        temperature=temperature,
+        conductance=conductance,
+        critical_ratio=b,
+        process="isothermal",
+    )
+    if filling:
+        time = float(line.filling_time(pressure, volume=volume))
+        return time, time / HEAT_CAPACITY_RATIO
+    whole, rest = line.venting_time(np.array([start, pressure]), volume=volume)
+    tau = line.time_constant(volume=volume)
+    return float(whole - rest), tau * _adiabatic_venting(pressure / start, far / start, b)
+
+
+def _adiabatic_venting(ratio: float, far: float, b: float) -> float:
+    """Time over tau until the pressure is a ratio of its start."""
+    gamma = HEAT_CAPACITY_RATIO
+    falling: FloatArray = np.geomspace(1.0, ratio, _STEPS)
+    phi = np.sqrt(np.maximum(1 - (np.maximum(far / falling - b, 0.0) / (1 - b)) ** 2, 0.0))
+    cooled = falling ** ((gamma - 1) / (2 * gamma))
+    return float(-np.trapezoid(1 / (gamma * falling * cooled * phi), falling))
+
+
+def _frequency(data: Observations) -> Stated:
+    depths, place = np.unique(data.columns["depth_over_width"], return_inverse=True)
+    found = np.array([tank_frequency(float(depth)) for depth in depths])[place]
+    return found, FREQUENCY_UNCERTAINTY * found
+
+
+def tank_frequency(depth: float) -> float:
+    """Lowest natural frequency of a rectangular tank, sigma sqrt(L/g). Args: `depth`: in widths L.
+
+    A chamber whose radius is large against its width is such a tank under gravity: its Coriolis force
+    vanishes beside waves that are many times faster than its rotation.
+    """
+    disc = Disc(
+        outer_radius=_RADIUS,
+        inner_radius=_RADIUS - 2 * depth,
+        axial_width=1.0,
+        central_angle=1 / _RADIUS,
+        chambers=4,
+        plate_thickness=0.0,
+        max_fill_ratio=1.0,
+        initial_fill=0.5,
+    )
+    surface = _RADIUS - depth
+    lowest = sloshing_system(disc=disc, surface_radius=surface, cells=_CELLS).natural_frequencies()[0]
+    # Gravity of the rotation is omega^2 a, so sigma = s omega = s sqrt(g/a).
+    return float(lowest) / math.sqrt(surface)
+
+
+_measured: Final = partial(positive, measured=True)
+_optional: Final = partial(column, optional=True, lowest=0.0)
+BENCH: Final[Mapping[str, Kind]] = {
+    "friction": Kind(
+        title="Darcy friction factor of a long straight tube or duct at rest",
+        columns=(
+            _measured("friction_factor", "measured"),
+            positive("reynolds", "Reynolds number with the hydraulic diameter and the mean velocity"),
+            _optional(
+                "relative_roughness", "ks/d, grain of the wall over the bore; smooth without this column"
+            ),
+            _optional(
+                "aspect_ratio",
+                "long over short side of a rectangular duct; 0, or no such column, for a tube",
+                highest=_WIDEST,
+            ),
+        ),
+        stated=_friction,
+        obstacle=_no_duct,
+    ),
+    "tube_at_rest": Kind(
+        title="pressure that drives liquid through a straight smooth tube at rest",
+        columns=(
+            _measured("pressure [kPa]", "between both ends"),
+            positive("flow [ml/s]", "volume of liquid in a time"),
+            positive("bore [mm]", "of the tube"),
+            positive("length [mm]", "of the tube, whose entrance is rounded and whose outlet is open"),
+            positive("density [kg/m^3]", "of the liquid"),
+            positive("kinematic_viscosity [mm^2/s]", "of the liquid"),
+            _optional(
+                "laminar",
+                "1 where flow is known to be laminar, whatever Re; 0 without this column",
+                highest=1.0,
+                whole=True,
+            ),
+        ),
+        stated=_pressure,
+    ),
+    "vessel": Kind(
+        title="time in which a vessel fills with air or vents it, taken as an ideal gas",
+        columns=(
+            _measured("time [s]", "from the start"),
+            positive("pressure [bar]", "reached after that time, absolute"),
+            positive("start_pressure [bar]", "at time zero, absolute"),
+            positive(
+                "far_pressure [bar]",
+                "at the other end of the line, absolute: of the supply, or the surroundings",
+            ),
+            positive("temperature [K]", "of the gas at the start"),
+            positive("volume [l]", "of the vessel"),
+            positive("conductance [l/(s*bar)]", "C of valve and line (ISO 6358), known to 10 %"),
+            _optional("critical_ratio", "b of valve and line; 0.5 without this column", highest=0.999),
+        ),
+        stated=_vessel_time,
+        obstacle=_not_between,
+    ),
+    "wave_frequency": Kind(
+        title="lowest natural frequency of liquid in a rectangular tank, sigma sqrt(L/g)",
+        columns=(
+            _measured("frequency_ratio", "measured"),
+            column(
+                "depth_over_width",
+                "depth of the liquid over the width L of the tank",
+                lowest=0.01,
+                highest=10.0,
+            ),
+        ),
+        stated=_frequency,
+    ),
+    "vibration": Kind(
+        title="vibration of a rotor with washers at one place",
+        columns=(
+            _measured("amplitude [um]", "zero to peak"),
+            column("washers", "their number", lowest=0.0, highest=100.0),
+        ),
+    ),
+}

@@ -1,0 +1,174 @@
+"""What is measured on a rotor with eccentric masses, and how its scene predicts it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.integration import plant_step, substeps
+from ringbalance.controller.eccentric_mass.plant import LOCKED, STUCK, PlantParameters, rest_state
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.identification.kinds.kind import (
+    Grid,
+    Kind,
+    Observations,
+    always,
+    amplitude,
+    column,
+    measured,
+    parts,
+    phase,
+    positive,
+)
+from ringbalance.scene.arrays import FloatArray, IntArray
+
+MOST_STEPS: Final = 300_000
+"""Of all motions of a file, some 0.2 s a prediction: a fit takes a minute or two."""
+_MOST_SUBSTEPS: Final = 20_000
+"""Of one call of the plant, some 0.02 s: a signal, such as that of Ctrl-C, acts only between calls."""
+_VOLTAGES: Final = (0.25, 0.5, 1.0)
+"""Of the largest; where the scene gives none, those of the data alone."""
+_TIMES: Final = (0.1, 0.4, 1.0)
+"""s, of positioning."""
+_SPEEDS: Final = 9
+"""From half of the lowest speed of the scene to the highest one."""
+
+
+def _steady_whirls(scene: EccentricScene, observations: Observations, _: object) -> FloatArray:
+    """Vibration over the speed in the rotor's frame, m, both masses clamped where they stand at the start.
+
+    At constant speed, as in a run-up that is slow against the decay of the rotor's motion.
+    """
+    plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
+    speeds = observations.columns["speed"].tolist()
+    return parts(np.array([plant.steady_whirl(speed, angles) for speed in speeds], dtype=np.complex128))
+
+
+def _positions(scene: EccentricScene, observations: Observations, _: object) -> FloatArray:
+    """Angles by which one mass has moved under a constant voltage, rad, the other one clamped.
+
+    It starts at rest from its place in the scene, on a rotor that whirls steadily at constant speed. Rows of
+    one series, mass, voltage and speed are one motion.
+    """
+    plant = PlantParameters.of(scene)
+    found = np.empty(len(observations))
+    for motion, rows in _motions(observations):
+        found[rows] = _moved(plant, scene.masses.initial_angle, motion, observations.columns["time"][rows])
+    return found
+
+
+def _moved_masses(observations: Observations) -> IntArray:
+    """Index, 0 or 1, of the mass that each row moves."""
+    return np.asarray(observations.columns.get("moved_mass", np.ones(len(observations))) - 1, dtype=np.int64)
+
+
+def _informs(observations: Observations) -> tuple[str, ...]:
+    """Friction of every mass that moves, and the motor."""
+    arms = (f"masses.friction_arm[{mass}]" for mass in sorted(set(_moved_masses(observations).tolist())))
+    return (*arms, "motor.torque_constant", "motor.back_emf_constant")
+
+
+def _too_long(scene: EccentricScene, observations: Observations) -> str:
+    """Why these motions would take too long to integrate, as a fit does some hundred times; else empty."""
+    plant, times = PlantParameters.of(scene), observations.columns["time"]
+    motions = _motions(observations)
+    steps = sum(substeps(plant, motion.speed, 0.0, times[rows[-1]]) for motion, rows in motions)
+    if steps <= MOST_STEPS:
+        return ""
+    return (
+        f"the motions take {steps} steps of integration, and a fit at most {MOST_STEPS}: check the units of "
+        "time and speed, or leave out the latest times and some of the voltages"
+    )
+
+
+class _Motion(NamedTuple):
+    series: str
+    mass: int
+    """Index."""
+    voltage: float
+    speed: float
+
+
+def _motions(observations: Observations) -> Iterator[tuple[_Motion, IntArray]]:
+    """Every motion, and its rows in the order of their times."""
+    columns, series = observations.columns, observations.series.tolist()
+    set_to = zip(series, _moved_masses(observations), columns["voltage"], columns["speed"], strict=True)
+    rows_of: dict[_Motion, list[int]] = {}
+    for row, values in enumerate(set_to):
+        rows_of.setdefault(_Motion(*values), []).append(row)
+    for motion, rows in rows_of.items():
+        yield motion, np.array(rows)[np.argsort(columns["time"][rows], kind="stable")]
+
+
+def _moved(
+    plant: PlantParameters, angles: tuple[float, float], motion: _Motion, times: FloatArray
+) -> FloatArray:
+    """Angle moved at rising times, rad."""
+    speed, mass = float(motion.speed), motion.mass
+    state, flags = rest_state(angles), np.where(np.arange(2) == mass, STUCK, LOCKED)
+    whirl = plant.steady_whirl(speed, angles) if speed else 0j
+    state[0], state[1] = whirl.real, whirl.imag
+    command, found, now = motion.voltage * (np.arange(2) == mass), np.empty(times.size), 0.0
+    for place, time in enumerate(times.tolist()):
+        parts = math.ceil(substeps(plant, speed, 0.0, time - now) / _MOST_SUBSTEPS) if time > now else 0
+        for _ in range(parts):
+            state, flags = plant_step(plant, state, flags, command, speed, 0.0, (time - now) / parts)
+        now = time
+        found[place] = state[4 + mass] - angles[mass]
+    return found
+
+
+def _some_speeds(scene: EccentricScene) -> Grid:
+    speeds = [point.speed for point in scene.rotor.speed_profile]
+    return {"speed": np.linspace(min(speeds) / 2, max(speeds), _SPEEDS).tolist()}
+
+
+def _some_motions(scene: EccentricScene) -> Grid:
+    largest = scene.motor.maximum_voltage
+    return {
+        "moved_mass": [1.0, 2.0],
+        "voltage": [] if largest is None else [x * largest for x in _VOLTAGES],
+        "speed": [min(point.speed for point in scene.rotor.speed_profile)],
+        "time": _TIMES,
+    }
+
+
+ECCENTRIC_MASS: Final[Mapping[str, Kind]] = {
+    "run_up": Kind(
+        title="vibration of the rotor over its speed, both masses clamped",
+        balancer="eccentric_mass",
+        columns=(
+            positive("speed [rpm]", "of the rotor"),
+            amplitude("amplitude [um]", "of the vibration"),
+            phase("phase [deg]"),
+        ),
+        predict=_steady_whirls,
+        informs=always("rotor.stiffness", "rotor.damping", "imbalance.mass", "imbalance.phase"),
+        offers=_some_speeds,
+    ),
+    "positioning": Kind(
+        title="angle of one mass under a constant motor voltage",
+        balancer="eccentric_mass",
+        columns=(
+            column("time [s]", "from when the voltage was applied", lowest=0.0, highest=100.0),
+            column("voltage [V]", "of the motor", highest=1000.0),
+            column("speed [rpm]", "of the rotor", lowest=0.0, highest=1000.0),
+            measured("angle [deg]", "moved by the mass on its track since then, not wrapped"),
+            column(
+                "moved_mass",
+                "1 or 2, the mass that moves while the other one is clamped; 1 without this column",
+                optional=True,
+                lowest=1.0,
+                highest=2.0,
+                whole=True,
+            ),
+        ),
+        predict=_positions,
+        informs=_informs,
+        obstacle=_too_long,
+        offers=_some_motions,
+    ),
+}

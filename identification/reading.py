@@ -1,0 +1,353 @@
+"""From files of measurements to observations of a kind, or everything that is wrong with them.
+
+What a file states of the uncertainty of its measured columns is at the end: 95 %, absolute, SI, row by row.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from ringbalance.identification.kinds.kind import Column, Kind, Observations
+from ringbalance.identification.kinds.registry import AMPLITUDES, KINDS, kinds_of
+from ringbalance.identification.tables import (
+    Table,
+    data_fault,
+    decoded,
+    file_name,
+    in_order,
+    parse_table,
+    read_content,
+    split_head,
+)
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.faults import Fault, SceneError, did_you_mean
+from ringbalance.scene.keys.fields import LETTERS, half_width
+from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
+from ringbalance.scene.toml import toml_text
+from ringbalance.scene.units import FieldError, parse_quantity
+
+_AMPLITUDE: Final = "amplitude"
+_UNCERTAINTY: Final = "uncertainty"
+_TEXTS: Final = (
+    *("kind", "source", "uncertainty_from", "where", "doi", "licence", "read", "conditions"),
+    *("supports", "does_not_support"),
+)
+"""Keys of the first lines that hold text."""
+_ROUNDED: Final = 0.01
+"""Of a full chamber's fill, as it may be written down."""
+
+
+def read_observations(paths: Iterable[Path], *, scene: AnyScene | None = None) -> tuple[Observations, ...]:
+    """The observations of each file, for a scene; for none those of test benches.
+
+    Raises: SceneError: all that is wrong with any of the files, each error with line and column.
+    """
+    faults: list[Fault] = []
+    found = []
+    for path in paths:
+        content, wrong = read_content(path)
+        if not wrong:
+            observations, wrong = observations_of(content, file=file_name(path), scene=scene)
+            found += [observations] if observations else []
+        faults += in_order(wrong)
+    faults += [*_given_twice(found), *_known_already(found, scene)]
+    if faults:
+        raise SceneError(faults)
+    return tuple(found)
+
+
+def _given_twice(found: Iterable[Observations]) -> Iterator[Fault]:
+    first: dict[str, str] = {}
+    for each in found:
+        if each.sha256 in first:
+            yield data_fault(each.file, "", f"it has the same content as {first[each.sha256]}; give it once")
+        first.setdefault(each.sha256, each.file)
+
+
+def _known_already(found: Iterable[Observations], scene: AnyScene | None) -> Iterator[Fault]:
+    """Files that the scene was fitted to: its [uncertainty] has what they say."""
+    for each in found:
+        if scene is not None and each.sha256 in {known.sha256 for known in scene.measured.files}:
+            problem = f"{scene.file} was fitted to this file already, so that it would count twice"
+            allowed = "the scene as it was before, with all files together"
+            yield data_fault(each.file, "", problem, allowed=allowed)
+
+
+def observations_of(
+    content: bytes, *, file: str, scene: AnyScene | None = None
+) -> tuple[Observations | None, tuple[Fault, ...]]:
+    """The observations of a file's bytes, or all that is wrong with it."""
+    text, undecoded = decoded(content, file=file)
+    if undecoded:
+        return None, undecoded
+    table, faults = parse_table(text, file=file)
+    if table is None:
+        return None, faults
+    wrong = [*faults, *_kind_faults(table, scene)]
+    if len(wrong) > len(faults):
+        return None, tuple(wrong)
+    kind = KINDS[str(table.header["kind"])]
+    wrong += _header_faults(table, kind)
+    heads = list(_head_faults(table, kind))
+    if heads:
+        return None, (*wrong, *heads)
+    columns, cell_faults = _columns(table, kind)
+    uncertainty, stated_faults = _stated_uncertainty(table, kind, columns)
+    wrong += [*cell_faults, *_faults_of_scene(table, kind, scene, columns), *stated_faults]
+    wrong += _repeated(table) if kind.balancer else ()
+    if wrong:
+        return None, tuple(wrong)
+    # Amplitudes as the file's convention has them become zero to peak.
+    factor = AMPLITUDES[str(table.header.get(_AMPLITUDE, "zero_to_peak"))]
+    letters = table.texts("chamber") if kind.has_chamber else ("",) * len(table.rows)
+    used = {column.name: columns[column.name] for column in kind.columns if column.name in columns}
+    return Observations(
+        kind=str(table.header["kind"]),
+        file=table.file,
+        source=str(table.header["source"]),
+        sha256=hashlib.sha256(content).hexdigest(),
+        lines=np.array(table.lines, dtype=np.int64),
+        series=table.series,
+        chamber=np.array(letters, dtype=np.str_),
+        columns=_zero_to_peak(used, kind, factor),
+        uncertainty=_zero_to_peak(uncertainty, kind, factor),
+    ), ()
+
+
+def _kind_faults(table: Table, scene: AnyScene | None) -> Iterator[Fault]:
+    word, allowed = table.header.get("kind"), kinds_of("" if scene is None else scene.balancer)
+    if word is None:
+        problem = 'the key "kind" is missing in the first lines, marked #'
+        yield data_fault(table.file, "", problem, allowed=f'kind = "..." of {", ".join(allowed)}')
+    elif word not in allowed:
+        problem = f"there is no such kind of data{did_you_mean(str(word), allowed)}"
+        if str(word) in KINDS and scene is None:
+            problem = "a scene predicts data of this kind: ringbalance fit"
+        elif str(word) in KINDS and scene is not None:
+            problem = f'the balancer of {scene.file} is "{scene.balancer}", which these data tell nothing of'
+        yield data_fault(table.file, "kind", problem, value=toml_text(word), allowed=", ".join(allowed))
+
+
+def _header_faults(table: Table, kind: Kind) -> Iterator[Fault]:
+    known = (*_TEXTS, _UNCERTAINTY, *([_AMPLITUDE] if kind.has_amplitudes else []))
+    for key, value in table.header.items():
+        if key not in known:
+            problem = f"this key of the first lines is not known{did_you_mean(key, known)}"
+            yield data_fault(table.file, toml_text(key), problem, allowed=", ".join(known))
+        elif key in _TEXTS and not isinstance(value, str):
+            yield data_fault(table.file, key, "it is not text", value=toml_text(value), allowed='"..."')
+    for key in ("source", *([] if kind.balancer else [_UNCERTAINTY])):
+        if key not in table.header:
+            yield data_fault(table.file, "", f'the key "{key}" is missing in the first lines, marked #')
+    if not str(table.header.get("source", "-")).strip():
+        yield data_fault(table.file, "source", "it is empty", allowed="rig, run and date")
+    stated = table.header.get(_AMPLITUDE)
+    if kind.has_amplitudes and not (isinstance(stated, str) and stated in AMPLITUDES):
+        allowed = " or ".join(f'amplitude = "{word}"' for word in AMPLITUDES)
+        problem = "the first lines must say how amplitudes are counted"
+        value = "missing" if stated is None else toml_text(stated)
+        yield data_fault(table.file, _AMPLITUDE, problem, value=value, allowed=allowed)
+
+
+def _head_faults(table: Table, kind: Kind) -> Iterator[Fault]:
+    known = [column.name for column in (*kind.columns, *kind.uncertainties())] + [*kind.texts]
+    yield from table.name_faults(known)
+    for head in table.heads:
+        name, unit = split_head(head) or ("", "")
+        yield from _one_head(table, head, name, unit, kind, known)
+    names = {(split_head(head) or ("", ""))[0] for head in table.heads}
+    yield from _missing(table, kind, names)
+
+
+def _one_head(
+    table: Table, head: str, name: str, unit: str, kind: Kind, known: Iterable[str]
+) -> Iterator[Fault]:
+    column = kind.column(name)
+    if column is None:
+        if name not in kind.texts and name.replace("_", "").islower():
+            problem = f"a file of this kind has no such column{did_you_mean(name, known)}"
+            yield table.head_fault(head, problem, ", ".join(known))
+        elif name in kind.texts and unit:
+            yield table.head_fault(head, "a column of text has no unit", name)
+        return
+    try:
+        if column.dimension is not None:
+            parse_quantity(f"1 {unit}", column.dimension)
+        elif unit and unit != "%":
+            raise FieldError("this column has no unit", f"{name}, or {name} [%]")
+    except FieldError as error:
+        yield table.head_fault(head, error.problem, error.allowed)
+
+
+def _missing(table: Table, kind: Kind, names: set[str]) -> Iterator[Fault]:
+    place = f"line {table.head_line}"
+    needed = [column for column in kind.columns if not column.optional and column.name not in kind.one_of]
+    for column in needed:
+        if column.name not in names:
+            yield data_fault(table.file, place, f'the column "{column.head}" is missing: {column.meaning}')
+    if kind.has_chamber and "chamber" not in names:
+        yield data_fault(table.file, place, 'the column "chamber" is missing: letter of the driven chamber')
+    given = [name for name in kind.one_of if name in names]
+    if kind.one_of and len(given) != 1:
+        choice = " or ".join(f'"{c.head}"' for c in kind.columns if c.name in kind.one_of)
+        yield data_fault(table.file, place, f"{len(given)} of the columns {choice}, and one is needed")
+
+
+def _columns(table: Table, kind: Kind) -> tuple[dict[str, FloatArray], list[Fault]]:
+    """Every column of numbers, SI, and the errors of its cells."""
+    columns: dict[str, FloatArray] = {}
+    faults: list[Fault] = []
+    for head in table.heads:
+        name, unit = split_head(head) or ("", "")
+        column = kind.column(name)
+        if column is None:
+            continue
+        dimension = "share" if unit == "%" and column.dimension is None else column.dimension
+        columns[name], wrong = table.values(head, unit, dimension)
+        bad = {fault.key for fault in wrong}
+        faults += wrong + [
+            fault for fault in _range_faults(table, head, column, columns[name]) if fault.key not in bad
+        ]
+    return columns, faults
+
+
+def _range_faults(table: Table, head: str, column: Column, values: FloatArray) -> Iterator[Fault]:
+    cells = table.texts(head)
+    for line, cell, value in zip(table.lines, cells, values.tolist(), strict=True):
+        try:
+            column.check(value)
+        except FieldError as error:
+            yield table.fault(line, head, cell, error.problem, error.allowed)
+
+
+def _faults_of_scene(
+    table: Table, kind: Kind, scene: AnyScene | None, columns: Mapping[str, FloatArray]
+) -> Iterator[Fault]:
+    """Chambers that the disc does not have, and fills of a driven one beyond the liquid of its pair."""
+    if scene is None or not (kind.has_chamber or kind.column("gas_time")):
+        return
+    disc = liquid_ring_scene(scene).disc
+    letters, total = LETTERS[: disc.chambers], 2 * disc.initial_fill
+    for line, cell in zip(table.lines, table.texts("chamber"), strict=True) if kind.has_chamber else ():
+        if len(cell) != 1 or cell not in letters:
+            problem = f"the disc has no chamber of that name{did_you_mean(cell, letters)}"
+            yield table.fault(line, "chamber", cell, problem, ", ".join(letters))
+    for head in table.heads:
+        if (split_head(head) or ("",))[0] == "fill_ratio":
+            rows = zip(table.lines, table.texts(head), columns["fill_ratio"].tolist(), strict=True)
+            for line, cell, fill in rows:
+                if total * (1 + _ROUNDED) < fill <= 1:
+                    problem = f"the chambers of a pair hold {total:.4g} together, twice disc.initial_fill"
+                    yield table.fault(line, head, cell, problem, f"from 0 to {total:.4g}")
+
+
+def _repeated(table: Table) -> Iterator[Fault]:
+    """Rows that stand twice: as evidence they would count twice."""
+    counted = Counter(table.rows)
+    first: dict[tuple[str, ...], int] = {}
+    for line, row in zip(table.lines, table.rows, strict=True):
+        if counted[row] > 1 and first.setdefault(row, line) != line:
+            problem = (
+                f"the row is the same as line {first[row]}; remove it, or tell the two apart in a column "
+                '"note" where it was measured again'
+            )
+            yield data_fault(table.file, f"line {line}", problem)
+
+
+def _zero_to_peak(columns: Mapping[str, FloatArray], kind: Kind, factor: float) -> dict[str, FloatArray]:
+    counted = {column.name for column in kind.columns if column.amplitude}
+    return {name: values * (factor if name in counted else 1.0) for name, values in columns.items()}
+
+
+def _stated_uncertainty(
+    table: Table, kind: Kind, columns: Mapping[str, FloatArray]
+) -> tuple[dict[str, FloatArray], list[Fault]]:
+    """Expanded uncertainty of each measured column for which the file states one.
+
+    A column `uncertainty_<name>` comes before a column `uncertainty`, that before the key of the first lines.
+    A relative uncertainty of a vibration is that of both its components, so that its phase has it in radians.
+    """
+    measured = [column for column in kind.measured if column.name in columns]
+    result, faults = _of_header(table, kind, columns, measured)
+    if _UNCERTAINTY in columns:
+        result = {
+            column.name: columns[_UNCERTAINTY] * _size(kind, columns, column.name) for column in measured
+        }
+    own = {column.name: columns.get(f"{_UNCERTAINTY}_{column.name}") for column in measured}
+    result |= {name: width for name, width in own.items() if width is not None}
+    return result, [*faults, *_of_zero(table, columns, result), *_partial(table, kind, result)]
+
+
+def _of_header(
+    table: Table, kind: Kind, columns: Mapping[str, FloatArray], measured: Iterable[Column]
+) -> tuple[dict[str, FloatArray], list[Fault]]:
+    stated = table.header.get(_UNCERTAINTY)
+    if stated is None:
+        return {}, []
+    if isinstance(stated, Mapping):
+        return _by_column(table, stated, columns, {column.name: column for column in measured})
+    if isinstance(stated, bool) or not isinstance(stated, int | float) or not 0 < stated < 1:
+        problem = "it must be a number above 0 and below 1: 95 %, relative to the measured values"
+        allowed = 'such as 0.02, or by column: { amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
+        return {}, [data_fault(table.file, _UNCERTAINTY, problem, value=toml_text(stated), allowed=allowed)]
+    return {column.name: stated * _size(kind, columns, column.name) for column in measured}, []
+
+
+def _by_column(
+    table: Table,
+    stated: Mapping[str, object],
+    columns: Mapping[str, FloatArray],
+    measured: Mapping[str, Column],
+) -> tuple[dict[str, FloatArray], list[Fault]]:
+    result: dict[str, FloatArray] = {}
+    faults = []
+    for name, value in stated.items():
+        try:
+            if name not in measured:
+                problem = f"the file measures no such column{did_you_mean(name, measured)}"
+                raise FieldError(problem, ", ".join(measured))
+            width, relative = half_width(measured[name].dimension).read(value)
+            if relative and measured[name].dimension == "angle":
+                raise FieldError("an angle has no percentage", 'an angle such as "1 deg"')
+            if not width > 0:
+                raise FieldError("an uncertainty is above zero", "leave it out where it is to be estimated")
+        except FieldError as error:
+            place = f"{_UNCERTAINTY}.{toml_text(name).strip(chr(34))}"
+            faults.append(
+                data_fault(table.file, place, error.problem, value=toml_text(value), allowed=error.allowed)
+            )
+            continue
+        result[name] = width * (np.abs(columns[name]) if relative else np.ones_like(columns[name]))
+    return result, faults
+
+
+def _size(kind: Kind, columns: Mapping[str, FloatArray], name: str) -> FloatArray:
+    """What a relative uncertainty refers to: the value, or one radian for the phase of a vibration."""
+    of_vibration = name.startswith("phase") and kind.has_amplitudes
+    return np.ones_like(columns[name]) if of_vibration else np.abs(columns[name])
+
+
+def _of_zero(
+    table: Table, columns: Mapping[str, FloatArray], uncertainty: Mapping[str, FloatArray]
+) -> Iterator[Fault]:
+    """A relative uncertainty of a value of zero says that the value is exact."""
+    for name, width in uncertainty.items():
+        for line, value, each in zip(table.lines, columns[name].tolist(), width.tolist(), strict=True):
+            if value == 0 and each == 0:
+                problem = f"{name} is 0 there, so its uncertainty cannot be relative"
+                allowed = f'an absolute one, in a column "{_UNCERTAINTY}_{name}"'
+                yield data_fault(table.file, f"line {line}", problem, allowed=allowed)
+
+
+def _partial(table: Table, kind: Kind, uncertainty: Mapping[str, FloatArray]) -> Iterator[Fault]:
+    """The noise of vibrations is given or estimated, all amplitudes of a file alike."""
+    missing = [column.name for column in kind.measured if column.amplitude and column.name not in uncertainty]
+    if uncertainty and missing:
+        problem = f"stated of {', '.join(uncertainty)} and not of {', '.join(missing)}"
+        yield data_fault(table.file, _UNCERTAINTY, problem, allowed="of every amplitude, or of nothing")

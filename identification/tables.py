@@ -1,0 +1,298 @@
+"""Files of measurements as tables of text: TOML in the first lines, marked #, then rows below named columns.
+
+What a spreadsheet does to such a file is undone where that is unambiguous: a byte order mark, Windows line
+ends, a line "sep=;", semicolons or tabs between cells, first lines in quotation marks or with empty cells
+behind them. A decimal comma is refused: in a table it could as well part thousands.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from ringbalance.scene.arrays import FloatArray, StringArray
+from ringbalance.scene.faults import Fault, did_you_mean
+from ringbalance.scene.toml import read_toml, toml_text
+from ringbalance.scene.units import DIMENSIONS, FieldError, parse_number, parse_quantity
+
+LARGEST_FILE: Final = 8 * 2**20
+MOST_ROWS: Final = 2000
+"""A row is a measurement; more of them are a recording, which is averaged or thinned out first. A fit
+holds the covariance of every pair of rows: more would take gigabytes."""
+SERIES: Final = "series"
+_MARK: Final = "#"
+_SEPARATORS: Final = ";\t,"
+_SETS_A_KEY: Final = re.compile(r'"?#\s*\w+\s*=')
+_NAMED_SEPARATOR: Final = re.compile(r'"?sep=.{0,2}"?[,;\t]*', re.IGNORECASE)
+_LINE: Final = re.compile(r"line (\d+)")
+_WORKBOOKS: Final = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+"""First bytes of .xlsx or .ods, and of .xls."""
+_HEAD: Final = re.compile(r"([A-Za-z][A-Za-z0-9_ ]*?)(?: ?\[([^][]+)\])?")
+_SIZES: Final = (1e-15, 1e15)
+"""Of a number as it stands in a cell; zero is allowed too."""
+_NO_UNIT: Final = "1"
+_NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A file's header and its cells, as text; `lines` and `rows` are of one length."""
+
+    file: str
+    header: Mapping[str, object]
+    head_line: int
+    heads: tuple[str, ...]
+    lines: tuple[int, ...]
+    """Line of each row in the file, from 1."""
+    rows: tuple[tuple[str, ...], ...]
+
+    def fault(self, line: int, head: str, cell: str, problem: str, allowed: str = "") -> Fault:
+        """One error of a cell."""
+        return data_fault(
+            self.file, f'line {line}, column "{head}"', problem, value=toml_text(cell), allowed=allowed
+        )
+
+    def name_faults(self, known: Collection[str] = ()) -> Iterator[Fault]:
+        """Heads that are no name with a unit, and names that stand twice. Args: `known`: names to suggest."""
+        names = [split_head(head) for head in self.heads]
+        for head, name in zip(self.heads, names, strict=True):
+            if name is None or not _NAME.fullmatch(name[0]):
+                problem = 'it is not a name with its unit in brackets, such as "pressure [kPa]"'
+                yield self.head_fault(head, problem + did_you_mean(name[0] if name else head, known))
+        once = [name[0] for name in names if name is not None]
+        for twice in sorted({each for each in once if once.count(each) > 1}):
+            yield data_fault(self.file, f"line {self.head_line}", f'the column "{twice}" stands twice')
+
+    def head_fault(self, head: str, problem: str, allowed: str = "") -> Fault:
+        """One error of the name or the unit of a column."""
+        place = f"line {self.head_line}, column {toml_text(head)}"
+        return data_fault(self.file, place, problem, allowed=allowed)
+
+    def values(self, head: str, unit: str, dimension: str | None) -> tuple[FloatArray, list[Fault]]:
+        """The numbers of a column, SI, and the errors of its cells; 0 stands for a cell with an error."""
+        at, values, faults = self.heads.index(head), np.zeros(len(self.rows)), []
+        for row, (line, cells) in enumerate(zip(self.lines, self.rows, strict=True)):
+            try:
+                values[row] = _cell_value(cells[at], unit, dimension)
+            except FieldError as error:
+                faults.append(self.fault(line, head, cells[at], error.problem, error.allowed))
+        return values, faults
+
+    @property
+    def series(self) -> StringArray:
+        """The column of series, or one series for all rows."""
+        return np.array(self.texts(SERIES) if SERIES in self.heads else ("one",) * len(self.rows))
+
+    def texts(self, head: str) -> tuple[str, ...]:
+        """The cells of a column of text."""
+        at = self.heads.index(head)
+        return tuple(cells[at] for cells in self.rows)
+
+
+def data_fault(file: str, place: str, problem: str, *, value: str = "", allowed: str = "") -> Fault:
+    """One error of a file of measurements. Args: `place`: such as 'line 3' or 'kind'; may be empty."""
+    return Fault(file=file, key=place, value=value, problem=problem, allowed=allowed)
+
+
+def file_name(path: Path) -> str:
+    """A path as messages show it, printable and on one line."""
+    name = str(path)
+    return name if name.isprintable() else toml_text(name)
+
+
+def read_content(path: Path) -> tuple[bytes, tuple[Fault, ...]]:
+    """The bytes of a file, no more than are read in any case, or why there are none."""
+    file = file_name(path)
+    try:
+        with open(path, "rb") as stream:
+            return stream.read(LARGEST_FILE + 1), ()
+    except IsADirectoryError:
+        return b"", (data_fault(file, "", "this is a folder, not a file of measurements"),)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        return b"", (data_fault(file, "", f"the file cannot be read: {reason}"),)
+
+
+def decoded(content: bytes, *, file: str) -> tuple[str, tuple[Fault, ...]]:
+    """The text of a file's bytes, or why it is none."""
+    if len(content) > LARGEST_FILE:
+        problem = "the file is larger than any list of measurements; average or thin out a recording"
+        return "", (data_fault(file, "", problem, allowed=f"up to {LARGEST_FILE // 2**20} MiB"),)
+    if content.startswith(_WORKBOOKS):
+        problem = 'this is a workbook, not text; save the sheet as "CSV UTF-8"'
+        return "", (data_fault(file, "", problem),)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line, column = _place(content, error.start)
+        problem = 'this is not UTF-8 text; save the file as "CSV UTF-8"'
+        return "", (data_fault(file, f"line {line}, character {column}", problem),)
+    if "\0" in text:
+        line, column = _place(content, content.index(b"\0"))
+        problem = 'this is not text but binary data; save the file as "CSV UTF-8"'
+        return "", (data_fault(file, f"line {line}, character {column}", problem),)
+    return text, ()
+
+
+def _place(content: bytes, at: int) -> tuple[int, int]:
+    """Line and character of a byte, both from 1."""
+    before = content[:at]
+    start = before.rfind(b"\n") + 1
+    return before.count(b"\n") + 1, len(before[start:].decode("utf-8-sig", "replace")) + 1
+
+
+def parse_table(text: str, *, file: str) -> tuple[Table | None, tuple[Fault, ...]]:
+    """The table of a text, or all that is wrong with its form."""
+    numbered = list(enumerate(re.split(r"\r\n|\r|\n", text), 1))
+    head_at = next((at for at, line in numbered if _is_data(line)), len(numbered) + 1)
+    header, faults = _header(numbered[: head_at - 1], file)
+    faults = (*faults, *_late_keys(numbered[head_at:], file))
+    data = [(at, line) for at, line in numbered[head_at - 1 :] if _is_data(line)]
+    if len(data) < 2:
+        problem = "there is no row of data below the names of the columns"
+        if not data:
+            problem = "the file has no line with the names of the columns"
+        return None, (*faults, data_fault(file, "", problem))
+    if len(data) - 1 > MOST_ROWS:
+        problem = f"{len(data) - 1} rows; a row is one measurement, so average or thin out a recording"
+        return None, (*faults, data_fault(file, "", problem, allowed=f"up to {MOST_ROWS} rows"))
+    if header is None:
+        return None, faults
+    separator = _separator(data[0][1])
+    try:
+        heads = _without_empty_end(_cells(data[0][1], separator))
+    except csv.Error as error:
+        return None, (*faults, _cell_fault(head_at, error, file))
+    rows, bad_rows = _rows(data[1:], len(heads), separator, file)
+    table = Table(
+        file=file,
+        header=header,
+        head_line=head_at,
+        heads=heads,
+        lines=tuple(rows),
+        rows=tuple(rows.values()),
+    )
+    return table, (*faults, *bad_rows)
+
+
+def _is_data(line: str) -> bool:
+    """Neither empty, nor marked, nor a spreadsheet's line that names the separator."""
+    start = line.lstrip(f'" {_SEPARATORS}')
+    return bool(start) and not start.startswith(_MARK) and not _NAMED_SEPARATOR.fullmatch(line.strip())
+
+
+def _header(
+    lines: Sequence[tuple[int, str]], file: str
+) -> tuple[Mapping[str, object] | None, tuple[Fault, ...]]:
+    """The TOML of the first lines; the mark becomes a space, so that its errors have the file's places."""
+    try:
+        return read_toml("\n".join(_unmarked(line) for _, line in lines)), ()
+    except (ValueError, csv.Error, RecursionError) as error:
+        reason = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        problem = f"the first lines, marked #, are not TOML: {' '.join(reason.split())}"
+        return None, (data_fault(file, "", problem),)
+
+
+def _late_keys(lines: Sequence[tuple[int, str]], file: str) -> Iterator[Fault]:
+    """First lines that stand below the columns, as where files were joined: they would count for no row."""
+    for at, line in lines:
+        if _SETS_A_KEY.match(line):
+            problem = "this stands below the names of the columns; a file has one kind of data and one header"
+            yield data_fault(file, f"line {at}", problem)
+
+
+def _unmarked(line: str) -> str:
+    line = line.strip()
+    if line.startswith(f'"{_MARK}'):
+        separator = line[-1] if line[-1] in _SEPARATORS else _separator(line)
+        line = separator.join(next(csv.reader([line], delimiter=separator), []))
+    return " " + line[1:].rstrip(f" {_SEPARATORS}") if line.startswith(_MARK) else ""
+
+
+def _separator(head: str) -> str:
+    """The first of semicolon, tab and comma that stands in the line of names, none of which has one."""
+    return next((each for each in _SEPARATORS if each in head), ",")
+
+
+def _cells(line: str, separator: str) -> tuple[str, ...]:
+    return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True)))
+
+
+def _cell_fault(line: int, error: csv.Error, file: str) -> Fault:
+    too_long = "field limit" in str(error)
+    marks = f"the quotation marks are wrong ({error})"
+    return data_fault(file, f"line {line}", "a cell is longer than any number or name" if too_long else marks)
+
+
+def _without_empty_end(row: tuple[str, ...]) -> tuple[str, ...]:
+    """A line of names without the empty cells that a spreadsheet adds behind it."""
+    while len(row) > 1 and not row[-1]:
+        row = row[:-1]
+    return row
+
+
+def _rows(
+    data: Sequence[tuple[int, str]], length: int, separator: str, file: str
+) -> tuple[dict[int, tuple[str, ...]], list[Fault]]:
+    """The rows of the right length by line, and the errors of the others."""
+    rows, faults = {}, []
+    for at, line in data:
+        try:
+            cells = _cells(line, separator)
+        except csv.Error as error:
+            faults.append(_cell_fault(at, error, file))
+            continue
+        if len(cells) < length or any(cells[length:]):
+            problem = f"{len(cells)} values, and the columns are {length}"
+            if len(cells) > length and separator == ",":
+                problem += "; a decimal comma would do this: write points"
+            faults.append(data_fault(file, f"line {at}", problem))
+        else:
+            rows[at] = cells[:length]
+    return rows, faults
+
+
+def in_order(faults: Iterable[Fault]) -> list[Fault]:
+    """Errors of one file in the order of its lines, those of the whole file first."""
+    return sorted(faults, key=lambda fault: int(found[1]) if (found := _LINE.match(fault.key)) else 0)
+
+
+def split_head(head: str) -> tuple[str, str] | None:
+    """Name and unit of a column, the unit empty where there is none; None for what is no such name."""
+    match = _HEAD.fullmatch(head)
+    if match is None:
+        return None
+    unit = (match[2] or "").strip()
+    return match[1].strip(), "" if unit == _NO_UNIT else unit
+
+
+def _check_unit(unit: str, dimension: str) -> None:
+    """Raises: FieldError: no unit of that dimension; the error has those that are."""
+    parse_quantity(f"1 {unit}", dimension)
+
+
+def dimension_of(unit: str) -> str | None:
+    """The first dimension that has a unit; None where none has it."""
+    for dimension in DIMENSIONS:
+        try:
+            _check_unit(unit, dimension)
+        except FieldError:
+            continue
+        return dimension
+    return None
+
+
+def _cell_value(cell: str, unit: str, dimension: str | None) -> float:
+    """The number of a cell, SI. Raises: FieldError: no number, or one of a size that nobody measures."""
+    if not cell:
+        raise FieldError("the cell is empty", "a number in every row, or no such column")
+    value = parse_number(cell)
+    if value and not _SIZES[0] <= abs(value) <= _SIZES[1]:
+        raise FieldError("no measurement has a number of this size", "0, or 1e-15 to 1e15")
+    return value if dimension is None else parse_quantity(f"{cell} {unit}", dimension)

@@ -1,0 +1,453 @@
+"""How every figure looks, and the frame that each fills: axes, units, bands and legend, from values in SI.
+
+Figures are drawn in sentinel colours, which the SVG text then exchanges for CSS variables.  Nothing random,
+no date and no fixed colour remains, so the same data gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal, cast
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
+from matplotlib.colors import LinearSegmentedColormap, to_hex
+from matplotlib.figure import Figure
+from matplotlib.ticker import AutoLocator, FuncFormatter, NullLocator
+from numpy.typing import ArrayLike
+
+from ringbalance.results.numbers import MINUS, display_unit, number, power_of_ten
+
+INK: Final = "#010101"
+MUTED: Final = "#020202"
+GRID: Final = "#030303"
+PAPER: Final = "#040404"
+"""The paper's formulas, in every figure."""
+FOUND: Final = "#050505"
+"""What this program found, in every figure."""
+THIRD: Final = "#060606"
+FOURTH: Final = "#070707"
+FIFTH: Final = "#080808"
+SURFACE: Final = "#090909"
+"""The page behind the figure."""
+
+AS_PAPER: Final[dict[str, Any]] = {"color": PAPER, "linestyle": (0, (5, 2))}
+"""A line of the paper's formulas."""
+REGIME_COLOURS: Final = {
+    "siphon": FOUND,
+    "separated": THIRD,
+    "blocked": FIFTH,
+    "reverse": FOURTH,
+    "cannot be told": MUTED,
+}
+_DASHES: Final = ("-", (0, (5, 1.6)), (0, (1.2, 1.2)), (0, (6, 1.6, 1.2, 1.6)), (0, (3, 1)), (0, (9, 3)))
+_LINE_COLOURS: Final = (FOUND, THIRD, FOURTH, FIFTH, PAPER, MUTED)
+_MARKERS: Final = ("o", "s", "^", "D", "v", "P")
+MAP: Final = tuple(f"#0a0a{step:02x}" for step in range(1, 13))
+"""Twelve shades from low to high, for a field in colour."""
+
+_VARIABLES: Final = {
+    INK: "--fig-ink",
+    MUTED: "--fig-muted",
+    GRID: "--fig-grid",
+    PAPER: "--fig-paper",
+    FOUND: "--fig-found",
+    THIRD: "--fig-third",
+    FOURTH: "--fig-fourth",
+    FIFTH: "--fig-fifth",
+    SURFACE: "--fig-surface",
+    **{shade: f"--fig-map-{step}" for step, shade in enumerate(MAP)},
+}
+
+
+def _shades(low: str, middle: str, high: str) -> tuple[str, ...]:
+    """From one colour over another to a third; lines in the text's colour stand out on each."""
+    ramp = LinearSegmentedColormap.from_list("ramp", [low, middle, high])
+    return tuple(to_hex(ramp(step / (len(MAP) - 1))) for step in range(len(MAP)))
+
+
+_MAP_LIGHT: Final = _shades("#f1f5fa", "#a9c9ec", "#5597d6")
+_MAP_DARK: Final = _shades("#18202a", "#1d4a7c", "#3f83c9")
+LIGHT: Final = {
+    "--fig-ink": "#1d2530",
+    "--fig-muted": "#5b6675",
+    "--fig-grid": "#dfe3e8",
+    "--fig-paper": "#b4500b",
+    "--fig-found": "#1059b0",
+    "--fig-third": "#1b7a55",
+    "--fig-fourth": "#7a3fa3",
+    "--fig-fifth": "#8a6d00",
+    "--fig-surface": "#ffffff",
+    **{f"--fig-map-{step}": shade for step, shade in enumerate(_MAP_LIGHT)},
+}
+DARK: Final = {
+    "--fig-ink": "#e4e8ee",
+    "--fig-muted": "#9aa6b5",
+    "--fig-grid": "#2c3540",
+    "--fig-paper": "#ffa35c",
+    "--fig-found": "#72b1ff",
+    "--fig-third": "#5fd0a0",
+    "--fig-fourth": "#cf9dfa",
+    "--fig-fifth": "#e3c55a",
+    "--fig-surface": "#12171e",
+    **{f"--fig-map-{step}": shade for step, shade in enumerate(_MAP_DARK)},
+}
+
+_FONT: Final = "DejaVu Sans, Arial, sans-serif"
+"""Of figures that are files."""
+_TEXT: Final = 8.8
+"""Size of all text, pt: 8 pt where two narrow figures share the width of an A4 page, 13 px on a screen."""
+_RC: Final = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "ringbalance",
+    "font.family": ["DejaVu Sans"],
+    "font.size": _TEXT,
+    "axes.edgecolor": MUTED,
+    "axes.facecolor": "none",
+    "axes.labelcolor": INK,
+    "axes.labelsize": _TEXT,
+    "axes.linewidth": 0.7,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "axes.unicode_minus": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "legend.frameon": False,
+    "legend.fontsize": _TEXT,
+    "legend.labelcolor": INK,
+    "legend.handlelength": 1.8,
+    "lines.linewidth": 1.6,
+    "lines.solid_capstyle": "round",
+    "text.color": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": _TEXT,
+    "ytick.labelsize": _TEXT,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "xtick.minor.visible": False,
+    "text.parse_math": False,
+}
+
+Paint = Callable[[Axes], object]
+"""What draws a part of a figure: on its axes, SI."""
+Axis = tuple[str, str]
+"""Name and SI unit of what an axis shows."""
+
+
+def line(index: int, *, size: float | None = None) -> dict[str, Any]:
+    """Properties of one of several curves: a colour and dashes of its own, or markers of a size."""
+    place = index % len(_LINE_COLOURS)
+    if size is None:
+        return {"color": _LINE_COLOURS[place], "linestyle": _DASHES[place]}
+    return {"color": _LINE_COLOURS[place], "marker": _MARKERS[place], "markersize": size}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawing:
+    """A finished figure."""
+
+    name: str
+    """Of the file, and the prefix of every id in it."""
+    svg: str
+    """For an HTML page that defines the colour variables."""
+    wide: bool = False
+    """Whether it takes the page's whole width."""
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height, pt."""
+        box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', self.svg)
+        if box is None:
+            raise ValueError(f"the figure {self.name} has no viewBox")
+        return float(box[1]), float(box[2])
+
+    def standalone(self) -> str:
+        """The figure as a file of its own, in the colours of a light page."""
+        return as_file(self.svg, *self.size)
+
+
+def as_file(body: str, width: float, height: float) -> str:
+    """An SVG file of svg elements; word processors, LaTeX and printers know neither variables nor schemes.
+
+    Args: `width`, `height`: pt.
+    """
+    body = body.replace("var(--fig-font)", _FONT)
+    for variable, colour in LIGHT.items():
+        body = body.replace(f"var({variable})", colour)
+    size = f'width="{width:g}pt" height="{height:g}pt" viewBox="0 0 {width:g} {height:g}"'
+    links = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<svg {links} {size}>\n'
+        f'<rect width="100%" height="100%" fill="{LIGHT["--fig-surface"]}"/>\n{body}\n</svg>\n'
+    )
+
+
+WIDE: Final = 7.5
+"""Width, in, of a figure that takes the page's whole width: its text then has the size of a narrow one's."""
+NARROW: Final = 3.6
+_LEFT: Final = 0.66
+_RIGHT: Final = 0.14
+_BOTTOM: Final = 0.42
+_TOP: Final = 0.1
+_LEGEND_ROW: Final = 0.175
+_DECADE: Final = 8.0
+"""Range of a logarithmic axis up to which ticks at 1, 2 and 5 would be too few."""
+_MANY: Final = 1e4
+"""Range of a logarithmic axis from which on decades alone are labelled."""
+_TOP_AXIS: Final = 0.42
+
+
+def plain_number(value: float, _position: object = None) -> str:
+    """Tick label in plain text, because matplotlib's own would be mathtext."""
+    if value == 0:
+        return "0"
+    text = f"{value:.6g}"
+    return text.replace("-", MINUS) if "e" not in text else number(value, digits=1)
+
+
+def decade(value: float, _position: object = None) -> str:
+    """Tick label of a logarithmic axis that spans many decades.
+
+    Args: `value`: the tick, positive.
+    """
+    exponent = f"{value:.0e}".split("e")
+    return power_of_ten(int(exponent[1])) if exponent[0] == "1" else ""
+
+
+def logarithmic(
+    axis: Literal["x", "y"], *, ticks: list[float] | None = None, within: tuple[float, float] | None = None
+) -> Paint:
+    """Makes one axis logarithmic, labels in plain text: at ticks, at 1, 2, 5 within limits, or decades."""
+    if within is not None:
+        fine = (1, 2, 5) if within[1] > _DECADE * within[0] else (1, 1.5, 2, 2.5, 3, 4, 5, 6, 7, 8)
+        steps = (step * 10.0**exponent for exponent in range(-12, 10) for step in fine)
+        ticks = [step for step in steps if within[0] <= step <= within[1]]
+
+    def paint(axes: Axes) -> None:
+        axes.set(**{f"{axis}scale": "log"})
+        target = axes.xaxis if axis == "x" else axes.yaxis
+        if ticks is not None:
+            target.set_ticks(ticks)
+        target.set_major_formatter(FuncFormatter(decade if ticks is None else plain_number))
+        target.set_minor_locator(NullLocator())
+
+    return paint
+
+
+def curve(
+    x: ArrayLike,
+    y: ArrayLike,
+    label: str | None = None,
+    *,
+    band: ArrayLike | None = None,
+    **look: Any,
+) -> Paint:
+    """A line or markers, and the half-width about them shaded where there is one."""
+
+    def paint(axes: Axes) -> None:
+        if band is not None:
+            values, width = np.asarray(y), np.asarray(band)
+            axes.fill_between(
+                np.asarray(x), values - width, values + width, color=look["color"], alpha=0.2, linewidth=0
+            )
+        axes.plot(np.asarray(x), np.asarray(y), label=label, **look)
+
+    return paint
+
+
+def level(value: float, label: str | None = None, **look: Any) -> Paint:
+    """A line across the whole figure."""
+    return lambda axes: axes.axhline(value, label=label, **look)
+
+
+def upright(value: float, label: str | None = None, **look: Any) -> Paint:
+    """A line from the bottom to the top."""
+    return lambda axes: axes.axvline(value, label=label, **look)
+
+
+def note(text: str, place: tuple[float, float], shift: tuple[float, float], **look: Any) -> Paint:
+    """A text beside a place, shifted by so many points."""
+    shifted = {"xytext": shift, "textcoords": "offset points", "color": MUTED}
+    return lambda axes: axes.annotate(text, place, **{**shifted, **look})
+
+
+AMPLITUDE: Final[Axis] = ("amplitude, zero to peak,", "m")
+TIME: Final[Axis] = ("time", "s")
+Curve = tuple[ArrayLike, ArrayLike, dict[str, Any]]
+"""Time, s, or speed; amplitude, m; and the line's properties."""
+
+
+def amplitudes(curves: Iterable[Curve], limit: float) -> Paint:
+    """Vibration amplitudes and the limit, m, on a logarithmic axis."""
+    drawn = list(curves)
+    every = np.append(np.concatenate([np.asarray(values) for _, values, _ in drawn]), limit)
+    low, high = 0.7 * every[every > 0].min(), 1.4 * every.max()
+
+    def paint(axes: Axes) -> None:
+        for time, values, look in drawn:
+            curve(time, values, **look)(axes)
+        level(limit, "limit", color=MUTED, linewidth=1, linestyle=":")(axes)
+        logarithmic("y", within=(low, high) if high < _MANY * low else None)(axes)
+        axes.set(xlim=(0, None), ylim=(low, high))
+
+    return paint
+
+
+def _to_page(text: str, name: str) -> str:
+    """Bare svg element: variables for colours and font, ids of its own, no fixed size."""
+    body = text[text.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
+    body = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", body, count=1)
+    body = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", body, count=1)
+    body = re.sub(r'\bid="', f'id="{name}-', body)
+    body = re.sub(r'(href="|url\()#', rf"\1#{name}-", body)
+    # Matplotlib before 3.11 writes the font in one property.
+    body = re.sub(r"font: ((?:\w+ )?[\d.]+px) [^;\"]*", r"font: \1 var(--fig-font)", body)
+    body = re.sub(r"font-family: [^;\"]*", "font-family: var(--fig-font)", body)
+    for sentinel, variable in _VARIABLES.items():
+        body = body.replace(sentinel, f"var({variable})")
+    # The frame around it on the page is what is read aloud, by the figure's caption.
+    body = body.replace("<svg ", '<svg aria-hidden="true" ', 1)
+    # A tenth of a point is finer than the eye; what is small, as a marker, keeps another digit.
+    parts = re.split(r'( (?:d|x|y|transform)="[^"]*")', body)
+    parts[1::2] = _rounded("\0".join(parts[1::2])).split("\0")
+    body = "".join(parts)
+    return "\n".join(text.rstrip() for text in body.splitlines())
+
+
+def _rounded(attributes: str) -> str:
+    short = re.sub(r"(\d\d\.\d)\d+", r"\1", re.sub(r"(\.\d\d)\d+", r"\1", attributes))
+    return re.sub(r"\.(?!\d)", "", re.sub(r"(\.\d*?)0+(?!\d)", r"\1", short))
+
+
+def draw(
+    name: str,
+    *paints: Paint,
+    x: Axis = ("", "1"),
+    y: Axis = ("", "1"),
+    xlim: tuple[float | None, float | None] | None = None,
+    ylim: tuple[float | None, float | None] | None = None,
+    columns: int = 2,
+    wide: bool = False,
+    height: float = 2.7,
+) -> Drawing:
+    """Draws one figure: its paints one after the other, its axes in the units that suit, and above it the
+    legend of what is labelled.
+
+    Args: `name`: of the file. `columns`: of the legend; 0: none. `height`: inches of 72 units.
+    """
+    settings: Any = dict(_RC)
+    with matplotlib.rc_context(settings):
+        width = WIDE if wide else NARROW
+        figure = Figure(figsize=(width, height))
+        # Margins in inches, the same in every figure, so that neighbours line up.
+        sizes = 1 - (_LEFT + _RIGHT) / width, 1 - (_BOTTOM + _TOP) / height
+        axes = figure.add_axes((_LEFT / width, _BOTTOM / height, *sizes))
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(FuncFormatter(plain_number))
+        for paint in paints:
+            paint(axes)
+        axes.set(xlim=xlim, ylim=ylim)
+        _in_unit(axes.xaxis, axes.get_xlim(), x)
+        _in_unit(axes.yaxis, axes.get_ylim(), y)
+        if columns:
+            legend_above(axes, columns=columns)
+        buffer = io.StringIO()
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return Drawing(name=name, svg=_to_page(buffer.getvalue(), name), wide=wide)
+
+
+def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], shown: Axis) -> None:
+    """Labels an axis, with its ticks in the unit that suits its ends."""
+    name, unit = shown
+    display = display_unit(unit, *limits)
+    axis.set_label_text(f"{name} in {display.symbol}" if name and display.symbol else name or display.symbol)
+    if display.factor == 1:
+        return
+    if not math.log10(display.factor).is_integer() and axis.get_scale() == "linear":
+        # Round in this unit they are not in the other.
+        low, high = sorted(end * display.factor for end in limits)
+        ticks = AutoLocator().tick_values(low, high)
+        axis.set_ticks([tick / display.factor for tick in ticks if low <= tick <= high])
+    text = axis.get_major_formatter()
+    axis.set_major_formatter(FuncFormatter(lambda value, place: text(value * display.factor, place)))
+
+
+def panels(axes: Axes, *boxes: tuple[float, float, float, float]) -> list[Axes]:
+    """Axes of their own in place of a figure's, each by left, bottom, width and height over the figure's."""
+    axes.set_axis_off()
+    return [figure_of(axes).add_axes(box) for box in boxes]
+
+
+def nice_span(span: float) -> list[float]:
+    """Two to five round ticks on either side of zero, and zero, within plus and minus a span."""
+    step = next(
+        step * 10.0**exponent
+        for exponent in range(math.floor(math.log10(span)) - 1, 99)
+        for step in (1, 2, 5)
+        if span / (step * 10.0**exponent) < 3
+    )
+    count = int(span / step)
+    return [step * place for place in range(-count, count + 1)]
+
+
+def figure_of(axes: Axes) -> Figure:
+    """The figure that axes belong to."""
+    return cast(Figure, axes.get_figure())
+
+
+def legend_above(axes: Axes, *, columns: int) -> None:
+    """Puts the legend above the axes, in columns that fit, and gives these the height left; call it last."""
+    figure = figure_of(axes)
+    handles, labels = axes.get_legend_handles_labels()
+    for fitting in range(max(columns, 1), 0, -1):
+        legend = figure.legend(
+            handles,
+            labels,
+            loc="upper left",
+            bbox_to_anchor=(0, 1),
+            ncols=fitting,
+            columnspacing=1.4,
+            borderaxespad=0.0,
+            borderpad=0.1,
+            labelspacing=0.35,
+        )
+        if fitting == 1 or not labels or legend.get_window_extent().width <= figure.bbox.width:
+            break
+        legend.remove()
+    rows = -(-len(labels) // fitting)
+    top = _TOP + _LEGEND_ROW * rows + (_TOP_AXIS if axes.child_axes else 0.0)
+    box, height = axes.get_position(), figure.get_figheight()
+    axes.set_position((box.x0, box.y0, box.width, 1 - (_BOTTOM + top) / height))
+
+
+_POINTS: Final = 72
+_MARGIN: Final = 18.0
+
+
+def sheet(drawings: Sequence[Drawing]) -> str:
+    """All drawings below each other, narrow ones in pairs, in the colours of a light page."""
+    placed, x, y, row, edge = [], _MARGIN, _MARGIN, 0.0, _MARGIN + _POINTS * WIDE
+    for drawing in drawings:
+        width = _POINTS * (WIDE if drawing.wide else NARROW)
+        if x > _MARGIN and x + width > edge:
+            x, y, row = _MARGIN, y + row + _MARGIN, 0.0
+        height = drawing.size[1]
+        place = f'<svg x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" overflow="visible" '
+        told = f'role="img" aria-label="{drawing.name.replace("-", " ")}"'
+        placed.append(drawing.svg.replace("<svg ", place, 1).replace('aria-hidden="true"', told, 1))
+        x, row = x + width + _MARGIN, max(row, height)
+    return as_file("\n".join(placed), edge + _MARGIN, y + row + _MARGIN)

@@ -1,0 +1,96 @@
+"""TOML read, but for keys so long that reading them takes gigabytes; and written, in a file or in a
+message.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+_LONGEST_VALUE, _LONGEST_LIST, _DEEPEST = 60, 10, 4
+MOST_PARTS: Final = 50
+"""Of a dotted key. Time and memory of `tomllib` grow with the square: 3.5 GB for one key of 30,000 parts."""
+_QUOTED: Final = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'')
+_LONG_KEY: Final = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
+
+
+def read_toml(text: str) -> dict[str, Any]:
+    """The tables of a TOML document.
+
+    Raises: ValueError: not TOML, or a key of more than `MOST_PARTS` parts. RecursionError: nested too deeply.
+    """
+    long_key = _LONG_KEY.search(_QUOTED.sub("q", text))
+    if long_key is not None:
+        # Quoted texts hold no line break, so that lines count as in the file.
+        line = long_key.string.count("\n", 0, long_key.start()) + 1
+        raise ValueError(f"line {line} has a key of more than {MOST_PARTS} parts")
+    return tomllib.loads(text)
+
+
+def toml_bytes(document: Mapping[str, Any]) -> bytes:
+    """A document of texts, numbers, truth values, lists and tables, which `tomllib` reads back as it was."""
+    tables = {name: value for name, value in document.items() if isinstance(value, Mapping)}
+    top = {key: value for key, value in document.items() if key not in tables}
+    lines = list(_table_lines(top))
+    for name, table in tables.items():
+        lines += ["", f"[{toml_key(name)}]", *_table_lines(table)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _table_lines(table: Mapping[str, Any]) -> list[str]:
+    return [f"{toml_key(key)} = {_value_text(value, indent='  ')}" for key, value in table.items()]
+
+
+def _value_text(value: Any, *, indent: str = "") -> str:
+    """One value; a list of tables that stands by itself has a line for each."""
+    if isinstance(value, Mapping):
+        inside = ", ".join(f"{toml_key(key)} = {_value_text(item)}" for key, item in value.items())
+        return f"{{ {inside} }}" if inside else "{}"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        items = [_value_text(item) for item in value]
+        if indent and items and isinstance(value[0], Mapping):
+            return "[\n" + "".join(f"{indent}{item},\n" for item in items) + "]"
+        return "[" + ", ".join(items) + "]"
+    # JSON's escapes are TOML's, but TOML asks for one more.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def toml_text(value: object) -> str:
+    """A value as it would stand in a TOML file, printable and shortened to fit a line."""
+    text = _toml_text(value, depth=0)
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 4] + " ..."
+
+
+def _toml_text(value: object, *, depth: int) -> str:
+    if isinstance(value, str):
+        return _quoted(value[: 2 * _LONGEST_VALUE])
+    if isinstance(value, Mapping | Sequence):
+        return _nested(value, depth=depth + 1)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int) and abs(value) >= 10**30:
+        return f"a whole number of {value.bit_length()} bits"
+    return str(value)
+
+
+def _nested(value: Mapping[Any, Any] | Sequence[Any], *, depth: int) -> str:
+    if depth > _DEEPEST:
+        return "..."
+    if isinstance(value, Mapping):
+        few = list(value.items())[:_LONGEST_LIST]
+        pairs = (f"{toml_key(str(key))} = {_toml_text(item, depth=depth)}" for key, item in few)
+        return "{ " + ", ".join(pairs) + " }"
+    return "[" + ", ".join(_toml_text(item, depth=depth) for item in value[:_LONGEST_LIST]) + "]"
+
+
+def toml_key(key: str) -> str:
+    """A key as it would stand in a TOML file: bare where it can be, else quoted; printable, on one line."""
+    bare = key.isascii() and key.replace("_", "a").replace("-", "a").isalnum()
+    return key if bare and len(key) <= _LONGEST_VALUE else _quoted(key[:_LONGEST_VALUE])
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=not text.isprintable())

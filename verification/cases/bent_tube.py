@@ -1,0 +1,236 @@
+"""A tube with two bends over a crest, turning, solved in three dimensions; a heavy run."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.bent_tube import Segment
+from ringbalance.physics.convergence import gci
+from ringbalance.physics.tube.friction import rotation_reynolds_number
+from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import (
+    Convergence,
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Reference,
+    Series,
+    Table,
+    figure,
+)
+from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, bend_shift
+
+REYNOLDS: Final = 200.0
+VISCOSITY: Final = 20e-6
+"""m^2/s: a silicone oil."""
+LEG_IN, HUMP, LEG_OUT = 3.0, 6.0, 12.0
+"""Straight lengths over the bore."""
+_MESHES: Final = ((2, 2, 1.0), (2, 3, 1.5), (3, 4, 2.1))
+"""Cells around and across, and along over those of the coarsest; coarse to fine."""
+_FORMAL_ORDER: Final = 4.0
+_FACTORS: Final = {None: 1.0, "coriolis_halved": 0.5}
+_DEVELOPED: Final = (5.0, 1.0)
+"""Where flow has developed again: from and to, bores before the outlet."""
+
+
+def path_over_crest(scene: Scene, refinement: float) -> tuple[Segment, ...]:
+    """Leg, bend to the right, over the crest, bend to the right, leg; lengths over the bore.
+
+    Args: `refinement`: cells along the path over those of the coarsest mesh.
+    """
+    bend = scene.tube.bends[0]
+
+    def cells(count: int) -> int:
+        return max(1, round(refinement * count))
+
+    radius = bend.radius / scene.tube.bore
+    arc = Segment(length=bend.angle * radius, turn=-bend.angle, cells=cells(5))
+    return (
+        Segment(length=LEG_IN, cells=cells(4), ratio=0.4),
+        arc,
+        Segment(length=HUMP / 2, cells=cells(5), ratio=1.5),
+        Segment(length=HUMP / 2, cells=cells(5), ratio=1 / 1.5),
+        arc,
+        Segment(length=LEG_OUT, cells=cells(14), ratio=3.0),
+    )
+
+
+def _say(text: str) -> None:
+    print(f"bent_tube_3d: {text}", file=sys.stderr, flush=True)
+
+
+def _rotation(scene: Scene) -> float:
+    return rotation_reynolds_number(
+        angular_velocity=scene.rotor.speed,
+        bore=scene.tube.bore,
+        kinematic_viscosity=VISCOSITY,
+    )
+
+
+def _solve(scene: Scene, *, mesh: tuple[int, int, float], coriolis_factor: float = 1.0) -> BentTubeFlow:
+    """The flow on a mesh of cells around, cells across and refinement along the path.
+
+    Raises: ArithmeticError: Newton's method failed.
+    """
+    around, across, along = mesh
+    flow = BentTubeFlow.of(
+        segments=path_over_crest(scene, along),
+        cells=SectionMesh(around=around, across=across, wall_ratio=3.0),
+        reynolds=REYNOLDS,
+        rotation_reynolds=_rotation(scene),
+        coriolis_factor=coriolis_factor,
+        # With less rotation the start is further from the flow.
+        first_inertia=1.0 if coriolis_factor == 1.0 else 0.5,
+        progress=_say,
+    )
+    if not flow.solution.status.ok:
+        raise ArithmeticError(flow.solution.status.text)
+    return flow
+
+
+def _terms(scene: Scene, length: float) -> dict[str, float]:
+    """Friction, rotation and bends of the tube law, and what the bends' curvature does to the rotation."""
+    bore, bend = scene.tube.bore, scene.tube.bends[0]
+    tube = dataclasses.replace(scene.tube, length=length * bore, bends=(bend, bend), drag_coefficient=None)
+    liquid = dataclasses.replace(scene.liquid, kinematic_viscosity=VISCOSITY)
+    same = dataclasses.replace(scene, tube=tube, liquid=liquid, uncertainty=())
+    loss = tube_loss(same, [REYNOLDS * VISCOSITY / bore])
+    arcs = 2 * 64 / REYNOLDS * bend.angle * bend.radius / bore
+    shift = bend_shift(
+        reynolds=REYNOLDS,
+        rotation_reynolds=_rotation(scene),
+        angle=bend.angle,
+        radius=bend.radius / bore,
+        with_rotation=False,
+    )
+    bends = float(loss.terms["bends"][0]) - arcs
+    half_width = float(loss.uncertainty_parts["bends"][0])
+    return {
+        "friction": float(loss.terms["friction"][0]) + arcs,
+        "rotation": float(loss.terms["rotation"][0]),
+        "bends": bends,
+        "bends_half_width": half_width,
+        "shift": 2 * shift,
+    }
+
+
+def _straight(flow: BentTubeFlow, scene: Scene) -> float:
+    """Gradient where flow has developed again, over that of the table."""
+    end = float(flow.arc_length[-1])
+    first, last = (end - distance for distance in _DEVELOPED)
+    gradient = REYNOLDS / 2 * flow.pressure_loss(start=first, end=last) / (last - first)
+    table = rotating_friction_ratio(reynolds=REYNOLDS, rotation_reynolds=_rotation(scene))
+    return gradient / (32 * float(table.value))
+
+
+def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """A tube with two bends over a crest, turning, solved in three dimensions; a heavy run."""
+    meshes = _MESHES if defect is None else _MESHES[1:2]
+    flows: list[BentTubeFlow] = []
+    losses: list[float] = []
+    for mesh in meshes:
+        flow = _solve(scene, mesh=mesh, coriolis_factor=_FACTORS[defect])
+        losses.append(flow.pressure_loss(start=0.0, end=float(flow.arc_length[-1])))
+        # Only the last flow is needed whole; each holds hundreds of megabytes.
+        flows = [flow]
+    fine, length = flows[0], float(flows[0].arc_length[-1])
+    sizes = _sizes(scene, meshes)
+    half_width, order = _half_width(losses, sizes)
+    terms = _terms(scene, length)
+    plain = terms["friction"] + terms["rotation"]
+    explained = plain + terms["shift"]
+    return Evidence(
+        found={
+            "straight": Found(value=_straight(fine, scene)),
+            "explained": Found(value=losses[-1] / explained, numerical=half_width / explained / 2),
+            "convergence": Found(value=half_width / losses[-1]),
+        },
+        reference=dict.fromkeys(("straight", "explained"), Reference(value=1.0)),
+        numbers={
+            "k": losses[-1],
+            "unknowns": float(fine.solution.statistics.unknowns),
+            "rotation_reynolds": _rotation(scene),
+            "reynolds": REYNOLDS,
+            "friction": terms["friction"],
+            "rotation": terms["rotation"],
+            "bends": terms["bends"],
+            "bends_half_width": terms["bends_half_width"],
+            "bends_found": losses[-1] - plain,
+            "shift": terms["shift"],
+            "sum": plain + terms["bends"],
+            "sum_gap": losses[-1] / (plain + terms["bends"]) - 1,
+            "explained_gap": losses[-1] / explained - 1,
+            "half_width": half_width,
+        },
+        convergence=(
+            Convergence(
+                quantity="loss coefficient of the whole tube",
+                unit="1",
+                formal_order=_FORMAL_ORDER,
+                size=[size / sizes[0] for size in sizes],
+                value=losses,
+                observed_order=order,
+                gci=half_width / losses[-1],
+                geometry="quadratic",
+                note="size: cube root of the volume per cell",
+            ),
+        )
+        if len(losses) > 1
+        else (),
+        series=(_figure(fine),),
+        tables=(_table(terms, losses[-1]),),
+    )
+
+
+def _sizes(scene: Scene, meshes: Sequence[tuple[int, int, float]]) -> list[float]:
+    """Cube root of the volume per cell, up to a factor."""
+    counts = []
+    for around, across, along in meshes:
+        section = 2 * around**2 + 4 * around * across
+        counts.append(section * sum(segment.cells for segment in path_over_crest(scene, along)))
+    return [count ** (-1 / 3) for count in counts]
+
+
+def _half_width(losses: Sequence[float], sizes: Sequence[float]) -> tuple[float, tuple[float, ...]]:
+    """Expanded uncertainty (95 %) of the finest loss, and the observed order."""
+    if len(losses) < 3:
+        return 0.0, ()
+    found = gci(
+        values=list(losses)[::-1], sizes=list(sizes)[::-1], formal_order=_FORMAL_ORDER, round_off=1e-9
+    )
+    return float(found.uncertainty), (float(found.observed_order),)
+
+
+def _figure(flow: BentTubeFlow) -> Series:
+    s = flow.arc_length
+    fall = 2 / flow.reynolds * flow.gradient * s
+    loss = np.array([flow.pressure_loss(start=0.0, end=float(end)) for end in s])
+    return figure(
+        "loss along the path beyond that of the straight turning tube",
+        ("arc length over bore", "1", s),
+        Curve("three dimensions", "1", loss - fall),
+    )
+
+
+def _table(terms: Mapping[str, float], found: float) -> Table:
+    plain = terms["friction"] + terms["rotation"]
+    rows = {
+        "friction of the whole length": terms["friction"],
+        "rotation": terms["rotation"],
+        "bends beyond the friction of their arcs, by the tube law": terms["bends"],
+        "bends in three dimensions": found - plain,
+        "bends as curvature added to rotation": terms["shift"],
+    }
+    return Table(
+        name="what the loss coefficient of the bent tube is made of",
+        columns={"term": list(rows), "K": list(rows.values())},
+    )

@@ -1,0 +1,362 @@
+"""The gas line's mouth: the fills that leave it dry, and a chamber that its tube reaches into."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.optimize import brentq, minimize_scalar
+
+from ringbalance.mesh.geometry import (
+    chamber_volume,
+    half_angle,
+    liquid_area,
+    liquid_first_moment,
+    surface_radius,
+)
+from ringbalance.mesh.quadratic_tetrahedra import derivatives, shapes, tetrahedra
+from ringbalance.mesh.wall_integrals import gauss
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms, drawing_shares
+from ringbalance.scene import liquid_ring_scene, load_scene
+from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.uncertain import with_value
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Reference,
+    Series,
+    as_found,
+    figure,
+    from_half_width,
+)
+
+_GRIDS: Final = ((30, 45, 4), (60, 90, 8))
+"""Radial and angular cells, and of an imported cell Gauss points along each direction; coarse and fine."""
+_ANGLES: Final = np.linspace(0.0, np.pi, 181)
+"""Of the shaft; the chamber is symmetric about its centre line."""
+_HOLE: Final = "gas_hole"
+"""Boundary of an imported chamber that is the mouth of its gas line."""
+_JUDGED: Final = ("stopped", "running", "any_speed")
+_OFFSETS: Final = np.array([0.02, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 20.0])
+"""g/omega^2 in units of R2: from a centred ring to almost a plane."""
+_FILE: Final = Path(__file__).parent / "gas_tube" / "data" / "scene.toml"
+_RADIUS, _TIP = 2e-3, 31e-3
+"""Of the tube outside, and radius of its mouth, m; as tools/example_chambers.py draws them."""
+_DEEP: Final = 0.8
+"""Fill ratio at which part of the tube is under the surface."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Cells:
+    """The chamber cut into small cells."""
+
+    place: ComplexArray
+    """Their middles, m, centre line along the real axis."""
+    share: FloatArray
+    """Of the chamber's area."""
+    width: FloatArray
+    """Distance over which the surface passes a cell, m."""
+
+
+def gas_hole_ends(scene: Scene) -> Evidence:
+    """On the coarse grid."""
+    disc, angles = scene.disc, _angles(scene.disc)
+    cells = _cells(disc, *_GRIDS[0])
+    safe = _safe_fills(scene, cells, _hole(disc, _safest_radius(disc, cells, angles)), angles)
+    return Evidence(
+        found=as_found(**{f"margin_{state}": safe[state] - disc.max_fill_ratio for state in _JUDGED})
+    )
+
+
+def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The largest fill that leaves a point of the chamber dry at every angle, at rest and at any speed.
+
+    Raises: NotRunError: the shaft is vertical, or there is no gravity.
+    """
+    if scene.environment.shaft != "horizontal" or scene.environment.gravity == 0:
+        raise NotRunError("the claim is about a horizontal shaft under gravity")
+    disc = scene.disc
+    angles = _ANGLES[:1] if defect == "upright_only" else _angles(disc)
+    coarse, fine = (_cells(disc, *grid) for grid in _GRIDS)
+    best = _safest_radius(disc, fine, angles)
+    hole = _hole(disc, best)
+    rough, safe = (_safe_fills(scene, cells, hole, angles) for cells in (coarse, fine))
+    ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
+    return Evidence(
+        found={
+            f"margin_{state}": Found(
+                value=safe[state] - disc.max_fill_ratio,
+                numerical=from_half_width(abs(safe[state] - rough[state])),
+            )
+            for state in _JUDGED
+        },
+        numbers={
+            "best_radius": best,
+            "hole_radius": float(np.abs(hole).mean()),
+            "max_fill": disc.max_fill_ratio,
+            "safe_running": safe["running"],
+            "safe_stopped": safe["stopped"],
+            "ring_radius": ring,
+            "safe_at_ring": _safe_at_rest(fine, _on_centre_line(ring), angles),
+            "between_margin": safe["turning"] - safe["stopped"],
+        },
+        series=(_over_radius(scene, fine),),
+    )
+
+
+def _angles(disc: Disc) -> FloatArray:
+    """Of the shaft: an imported chamber need not be symmetric."""
+    return _ANGLES if disc.geometry is None else np.linspace(-np.pi, np.pi, _ANGLES.size)
+
+
+def _hole(disc: Disc, best: float) -> ComplexArray:
+    """Points of the hole, m: the one that an imported chamber has, or the safest point of the centre line."""
+    facets = {} if disc.geometry is None else disc.geometry.boundaries
+    if disc.geometry is None or _HOLE not in facets:
+        return _on_centre_line(best)
+    places = disc.geometry.points[np.unique(facets[_HOLE])]
+    return np.asarray(np.unique(np.round(places[:, 0] + 1j * places[:, 1], 6)), dtype=np.complex128)
+
+
+def _on_centre_line(radius: float) -> ComplexArray:
+    return np.array([radius], dtype=np.complex128)
+
+
+def _safe_fills(scene: Scene, cells: _Cells, hole: ComplexArray, angles: FloatArray) -> Mapping[str, float]:
+    """Safe fills with a hole: at full speed, at rest, at any speed between, at the worst."""
+    stopped = _safe_at_rest(cells, hole, angles)
+    turning = _safe_turning(cells, hole, _OFFSETS * scene.disc.outer_radius, angles)
+    return {
+        "running": _safe_turning(cells, hole, _offset(scene), angles),
+        "stopped": stopped,
+        "turning": turning,
+        "any_speed": min(stopped, turning),
+    }
+
+
+def _offset(scene: Scene) -> FloatArray:
+    return np.array([scene.environment.gravity / scene.rotor.speed**2])
+
+
+def _cells(disc: Disc, radial: int, angular: int, points: int) -> _Cells:
+    if disc.geometry is not None:
+        return _imported_cells(disc.geometry, radial, angular, points)
+    depth = disc.outer_radius - disc.inner_radius
+    radius = disc.inner_radius + depth * (np.arange(radial) + 0.5) / radial
+    alpha = half_angle(disc=disc, radius=radius)
+    angle = np.outer(alpha, 2 * (np.arange(angular) + 0.5) / angular - 1)
+    area = np.broadcast_to((radius * 2 * alpha * depth / (radial * angular))[:, None], angle.shape).ravel()
+    place = np.asarray(radius[:, None] * np.exp(1j * angle), dtype=np.complex128).ravel()
+    return _Cells(place=place, share=area / area.sum(), width=np.sqrt(area))
+
+
+def _imported_cells(geometry: ChamberGeometry, radial: int, angular: int, points: int) -> _Cells:
+    """What lies in each column along the shaft, at the middle of it."""
+    places, volumes = _columns(geometry, points)
+    place, volume = places.ravel(), volumes.ravel()
+    parts = []
+    for value, count in ((np.abs(place), radial), (np.angle(place), angular)):
+        step = np.ptp(value) / count
+        parts.append((np.minimum(((value - value.min()) / step).astype(np.int64), count - 1), step))
+    (ring, depth), (ray, angle) = parts
+    cell, size = ring * angular + ray, radial * angular
+    share = np.bincount(cell, volume, size)
+    sums = np.bincount(cell, volume * place.real, size) + 1j * np.bincount(cell, volume * place.imag, size)
+    filled = share > 0
+    middle = np.asarray(sums[filled] / share[filled], dtype=np.complex128)
+    return _Cells(
+        place=middle,
+        share=share[filled] / share.sum(),
+        width=np.sqrt(depth * angle * np.abs(middle)),
+    )
+
+
+def _columns(geometry: ChamberGeometry, points: int) -> tuple[ComplexArray, FloatArray]:
+    """Gauss points of all cells across the shaft, m, and the volume at each, m^3."""
+    body = tetrahedra(geometry)
+    line, weights = gauss(points)
+    u, v, w = (grid.ravel() for grid in np.meshgrid(*3 * [line], indexing="ij"))
+    weight = np.prod([grid.ravel() for grid in np.meshgrid(*3 * [weights], indexing="ij")], axis=0)
+    # A cube drawn to a corner: its Jacobian is (1 - v)(1 - w)^2.
+    second, third, fourth = u * (1 - v) * (1 - w), v * (1 - w), w
+    local = np.stack([1 - second - third - fourth, second, third, fourth], axis=1)
+    corners = body.nodes[body.cells]
+    volume = np.linalg.det(derivatives(corners, local)) * weight * (1 - v) * (1 - w) ** 2
+    places = np.einsum("pn,enx->epx", shapes(local), corners[..., :2], optimize=True)
+    return np.asarray(places[..., 0] + 1j * places[..., 1]), np.asarray(volume)
+
+
+def _liquid_share(cells: _Cells, height: FloatArray) -> FloatArray:
+    """Share of the chamber below a level; height = distance of each cell beyond it, shape (states, cells)."""
+    inside = np.clip(0.5 + height / cells.width, 0.0, 1.0)
+    return np.asarray(inside @ cells.share, dtype=np.float64)
+
+
+def _safe_at_rest(cells: _Cells, hole: ComplexArray, angles: FloatArray) -> float:
+    """Smallest share below the level through a point of the hole, over directions of gravity."""
+    down = np.exp(1j * angles)[:, None]
+    place = np.real(cells.place * np.conj(down))
+    # The lowest point is reached first.
+    level = np.real(hole * np.conj(down)).max(axis=1, keepdims=True)
+    return float(_liquid_share(cells, place - level).min())
+
+
+def _safe_turning(cells: _Cells, hole: ComplexArray, offsets: FloatArray, angles: FloatArray) -> float:
+    """The same with the surface a circle about -g/omega^2."""
+    shares = []
+    for offset in offsets:
+        centre = -offset * np.exp(1j * angles)[:, None]
+        level = np.abs(hole - centre).max(axis=1, keepdims=True)
+        shares.append(_liquid_share(cells, np.abs(cells.place - centre) - level).min())
+    return float(min(shares))
+
+
+def _safest_radius(disc: Disc, cells: _Cells, angles: FloatArray) -> float:
+    inner, outer = disc.inner_radius, disc.outer_radius
+    scan = np.linspace(inner, outer, 25)
+    best = scan[int(np.argmax([_safe_at_rest(cells, _on_centre_line(r), angles) for r in scan]))]
+    step = scan[1] - scan[0]
+    result = minimize_scalar(
+        lambda r: -_safe_at_rest(cells, _on_centre_line(r), angles),
+        bounds=(max(inner, best - step), min(outer, best + step)),
+        method="bounded",
+        options={"xatol": 1e-4 * (outer - inner)},
+    )
+    return float(result.x)
+
+
+def _over_radius(scene: Scene, cells: _Cells) -> Series:
+    disc = scene.disc
+    radius = np.linspace(disc.inner_radius, disc.outer_radius, 61)
+    points, angles = [_on_centre_line(r) for r in radius], _angles(disc)
+    rest = np.array([_safe_at_rest(cells, point, angles[::4]) for point in points])
+    running = np.array([_safe_turning(cells, point, _offset(scene), angles[::30]) for point in points])
+    return figure(
+        "largest fill that leaves the gas hole dry",
+        ("radius of the hole on the centre line", "m", radius),
+        Curve("running", "1", running),
+        Curve("stopped, worst angle", "1", rest),
+        Curve("largest fill", "1", np.full(radius.shape, disc.max_fill_ratio), style="paper"),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Exact:
+    """The sector between plates less a cylinder along x, by quadrature over y; no mesh."""
+
+    scene: Scene
+    radius: float
+    """Of the cylinder, m; 0 for the bare sector."""
+
+    def _over_tube(self, inside: Callable[[float], float]) -> float:
+        if self.radius == 0:
+            return 0.0
+        width = 2 * self.radius
+
+        def chord(angle: float) -> float:
+            # y = radius sin(angle) takes the root at the cylinder's sides away.
+            y = self.radius * math.sin(angle)
+            return width * math.cos(angle) * inside(y) * self.radius * math.cos(angle)
+
+        return float(quad(chord, -math.pi / 2, math.pi / 2, epsrel=1e-12, epsabs=0, limit=400)[0])
+
+    def volume(self, a: float) -> float:
+        """Outside a surface, m^3."""
+        disc = self.scene.disc
+        tube = self._over_tube(lambda y: max(_TIP - math.sqrt(a * a - y * y), 0.0))
+        return disc.axial_width * float(liquid_area(disc=disc, surface_radius=a)) - tube
+
+    def moment(self, a: float) -> float:
+        """Along x, kg m."""
+        disc = self.scene.disc
+        tube = self._over_tube(lambda y: max(_TIP**2 - (a * a - y * y), 0.0) / 2)
+        sector = disc.axial_width * float(liquid_first_moment(disc=disc, surface_radius=a))
+        return self.scene.liquid.density * (sector - tube)
+
+    def lever(self, a: float) -> float:
+        """lambda, twice the mean of x over the free surface, m."""
+        disc, alpha = self.scene.disc, float(half_angle(disc=self.scene.disc, radius=a))
+
+        def there(y: float) -> float:
+            return 1.0 if math.sqrt(a * a - y * y) < _TIP else 0.0
+
+        area = 2 * a * alpha * disc.axial_width
+        along = 2 * a * a * math.sin(alpha) * disc.axial_width
+        area -= self._over_tube(lambda y: there(y) * a / math.sqrt(a * a - y * y))
+        along -= self._over_tube(lambda y: there(y) * a)
+        return 2 * along / area
+
+    def surface(self, fill: float) -> float:
+        """Radius of the free surface at a fill ratio, m."""
+        disc = self.scene.disc
+        wanted = fill * self.volume(disc.inner_radius)
+        return float(
+            brentq(lambda a: self.volume(a) - wanted, disc.inner_radius, disc.outer_radius, xtol=1e-14)
+        )
+
+
+def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The paper's chamber with a real gas tube: a mesh from CAD against the sector less a cylinder.
+
+    Raises: SceneError: the file of the case is damaged.
+    """
+    with_tube = replace(scene, disc=_disc_with_tube())
+    meshed = scene if defect == "without_the_tube" else with_tube
+    if defect == "drawn_too_wide":
+        meshed = with_value(scene=meshed, quantity="axial_width", value=1.001 * meshed.disc.axial_width)
+    largest = scene.disc.max_fill_ratio
+    fills = np.array([largest / 2, largest, _DEEP])
+    _, moment, ratio = chamber_closed_forms(scene=meshed, fill_ratio=fills)
+    shares = drawing_shares(meshed.disc, fills)
+    values = {
+        "volume": (chamber_volume(disc=meshed.disc), shares.volume),
+        "moment": (moment[1], shares.moment[1]),
+        "moment_deep": (moment[2], shares.moment[2]),
+        "lever": (ratio[0], shares.moment[0]),
+    }
+    bare, exact = (_totals(_Exact(scene=scene, radius=radius), fills) for radius in (0.0, _RADIUS))
+    hole = gas_hole(with_tube, level).numbers
+    return Evidence(
+        found={
+            name: Found(
+                value=float(value), numerical=from_half_width((float(share) + 1e-8) * abs(float(value)))
+            )
+            for name, (value, share) in values.items()
+        },
+        reference={name: Reference(value=value) for name, value in exact.items()},
+        numbers={
+            **{f"{name}_change": exact[name] / bare[name] - 1 for name in ("volume", "moment", "lever")},
+            "thickness": 2 * _RADIUS,
+            "tip": _TIP,
+            "ring_radius": float(surface_radius(disc=scene.disc, fill_ratio=largest)),
+            "safe_stopped": hole["safe_stopped"],
+            "safe_running": hole["safe_running"],
+        },
+    )
+
+
+def _totals(exact: _Exact, fills: FloatArray) -> dict[str, float]:
+    """At equal fills, the largest, and a deep one."""
+    half, full, deep = (exact.surface(float(fill)) for fill in fills)
+    return {
+        "volume": exact.volume(exact.scene.disc.inner_radius),
+        "moment": exact.moment(full),
+        "moment_deep": exact.moment(deep),
+        "lever": exact.lever(half),
+    }
+
+
+@lru_cache(maxsize=1)
+def _disc_with_tube() -> Disc:
+    return liquid_ring_scene(load_scene(_FILE)).disc

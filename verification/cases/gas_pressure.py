@@ -1,0 +1,194 @@
+"""Claims on what the gas pressure achieves: the least that starts a flow, how far a denser liquid goes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
+from ringbalance.reduced_model import paper
+from ringbalance.reduced_model.law.flow_law import FlowLaw
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Reference,
+    Series,
+    as_found,
+    figure,
+)
+from ringbalance.verification.loops import flow_law_of
+from ringbalance.verification.paper_numbers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE
+from ringbalance.verification.reference.exact_chamber import exact_moment, wall_pressure_of
+from ringbalance.verification.rings import found_of, ring_of
+
+_POINTS: Final = 101
+_STANDARD: Final = 1e-6
+"""Standard uncertainty of a gain: the fill at which the flow ends is found to a millionth of the largest."""
+_REFINEMENTS: Final = 3
+"""Each finds the fill at which the flow ends a hundred times more closely; a figure needs one less."""
+
+
+def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Stall by Eq. 19 and by the true wall pressure, and priming over the crest, beside the printed range.
+
+    Raises: NotRunError: a scene without a crest.
+    """
+    crest, omega, outer = scene.tube.hump_radius, scene.rotor.speed, scene.disc.outer_radius
+    if crest is None:
+        raise NotRunError("the scene's tube has no siphon crest to prime over")
+
+    def priming(radius: float) -> float:
+        """Gas pressure that lifts an almost empty chamber's liquid over the crest, the other side vented."""
+        return hydrostatic_pressure(density=DENSITY, angular_velocity=omega, inner=radius, outer=outer)
+
+    stall = paper.stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=omega)
+    velocity_high = paper.velocity_from_pressures(
+        density=DENSITY,
+        drag_coefficient=paper.PAPER_DRAG_COEFFICIENT,
+        pressure_difference=HIGHEST_PRESSURE.value,
+    )
+    radius = np.linspace(scene.disc.inner_radius, outer, 61)
+    shown = figure(
+        "pressure that starts the flow from an almost empty chamber",
+        ("inner radius of the siphon crest", "m", radius),
+        Curve("priming, other chamber vented", "Pa", np.array([priming(float(r)) for r in radius])),
+        Curve("0.54 MPa", "Pa", np.full(radius.shape, LOWEST_PRESSURE.value), style="paper"),
+        Curve("stall by Eq. 19", "Pa", np.full(radius.shape, stall), style="reference"),
+    )
+    return Evidence(
+        found=as_found(by_eq_19=stall, by_priming=priming(crest)),
+        reference=dict.fromkeys(("by_eq_19", "by_priming"), LOWEST_PRESSURE.reference),
+        numbers={
+            "by_ring": float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY)),
+            "scene_hump": crest,
+            "velocity_high": float(velocity_high),
+        },
+        series=(shown,),
+    )
+
+
+def denser_liquid_ends(scene: Scene) -> Evidence:
+    """The gains alone."""
+    laws = [_law(scene, density) for density in (scene.liquid.density, 2 * scene.liquid.density)]
+    return Evidence(found=as_found(gain=_gain(scene, laws), gain_raised=_gain(scene, laws, raised=2)))
+
+
+def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """What the same gas pressure achieves with a liquid of twice the density."""
+    light, full = scene.liquid.density, scene.disc.max_fill_ratio
+    felt = light if defect == "weightless" else 2 * light
+    # What the gas has to overcome when the driven chamber is empty: the wall pressure of a full opposite one.
+    stalls = [found_of(ring_of(scene, (full,), density=d), "wall_pressure", 0).value for d in (light, felt)]
+    laws = [_law(scene, density) for density in (light, felt)]
+    reach = [_reach(law, scene.gas.pressure) for law in laws]
+    raised = _gain(scene, laws, raised=2 if defect is None else 1)
+    usable = [
+        min(own, full - residual_fill_ratio(scene, law=law)) for law, own in zip(laws, reach, strict=True)
+    ]
+    return Evidence(
+        found={
+            "gain": Found(value=_gain(scene, laws), numerical=_STANDARD, corrected=raised),
+            "gain_raised": Found(value=raised, numerical=_STANDARD),
+        },
+        # Twice the density, twice the ability.
+        reference=dict.fromkeys(("gain", "gain_raised"), Reference(value=2.0)),
+        numbers={
+            "stall_light": stalls[0],
+            "stall_dense": stalls[1],
+            "gas": scene.gas.pressure,
+            "reach_light": reach[0],
+            "reach_dense": reach[1],
+            "usable_light": usable[0],
+            "gain_usable": _ability(scene, 2 * light, usable[1]) / _ability(scene, light, usable[0]),
+            "gain_full": _gain(scene, laws, full=True),
+            "gain_vapour": _gain(scene, [laws[0], _law(scene, 2 * light, degassed=True)], full=True),
+            "push": scene.gas.ambient_pressure - scene.liquid.vapour_pressure,
+            "prime_light": _priming(scene, light),
+            "prime_dense": _priming(scene, felt),
+        },
+        series=(_over_gas_pressure(scene, laws),),
+    )
+
+
+def _gain(scene: Scene, laws: Sequence[FlowLaw], *, raised: int = 1, full: bool = False) -> float:
+    """Ability on hand with the second law's liquid of twice the density, over that with the first law's.
+
+    Args: `raised`: factor of the gas pressure under the second law. `full`: whether its tube stays full.
+    Raises: NotRunError: the gas does not start the flow of the scene's own liquid.
+    """
+    gas, light = scene.gas.pressure, scene.liquid.density
+    own = _reach(laws[0], gas)
+    if own <= scene.disc.max_fill_ratio / 2:
+        raise NotRunError(
+            "the gas pressure of this scene does not start the flow from equal fills at every radius that "
+            "the siphon crest may have"
+        )
+    dense = _reach(laws[1], raised * gas, full=full)
+    return _ability(scene, 2 * light, dense) / _ability(scene, light, own)
+
+
+def _law(scene: Scene, density: float, *, degassed: bool = False) -> FlowLaw:
+    """Args: `degassed`: whether the liquid holds no gas, so that its cavity is at vapour pressure."""
+    liquid = dataclasses.replace(scene.liquid, density=density)
+    if degassed:
+        liquid = dataclasses.replace(liquid, dissolved_gas="none")
+    return flow_law_of(dataclasses.replace(scene, liquid=liquid))
+
+
+def _reach(
+    law: FlowLaw, gas_pressure: float, *, full: bool = False, refinements: int = _REFINEMENTS
+) -> float:
+    """Largest fill of the opposite chamber that a law reaches from equal fills and an empty tube."""
+    largest = law.max_fill_ratio
+    start = law.evaluate(fill_ratio=largest / 2, gas_pressure=gas_pressure, primed=full)
+    low, high = 0.0, largest / 2
+    for _ in range(refinements):
+        fill = np.linspace(high, low, _POINTS)
+        flow = law.evaluate(fill_ratio=fill, gas_pressure=gas_pressure, primed=full or bool(start.primed))
+        stopped = np.flatnonzero(flow.velocity <= 0)
+        if not stopped.size:
+            return largest - low
+        if stopped[0] == 0:
+            return largest - high
+        high, low = fill[stopped[0] - 1], fill[stopped[0]]
+    return float(largest - high)
+
+
+def _ability(scene: Scene, density: float, fill: float) -> float:
+    fills = np.array([fill, scene.disc.max_fill_ratio - fill])
+    moment = exact_moment(disc=scene.disc, density=density, fill_ratio=fills)
+    return float(moment[0] - moment[1])
+
+
+def _priming(scene: Scene, density: float) -> float:
+    """Gas pressure that lifts the liquid over the crest from equal fills, the other chamber vented."""
+    crest, omega = scene.tube.hump_radius, scene.rotor.speed
+    if crest is None:
+        return 0.0
+    level = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))
+    return max(hydrostatic_pressure(density=density, angular_velocity=omega, inner=crest, outer=level), 0.0)
+
+
+def _over_gas_pressure(scene: Scene, laws: Sequence[FlowLaw]) -> Series:
+    pressure = np.linspace(0.02, 2.5, 60) * wall_pressure_of(scene, scene.disc.max_fill_ratio)
+    light, dense = (
+        np.array(
+            [_ability(scene, density, _reach(law, float(p), refinements=_REFINEMENTS - 1)) for p in pressure]
+        )
+        for law, density in zip(laws, (scene.liquid.density, 2 * scene.liquid.density), strict=True)
+    )
+    return figure(
+        "ability of a pair against the gas pressure, by the calibrated law",
+        ("gas pressure", "Pa", pressure),
+        Curve("the scene's liquid", "kg m", light),
+        Curve("twice as dense", "kg m", dense),
+    )

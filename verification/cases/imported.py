@@ -1,0 +1,327 @@
+"""Imported chambers against closed forms: totals, pressure with its loads, and walls cut by the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.mesh.chamber import FREE_SURFACE
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.mesh.liquid_body import Level as SurfaceLevel
+from ringbalance.mesh.liquid_body import liquid_body
+from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
+from ringbalance.mesh.wall_integrals import (
+    LONGEST,
+    Walls,
+    integrals,
+    split_patches,
+    wall_patches,
+    walls_about,
+)
+from ringbalance.physics.convergence import gci
+from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
+from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
+from ringbalance.physics.pressure.solve import quadratic_basis, side, solve_on
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference, as_found, from_half_width
+from ringbalance.verification.orders import OrderStudy, order_figure, orders_found
+from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
+from ringbalance.verification.reference.exact_chamber import exact_totals
+from ringbalance.verification.reference.manufactured import Manufactured
+
+_CELLS: Final = ((8, 32, 2), (4, 16, 1), (2, 8, 1))
+"""Finest first; the arcs alone are approximated, so the cells along the angle decide."""
+_SIZES: Final = (1.0, 2.0, 4.0)
+_ORDER: Final = 4.0
+"""Of what an arc drawn by quadratic edges encloses."""
+_COARSE_TO_FINE: Final = ((2, 4, 2), (4, 8, 4), (8, 16, 8))
+_MANUFACTURED: Final = ("force_off_by_a_percent", "force_across_dropped", "surface_pressure_shifted")
+
+
+def _imported_chamber_reference(scene: Scene) -> Mapping[str, Reference]:
+    exact = exact_totals(scene)
+    exact["lever"] = exact.pop("lambda")
+    return {name: Reference(value=value) for name, value in exact.items()}
+
+
+def imported_chamber(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The built-in chamber as a mesh file would give it, against the closed forms and a manufactured
+    solution."""
+    records = [_record(scene.disc, cells, defect) for cells in _CELLS]
+    rows = np.array([_totals(scene, record) for record in records])
+    names = ("volume", "moment", "lever")
+    found = {name: _converged(rows[:, k]) for k, name in enumerate(names)}
+    pressure = _by_elements(scene, records[0])
+    orders = _manufactured(scene.disc, defect if defect in _MANUFACTURED else None)
+    return Evidence(
+        found={
+            **found,
+            "wall_pressure": pressure,
+            "field_order": Found(value=orders[0]),
+            "field_error": Found(value=orders[1]),
+        },
+        reference=_imported_chamber_reference(scene),
+        numbers={"cells": float(len(records[0].cells))},
+    )
+
+
+def _record(disc: Disc, cells: tuple[int, int, int], defect: str | None) -> ChamberGeometry:
+    record = disc_chamber(disc, cells)
+    if defect == "drawn_too_large":
+        return replace(record, points=record.points * 1.0001, digest=f"large {record.digest}")
+    return record
+
+
+def _totals(scene: Scene, record: ChamberGeometry) -> tuple[float, float, float]:
+    """Volume, moment at the largest fill, and lambda at equal fills, by integrals over the walls."""
+    disc = replace(scene.disc, geometry=record)
+    own = replace(scene, disc=disc)
+    fills = np.array([disc.max_fill_ratio, disc.max_fill_ratio / 2])
+    _, moment, ratio = chamber_closed_forms(scene=own, fill_ratio=fills)
+    return chamber_volume(disc=disc), float(moment[0]), float(ratio[1])
+
+
+def _converged(values: np.ndarray) -> Found:
+    study = gci(values=values.tolist(), sizes=_SIZES, formal_order=_ORDER)
+    # What a table of integrals is good to, besides.
+    width = study.uncertainty + 1e-8 * abs(float(values[0]))
+    return Found(value=float(values[0]), numerical=from_half_width(width))
+
+
+def _by_elements(scene: Scene, record: ChamberGeometry) -> Found:
+    ring = solved_ring(
+        geometry=record,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        surface_radius=float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio)),
+    )
+    pressure = ring.wall_pressure
+    return Found(
+        value=float(pressure.value),
+        numerical=from_half_width(float(pressure.uncertainty)),
+        conclusive=ring.status.ok,
+    )
+
+
+def _manufactured(disc: Disc, defect: str | None) -> tuple[float, float]:
+    """Order and finest error of the pressure in the whole chamber, its inner wall taken for the surface."""
+    exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
+    errors = []
+    for cells in _COARSE_TO_FINE:
+        record = disc_chamber(disc, cells)
+        walls = {FREE_SURFACE if n == "inner_wall" else n: each for n, each in record.boundaries.items()}
+        mesh = scikit_fem_mesh(tetrahedra(replace(record, boundaries=walls)))
+        solution = solve_on(quadratic_basis(mesh), exact.problem(defect))
+        true = exact.pressure(mesh.doflocs)
+        errors.append(float(np.sqrt(np.mean((solution.values - true) ** 2) / np.mean(true**2))))
+    study = OrderStudy.of(size=[4.0, 2.0, 1.0], error=errors)
+    return study.settled_order, study.finest_error
+
+
+_IMPORTED_PRESSURE_LEVELS: Final = {"light": (3, 6, 12), "heavy": (4, 8, 16, 24)}
+"""Radial cells; half of them lie in the liquid."""
+_FILL: Final = 0.4
+_OWN: Final = ("surface_off_by_a_percent", "facets_taken_for_the_wall")
+"""Mutations of the physical problem; the others are those of the manufactured one."""
+
+
+def imported_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Pressure in an imported chamber: a manufactured solution on meshes that become finer, and exact
+    loads."""
+    disc, sizes = scene.disc, _IMPORTED_PRESSURE_LEVELS[level]
+    studies = _studies(disc, sizes, None if defect in _OWN else defect)
+    rings = [_ring(scene, sizes[1], kind, defect) for kind in ("hexahedron27", "hexahedron")]
+    density, omega = scene.liquid.density, scene.rotor.speed
+    a = float(surface_radius(disc=disc, fill_ratio=_FILL))
+    exact = hydrostatic_pressure(density=density, angular_velocity=omega, inner=a, outer=disc.outer_radius)
+    off = [abs(float(ring.wall_pressure.value) - exact) for ring in rings]
+    widths = [float(ring.wall_pressure.uncertainty) for ring in rings]
+    if defect == "facets_taken_for_the_wall":
+        widths[1] = widths[0]
+    field, wall = studies["field"], studies["wall"]
+    found = {
+        "field_order": field.settled_order,
+        "field_error": field.finest_error,
+        "wall_error": wall.finest_error,
+        "pressure": off[0] / exact,
+        "held": max(error / width for error, width in zip(off, widths, strict=True)),
+        "loads": _balance(rings[0], omega),
+    }
+    return Evidence(
+        found=as_found(**found),
+        numbers={"straight": off[1] / exact, "unknowns": float(rings[0].statistics.unknowns)},
+        series=(order_figure({"pressure field": field, "force on the outer wall": wall}),),
+        convergence=(
+            field.table("pressure field, relative error", 3.0),
+            wall.table("force on the outer wall, relative error", 4.0),
+        ),
+    )
+
+
+@lru_cache(maxsize=8)
+def _ring(scene: Scene, size: int, kind: CellKind, defect: str | None) -> ImportedRing:
+    a = float(surface_radius(disc=scene.disc, fill_ratio=_FILL))
+    return solved_ring(
+        geometry=disc_chamber(scene.disc, (size, 2 * size, size), kind=kind),
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        surface_radius=1.01 * a if defect == "surface_off_by_a_percent" else a,
+    )
+
+
+def _balance(ring: ImportedRing, omega: float) -> float:
+    """All forces on the walls together over the centrifugal force of the liquid, deviation from one."""
+    total = np.sum([load.force.value for load in ring.loads.values()], axis=0)
+    exact = omega**2 * ring.first_moment * np.array([1.0, 1.0, 0.0])
+    return float(np.linalg.norm(total - exact) / np.linalg.norm(exact))
+
+
+@lru_cache(maxsize=8)
+def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> dict[str, OrderStudy]:
+    exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
+    problem, errors = exact.problem(defect), []
+    a = float(surface_radius(disc=disc, fill_ratio=_FILL))
+    for size in sizes:
+        chamber = tetrahedra(disc_chamber(disc, (size, 2 * size, size)))
+        basis = quadratic_basis(scikit_fem_mesh(liquid_body(chamber, SurfaceLevel(constant=a**2 / 2))))
+        errors.append(_imported_pressure_errors(basis, exact, solve_on(basis, problem).values))
+    field, wall = zip(*errors, strict=True)
+    steps = [1 / size for size in sizes]
+    return {"field": OrderStudy.of(size=steps, error=field), "wall": OrderStudy.of(size=steps, error=wall)}
+
+
+def _imported_pressure_errors(basis: Any, exact: Manufactured, values: FloatArray) -> tuple[float, float]:
+    """Root mean square of the field's error, and the error of the force on the outer wall, relative."""
+    true = exact.pressure(np.asarray(basis.global_coordinates()))
+    difference = np.asarray(basis.interpolate(values)) - true
+    wall = side(basis.mesh, "outer_wall")
+    force = np.sum(wall.weights * exact.pressure(wall.points))
+    field = np.sqrt(np.sum(basis.dx * difference**2) / np.sum(basis.dx * true**2))
+    return float(field), abs(float(np.sum(wall.weights * wall.at_points(values)) / force) - 1)
+
+
+_ROUND_CHAMBER_LEVELS: Final = {"light": (2, 4, 8, 16), "heavy": (2, 4, 8, 16, 32)}
+"""Cells along each side of the square that becomes the cylinder: a quarter of the facets around it."""
+_DEPTHS: Final = np.array([0.07, 0.31, 0.52, 0.77, 0.96])
+"""Of the free surface, from where it touches the cylinder to where it leaves it."""
+_TILT: Final = 0.05
+"""g/(omega^2 R2), far above that of the running disc."""
+_TURN: Final = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Round:
+    """A cylinder parallel to the shaft."""
+
+    centre: float
+    radius: float
+    width: float
+
+    def outside(self, level: FloatArray, centre: FloatArray) -> FloatArray:
+        """V, its moments along x and y about the shaft, and their slopes by b^2, outside |r - c|^2 = b^2."""
+        away = np.array([self.centre, 0.0]) - centre
+        distance = float(np.hypot(*away))
+        b = np.sqrt(level)
+        chord = (distance**2 + level - self.radius**2) / (2 * distance)
+        near, first = _segment(b, chord)
+        far, second = _segment(self.radius, distance - chord)
+        area = np.pi * self.radius**2 - near - far
+        along = np.pi * self.radius**2 * distance - first - (distance * far - second)
+        half = np.arccos(chord / b)
+        unit, slope = away / distance, np.array([-half, -b * np.sin(half)])
+        moments = centre[:, None] * area + unit[:, None] * along
+        slopes = centre[:, None] * slope[0] + unit[:, None] * slope[1]
+        return self.width * np.stack([area, *moments, slope[0], *slopes])
+
+
+def _segment(radius: FloatArray | float, chord: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Area of a circle beyond a chord at a distance from its centre, and its moment about the centre."""
+    half = np.sqrt(radius**2 - chord**2)
+    area = radius**2 * np.arccos(chord / radius) - chord * half
+    return np.asarray(area), np.asarray(2 / 3 * half**3)
+
+
+def round_chamber(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """A cylinder beside the shaft as an imported chamber: integrals over its walls against lenses of
+    circles."""
+    disc, cells = scene.disc, _ROUND_CHAMBER_LEVELS[level]
+    curved: CellKind = "hexahedron" if defect == "middle_nodes_ignored" else "hexahedron27"
+    errors = {
+        kind: np.array([_round_chamber_errors(disc, n, kind, defect) for n in cells])
+        for kind in (curved, "hexahedron")
+    }
+    size = [1 / n for n in cells]
+    studies = {
+        "round": OrderStudy.of(size=size, error=errors[curved][:, 0].tolist()),
+        "straight": OrderStudy.of(size=size, error=errors["hexahedron"][:, 0].tolist()),
+    }
+    found = orders_found(studies)
+    found["tilted_error"] = Found(value=float(errors[curved][-1, 2]))
+    found["lever_error"] = Found(value=float(errors[curved][-1, 1]))
+    return Evidence(
+        found=found,
+        numbers={"facets": 4.0 * cells[-1]},
+        convergence=(
+            studies["round"].table("volume and moment", 4.0, geometry="quadratic"),
+            studies["straight"].table("volume and moment", 2.0, geometry="straight"),
+        ),
+    )
+
+
+def _round_chamber_errors(
+    disc: Disc, cells: int, kind: CellKind, defect: str | None
+) -> tuple[float, float, float]:
+    """Largest errors of volume and moment, of the lever arm, and of both first ones under gravity."""
+    true = _Round(
+        centre=(disc.outer_radius + disc.inner_radius) / 2,
+        radius=(disc.outer_radius - disc.inner_radius) / 2,
+        width=disc.axial_width,
+    )
+    patches, outer = _walls(true, cells, kind)
+    whole = np.pi * true.radius**2 * true.width * np.array([1.0, true.centre, true.centre])
+
+    def found(centre: FloatArray) -> tuple[float, float]:
+        distance = float(np.hypot(true.centre - centre[0], centre[1]))
+        radii = distance + (2 * _DEPTHS - 1) * true.radius
+        walls = _with_defect(walls_about(patches, outer, centre=centre), defect)
+        result = integrals(walls, radii**2)[[0, 1, 2, 4, 5, 6]]
+        expected = true.outside(radii**2, centre)
+        # As the quotient of the ratios, where a coarse mesh has no surface left to divide by.
+        lever = (result[4] * expected[3] - expected[4] * result[3]) / (expected[4] * expected[3])
+        return float(np.max(np.abs(result - expected)[:3].T / whole)), float(np.max(np.abs(lever)))
+
+    plain, lever = found(np.zeros(2))
+    angles = 2 * np.pi * (np.arange(_TURN) + 0.2) / _TURN
+    length = _TILT * disc.outer_radius
+    tilted = max(found(-length * np.array([np.cos(p), np.sin(p)]))[0] for p in angles)
+    return plain, lever, tilted
+
+
+def _walls(true: _Round, cells: int, kind: CellKind) -> tuple[FloatArray, np.ndarray]:
+    def place(cube: FloatArray) -> FloatArray:
+        # Squares become circles; along each the angle is even, so that middle nodes halve their arcs.
+        u, v = 2 * cube[..., 0] - 1, 2 * cube[..., 1] - 1
+        size, flat = np.maximum(np.abs(u), np.abs(v)), np.abs(u) >= np.abs(v)
+        share = np.divide(np.where(flat, v, u), np.where(size > 0, np.where(flat, u, v), 1.0))
+        long, short = np.cos(np.pi / 4 * share), np.sin(np.pi / 4 * share)
+        sign = np.where(flat, np.sign(u), np.sign(v)) * size * true.radius
+        x, y = sign * np.where(flat, long, short), sign * np.where(flat, short, long)
+        return np.stack([true.centre + x, y, true.width * (cube[..., 2] - 0.5)], axis=-1)
+
+    return split_patches(*wall_patches(block_chamber((cells, cells, 1), place, kind=kind)), longest=LONGEST)
+
+
+def _with_defect(walls: Walls, defect: str | None) -> Walls:
+    if defect == "crossed_walls_not_cut":
+        middle = (walls.lowest + walls.highest) / 2
+        return replace(walls, lowest=middle, highest=middle)
+    if defect == "moment_about_the_shifted_axis":
+        return replace(walls, centre=np.zeros(2))
+    return walls

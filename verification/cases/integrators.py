@@ -1,0 +1,353 @@
+"""One operation under a flow law by every integrator: the program's march, Eq. 20's segments, adaptive steps.
+
+Laws with exact solutions: the paper's, and one without its parabola in time.  Near a stall u goes like the
+square root of the distance d: u = c sqrt(d), and with kappa = (S/V) c dt one segment takes d to
+d - kappa sqrt(d).  The exact flow stalls after tau = 2 sqrt(d)/((S/V) c).  A segment stays on its side of
+the stall only while kappa <= sqrt(d), which is dt <= tau/2: however short the segments, the last ones are too
+long.  What steps over lands kappa sqrt(d) - d beyond the stall, kappa^2/4 at the most.  A full tube would let
+it flow back from there: the map's slope 1 - kappa/(2 sqrt(d)) leaves (-1, 1) where sqrt(d) < kappa/4, and the
+steps end in the cycle d = +-kappa^2/4, in which that slope is zero, so that every start is drawn into it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.reduced_model.law.flow_law import Flow
+from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
+from ringbalance.reduced_model.paper import stall_pressure
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Reference,
+    Series,
+    Table,
+    as_found,
+    figure,
+    from_half_width,
+)
+from ringbalance.verification.orders import OrderStudy
+from ringbalance.verification.reference.marched import marched
+from ringbalance.verification.reference.transfers import (
+    Drive,
+    Integrator,
+    adaptive_ode,
+    closed_form,
+    explicit_segments,
+    paper_drive,
+)
+
+_SHARE: Final = 0.9
+"""Of the time until the chamber is empty or the flow stalls; at a stall itself no scheme has its order."""
+_SHORT: Final = 0.1
+"""Share of the long operation that a controller's usual command lasts."""
+_COUNTS: Final = (4, 8, 16, 32, 64, 128, 256, 512)
+_INSTANTS: Final = 200
+_ABOVE_STALL: Final = 1.8
+_BELOW_STALL: Final = 0.6
+"""Gas pressures in units of the one that empties a chamber."""
+_KINK: Final = 0.6
+"""Fill, in units of the largest, below which the kinked law slows down."""
+_WAYS: Final[Mapping[str, Integrator]] = {
+    "closed form": closed_form,
+    "adaptive, 1e-5": adaptive_ode(tolerance=1e-5),
+    "adaptive, 1e-8": adaptive_ode(tolerance=1e-8),
+    "adaptive, 1e-11": adaptive_ode(tolerance=1e-11),
+    "Eq. 20, 16 segments": explicit_segments(16),
+    "Eq. 20, 128 segments": explicit_segments(128),
+    "Eq. 20, 1024 segments": explicit_segments(1024),
+}
+_SEGMENTS: Final = (8, 16, 32, 64, 128)
+_PHASES: Final = np.linspace(1.0, 1.3, 31)
+"""Durations, in units of the time to the stall: each lets the segments meet the stall differently."""
+_STARTS: Final = (0.02, 0.05, 0.1)
+_BISECTIONS: Final = 40
+_CYCLES: Final = 5
+"""Times to the stall after which a tube that stays full has found its cycle."""
+
+
+def _from_full(law: PaperLaw, gas_pressure: float) -> Drive:
+    return paper_drive(law, gas_pressure=gas_pressure, fill=law.max_fill_ratio, total=law.max_fill_ratio)
+
+
+def _end(drive: Drive) -> float:
+    """Time at which the flow ends by itself, s; nan where it does not begin."""
+    return closed_form(drive, np.array([1e9])).event_time or math.nan
+
+
+def _last_fill(way: Integrator, drive: Drive, duration: float) -> float:
+    return float(way(drive, np.array([duration])).fill[-1])
+
+
+def _moved(way: Integrator, drive: Drive, duration: float) -> float:
+    """Fill ratio given away."""
+    return drive.fill - _last_fill(way, drive, duration)
+
+
+def _by_segments(
+    drive: Drive, duration: float, counts: Sequence[int], *, frozen: bool
+) -> tuple[list[float], OrderStudy]:
+    """Fill that segments move, and their relative errors. Args: `frozen`: the first velocity is kept."""
+    exact = _moved(closed_form, drive, duration)
+    moved = [_moved(explicit_segments(count), drive, duration) for count in counts]
+    if frozen:
+        moved = [float(drive.flow(drive.fill).velocity) * drive.exchange_rate * duration] * len(counts)
+    error = [abs(one / exact - 1) for one in moved]
+    return moved, OrderStudy.of(size=[counts[0] / count for count in counts], error=error)
+
+
+def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Explicit segments against the closed form over one long operation.
+
+    Raises: NotRunError: the gas pressure does not start the flow.
+    """
+    drive = _from_full(paper_law(scene), scene.gas.pressure)
+    duration = _SHARE * _end(drive)
+    if math.isnan(duration):
+        raise NotRunError("the gas pressure of this scene does not start the flow by Eq. 19: raise it")
+    moved, study = _by_segments(drive, duration, _COUNTS, frozen=defect == "frozen_velocity")
+    exact = _moved(closed_form, drive, duration)
+    # Richardson's extrapolation at first order; half of the last correction bounds what it has left.
+    limit = moved[-1] + (moved[-1] - moved[-2])
+    counts = np.array(_COUNTS, dtype=np.float64)
+    shown = figure(
+        "error of the moved fill against the number of segments",
+        ("segments", "1", counts),
+        Curve("Eq. 20", "1", np.array(study.error), style="paper"),
+        Curve("first order", "1", study.error[0] * counts[0] / counts, style="reference"),
+        log=True,
+    )
+    return Evidence(
+        found={
+            "moved_fill": Found(value=limit, numerical=from_half_width(abs(limit - moved[-1]) / 2)),
+            **as_found(order=study.settled_order, finest_error=study.finest_error),
+        },
+        reference={"moved_fill": Reference(value=exact)},
+        numbers={
+            "duration": duration,
+            "moved": exact,
+            "single": abs(_moved(explicit_segments(1), drive, duration) / exact - 1),
+            "segments_percent": _segments_for(drive, duration, 1e-2),
+            "segments_per_mille": _segments_for(drive, duration, 1e-3),
+            "short": _SHORT * duration,
+            "short_segments": _segments_for(drive, _SHORT * duration, 1e-3),
+        },
+        series=(shown,),
+        convergence=(study.table("moved fill ratio, relative", 1.0),),
+    )
+
+
+def _segments_for(drive: Drive, duration: float, tolerance: float) -> float:
+    """Smallest number of segments within a tolerance: first guessed from the error of many, then counted."""
+    exact, many = _moved(closed_form, drive, duration), _COUNTS[-1]
+
+    def error(count: int) -> float:
+        return abs(_moved(explicit_segments(count), drive, duration) / exact - 1)
+
+    count = max(1, math.ceil(many * error(many) / tolerance))
+    while error(count) > tolerance:
+        count += 1
+    return float(count)
+
+
+def orders(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Every integrator on one operation, and Eq. 20's segments into a stall."""
+    law, march = paper_law(scene), marched(scene.tube)
+    empties = stall_pressure(
+        disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
+    )
+    long, low = (_from_full(law, share * empties) for share in (_ABOVE_STALL, _BELOW_STALL))
+    spoiled = 1.001 if defect == "exchange_rate_off" else 1.0
+    used, used_low = (replace(drive, exchange_rate=drive.exchange_rate * spoiled) for drive in (long, low))
+    duration = _SHARE * _end(long)
+    t, fine = (np.linspace(0, duration, count + 1)[1:] for count in (20, _INSTANTS))
+    stalls = march(used_low, np.array([2 * _end(low)])).event_time
+    _, study = _by_segments(long, duration, _COUNTS[1:-1], frozen=defect == "frozen_velocity")
+    kinked = replace(long, law=_SlowedLaw(law, _kinked))
+    stalled, longest, drawn = _stall_study(low, law, spoiled=defect == "stall_rate_off")
+    return Evidence(
+        found=as_found(
+            march_error=_difference(march(used, fine).fill, closed_form(long, fine).fill),
+            stall_error=1.0 if stalls is None else abs(stalls / _end(low) - 1),
+            moved_error=_moved_error(march, long, duration),
+            explicit_order=study.settled_order,
+            kinked_difference=_difference(
+                march(kinked, t).fill, adaptive_ode(tolerance=1e-11)(kinked, t).fill
+            ),
+            tapered_march=_tapered_error(long, law, t, march),
+            tapered_adaptive=_tapered_error(long, law, t, adaptive_ode(tolerance=1e-10)),
+            **stalled,
+        ),
+        numbers={"longest_for_per_mille": longest, "time_to_stall": _end(low)},
+        series=(drawn,),
+        tables=(_side_by_side(march, long, law, duration),),
+        convergence=(study.table("fill by explicit segments, relative error", 1.0),),
+    )
+
+
+def _difference(fill: FloatArray, other: FloatArray) -> float:
+    return float(np.max(np.abs(fill - other)))
+
+
+def _moved_error(march: Integrator, drive: Drive, duration: float) -> float:
+    """S times the integral of u along the march's own path, by Gauss's rule in time."""
+    abscissa, weight = np.polynomial.legendre.leggauss(20)
+    t = duration * (1 + abscissa) / 2
+    path = march(drive, np.append(t, duration))
+    passed = drive.exchange_rate * duration / 2 * float(weight @ drive.flow(path.fill[:-1]).velocity)
+    return abs(passed / (drive.fill - float(path.fill[-1])) - 1)
+
+
+@dataclass(frozen=True)
+class _SlowedLaw:
+    """The paper's law, slower in the share of its velocity that a function of the fill gives."""
+
+    base: PaperLaw
+    share: Callable[[FloatArray, float], FloatArray]
+    """From x of the driven chamber and the largest x."""
+    name: str = "slowed"
+
+    @property
+    def max_fill_ratio(self) -> float:
+        """Of the paper's law."""
+        return self.base.max_fill_ratio
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """Of the paper's law."""
+        return self.base.table()
+
+    def evaluate(self, **asked: Any) -> Flow:
+        """As the paper's law, slowed."""
+        flow = self.base.evaluate(**asked)
+        share = self.share(np.asarray(asked["fill_ratio"], dtype=np.float64), self.max_fill_ratio)
+        return replace(flow, velocity=flow.velocity * share)
+
+
+def _kinked(fill_ratio: FloatArray, largest: float) -> FloatArray:
+    """Slower in proportion to the fill once that is below a kink; continuous, not smooth."""
+    return np.asarray(np.minimum(1.0, 0.5 + 0.5 * fill_ratio / (_KINK * largest)))
+
+
+def _tapered(fill_ratio: FloatArray, largest: float) -> FloatArray:
+    """Smooth, and with an exact solution of its own."""
+    return np.asarray((1 + fill_ratio / largest) / 2)
+
+
+def _tapered_error(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrator) -> float:
+    """Largest error in fill of an integrator under the tapered law, from a pressure that empties the chamber.
+
+    With s = sqrt(alpha + beta x) and u = s (1 + x/x_max)/2 the fill obeys ds/dt = -(S/V) (A + D s^2)/2, so
+    s = sqrt(A/D) tan(atan(s_0 sqrt(D/A)) - (S/V) sqrt(A D) t/2).
+    """
+    a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
+    alpha, beta = a * (drive.gas_pressure - b * drive.total), 2 * a * b
+    d = 0.5 / law.max_fill_ratio
+    rest = beta / 2 - d * alpha
+    start = math.atan(math.sqrt(alpha + beta * drive.fill) * math.sqrt(d / rest))
+    s = math.sqrt(rest / d) * np.tan(start - drive.exchange_rate * math.sqrt(rest * d) / 2 * time)
+    tapered = replace(drive, law=_SlowedLaw(law, _tapered))
+    return _difference(way(tapered, time).fill, (s**2 - alpha) / beta)
+
+
+def _side_by_side(march: Integrator, drive: Drive, law: PaperLaw, duration: float) -> Table:
+    """Error at the end of a long operation, and what it costs; the closed form is the reference."""
+    t, exact = np.array([duration]), _last_fill(closed_form, drive, duration)
+    ways = {"march": march, **_WAYS}
+    others = [way for way in ways.values() if way is not closed_form]
+    tapered = {way: f"{_tapered_error(drive, law, t, way):.1e}" for way in others}
+    taken = {way: _velocities_taken(drive, law, t, way) for way in others}
+    errors = [abs(_last_fill(way, drive, duration) - exact) for way in ways.values()]
+    round_off = np.finfo(np.float64).eps
+    return Table(
+        name="integrators side by side: error in fill at the end of a long operation",
+        columns={
+            "integrator": list(ways),
+            "error, paper's law": [f"{e:.1e}" if e > round_off else "round-off" for e in errors],
+            "error, tapered law": [tapered.get(way, "does not apply") for way in ways.values()],
+            "velocities taken": [taken.get(way, "none") for way in ways.values()],
+        },
+    )
+
+
+def _velocities_taken(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrator) -> str:
+    """At how many points an integrator asks the law, its table included where it makes one."""
+    sizes: list[int] = []
+
+    def count(fill_ratio: FloatArray, _: float) -> FloatArray:
+        sizes.append(fill_ratio.size)
+        return np.ones_like(fill_ratio)
+
+    way(replace(drive, law=_SlowedLaw(law, count)), time)
+    return f"{sum(sizes)}"
+
+
+def _stall_study(
+    drive: Drive, law: PaperLaw, *, spoiled: bool = False
+) -> tuple[dict[str, float], float, Series]:
+    """Run the segments into the stall; `spoiled`: with the derivation's rate off by a tenth on purpose.
+
+    Returns: What the runs show beside what the derivation says; the length of a segment that steps over by a
+        thousandth of the fill at the most, s; and both over the number of segments.
+    """
+    a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
+    stall = (drive.total - drive.gas_pressure / b) / 2
+    per_root = drive.exchange_rate * math.sqrt(2 * a * b)  # (S/V) c
+    rate = per_root * (1.1 if spoiled else 1.0)
+    end = 2 * math.sqrt(drive.fill - stall) / per_root
+    counts = np.array(_SEGMENTS, dtype=np.float64)
+    bound = (rate * end / counts) ** 2 / 4
+    over = np.array([_overshoots(drive, stall, end, n) for n in _SEGMENTS])
+    cycle = np.array([_cycle(per_root, drive.fill - stall, end, n) for n in _SEGMENTS])
+    # Durations differ a little between the runs of one count, so each is compared with its own bound.
+    share = over / (bound[:, None] * _PHASES**2)
+    judged = {
+        "overshoot_share": float(share.max()),
+        # At the number of segments where it is least: the bound is met, not only kept.
+        "overshoot_reach": float(share.max(axis=1).min()),
+        "cycle_error": float(np.max(np.abs(cycle / bound - 1))),
+        "limit_error": max(abs(_longest(drive, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),
+    }
+    drawn = figure(
+        "fill beyond the stall against the length of a segment",
+        ("segment over the time to the stall", "1", 1 / counts),
+        Curve("largest step over the stall, Eq. 20", "1", over.max(axis=1), style="paper"),
+        Curve("cycle of a tube that stays full", "1", cycle),
+        Curve("kappa^2/4", "1", bound, style="reference"),
+        log=True,
+    )
+    return judged, 2 * math.sqrt(1e-3) / rate, drawn
+
+
+def _overshoots(drive: Drive, stall: float, end: float, count: int) -> FloatArray:
+    """How far beyond the stall segments land, for durations that are a little different."""
+    landed = map(partial(_last_fill, explicit_segments(count), drive), (end * _PHASES).tolist())
+    return np.maximum(stall - np.array(list(landed)), 0.0)
+
+
+def _cycle(per_root: float, distance: float, end: float, count: int) -> float:
+    """Distance from the stall in which segments of a tube that stays full end, u = sign(d) c sqrt(|d|)."""
+    for _ in range(_CYCLES * count):
+        distance -= per_root * end / count * math.copysign(math.sqrt(abs(distance)), distance)
+    return abs(distance)
+
+
+def _longest(drive: Drive, stall: float, distance: float) -> float:
+    """Longest single segment from a distance that ends on the same side of the stall, by runs."""
+    near = replace(drive, fill=stall + distance)
+    low, high = 0.0, _end(near)
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        stays = _last_fill(explicit_segments(1), near, middle) >= stall
+        low, high = (middle, high) if stays else (low, middle)
+    return low

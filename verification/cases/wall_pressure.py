@@ -1,0 +1,296 @@
+"""Claims on the pressure at the outer wall and the velocity's fall under it."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.pressure.ring import ring_quantities
+from ringbalance.reduced_model import paper
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Reference,
+    Series,
+    Table,
+    as_found,
+    figure,
+    from_half_width,
+)
+from ringbalance.verification.loops import flow_law_of
+from ringbalance.verification.paper_numbers import (
+    DENSITY,
+    DEPARTURE_HIGH,
+    DEPARTURE_LOW,
+    HIGH_PRESSURE,
+    LOW_PRESSURE,
+    RING_RADIUS,
+    at_paper_density,
+    rounded_radius,
+    with_plate,
+)
+from ringbalance.verification.reference.exact_chamber import (
+    exact_moment,
+    wall_pressure_of,
+    whole_ring_pressure,
+)
+from ringbalance.verification.rings import found_of, mesh_table, ring_of
+
+_SHARES: Final = np.array([0.1, 0.3, 0.5, 0.7, 0.9, 1.0])
+"""Of the largest fill."""
+_JUDGED: Final = {"thin": 0, "half": 2, "full": 5}
+_SPEEDS: Final = (0.1, 0.2, 0.5, 1.0)
+"""Of the scene's speed, for the table."""
+_PRESSURES: Final = {"low": LOW_PRESSURE, "high": HIGH_PRESSURE}
+_POINTS: Final = 41
+
+
+def wall_pressure_ends(scene: Scene) -> Evidence:
+    """Eq. 12 against the closed form."""
+    pressure = wall_pressure_of(scene, _SHARES * scene.disc.max_fill_ratio)
+    return Evidence(
+        found=as_found(**{name: pressure[index] for name, index in _JUDGED.items()}),
+        reference=_by_eq_12(scene),
+    )
+
+
+def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Eq. 12 against finite elements over fill, plate thickness, speed and gravity."""
+    disc, bare = scene.disc, with_plate(scene.disc, 0.0)
+    x = _SHARES * disc.max_fill_ratio
+    ring = ring_of(scene, tuple(x.tolist()))
+    shortfall = 1 - _eq_12(scene, disc, x) / ring.wall_pressure.value
+    without_plates = _eq_12(scene, bare, x)
+    # What Eq. 12 gives for a volume is its pressure in a ring that no plates take anything from.
+    same_volume = x * chamber_volume(disc=disc) / chamber_volume(disc=bare)
+    corrected = wall_pressure_of(scene, same_volume, disc=bare)
+    unplated = dataclasses.replace(scene, disc=bare)
+    shape = found_of(ring_of(unplated, (bare.max_fill_ratio,)), "wall_pressure", 0)
+    if defect == "whole_ring":
+        shape = dataclasses.replace(shape, value=whole_ring_pressure(unplated))
+    gravity = _gravity_table(scene)
+    over_fill = figure(
+        "pressure on the outer wall",
+        ("fill ratio", "1", x),
+        Curve("finite elements", "Pa", ring.wall_pressure.value, uncertainty=ring.wall_pressure.uncertainty),
+        Curve("Eq. 12", "Pa", _eq_12(scene, disc, x), style="paper"),
+    )
+    return Evidence(
+        found={
+            name: dataclasses.replace(
+                found_of(ring, "wall_pressure", index), corrected=float(corrected[index])
+            )
+            for name, index in _JUDGED.items()
+        }
+        | {"without_plates": shape.scaled(1 / float(without_plates[-1]))},
+        reference=_by_eq_12(scene) | {"without_plates": Reference(value=1.0)},
+        numbers={
+            "shortfall_full": float(shortfall[-1]),
+            "shortfall_thin": float(shortfall[0]),
+            "bare_difference": float(
+                np.max(np.abs(without_plates / wall_pressure_of(scene, x, disc=bare) - 1))
+            ),
+            "gravity": float(gravity.columns["change by gravity"][-1]),
+        },
+        series=(over_fill, _over_plates(scene)),
+        convergence=(mesh_table(ring, "wall_pressure", "Pa", -1),),
+        tables=(gravity,),
+        status=ring.status,
+    )
+
+
+def _by_eq_12(scene: Scene) -> dict[str, Reference]:
+    pressure = _eq_12(scene, scene.disc, _SHARES * scene.disc.max_fill_ratio)
+    return {name: Reference(value=float(pressure[index])) for name, index in _JUDGED.items()}
+
+
+def _eq_12(scene: Scene, disc: Disc, fill: FloatArray) -> FloatArray:
+    return paper.wall_pressure_paper(
+        disc=disc,
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        liquid_volume=fill * chamber_volume(disc=disc),
+    )
+
+
+def _over_plates(scene: Scene) -> Series:
+    """Relative error of Eq. 12 against plate thickness, at the smallest and the largest fill."""
+    widest = 0.5 * scene.disc.inner_radius * np.sin(scene.disc.central_angle / 2)
+    thickness = np.linspace(0, widest, 21)
+    fills = np.array([0.02, 1.0]) * scene.disc.max_fill_ratio
+    discs = [with_plate(scene.disc, t) for t in thickness]
+    thin, full = np.transpose(
+        [_eq_12(scene, disc, fills) / wall_pressure_of(scene, fills, disc=disc) - 1 for disc in discs]
+    )
+    return figure(
+        "error of Eq. 12 against the thickness of the plates",
+        ("plate thickness", "m", thickness),
+        Curve("thin ring", "1", thin, style="paper"),
+        Curve("largest fill", "1", full, style="paper"),
+    )
+
+
+def _gravity_table(scene: Scene) -> Table:
+    """Mean wall pressure over a turn with gravity, relative to that without, at falling speeds."""
+    speeds = [share * scene.rotor.speed for share in _SPEEDS]
+    middle = scene.disc.max_fill_ratio / 2
+    rings = [
+        ring_quantities(
+            disc=scene.disc,
+            density=scene.liquid.density,
+            angular_velocity=speed,
+            fill_ratio=middle,
+            gravity=scene.environment.gravity,
+            dimension=2,
+        )
+        for speed in speeds
+    ]
+    plain = float(wall_pressure_of(scene, middle)) * np.square(_SPEEDS)
+    mean = np.array([ring.wall_pressure.value[0] for ring in rings])
+    ripple = np.array([ring.ripple["wall_pressure"][0] for ring in rings])
+    return Table(
+        name="gravity across the shaft: change of the mean wall pressure, and its ripple over a turn",
+        columns={
+            "speed": speeds,
+            "change by gravity": (mean / plain - 1).tolist(),
+            "ripple": (ripple / plain).tolist(),
+            "ring": ["closed" if bool(ring.closed[0]) else "no closed ring" for ring in rings],
+        },
+        units={"speed": "rad/s", "change by gravity": "1", "ripple": "1"},
+    )
+
+
+def velocity_departure_ends(scene: Scene) -> Evidence:
+    """The falls under the true wall pressure: Eq. 19's arithmetic knows no plates."""
+    return Evidence(found=_departures(at_paper_density(scene)))
+
+
+def velocity_departure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The fall under the true wall pressure, by Eq. 19's own arithmetic, and by the calibrated law."""
+    given = at_paper_density(scene)
+    physics, printed = _departures(given), {"low": DEPARTURE_LOW, "high": DEPARTURE_HIGH}
+    if defect == "eq_12_used":
+        physics = {name: found.with_correction() for name, found in physics.items()}
+    arithmetic = {
+        f"arithmetic_{name}": Found(value=_eq_19(given, p), input=rounded_radius(partial(_eq_19, given, p)))
+        for name, p in _PRESSURES.items()
+    }
+    share = np.linspace(0, 1, _POINTS)
+    fall = _relative_velocity(given, LOW_PRESSURE, share[::-1] if defect == "chambers_exchanged" else share)
+    laws = {name: _law_velocity(given, pressure, share) for name, pressure in _PRESSURES.items()}
+    return Evidence(
+        found={**physics, **arithmetic, **as_found(slope=np.min(np.diff(fall)) * (_POINTS - 1))},
+        reference={
+            f"{what}_{name}": number.reference
+            for name, number in printed.items()
+            for what in ("departure", "arithmetic")
+        },
+        numbers={
+            **{f"rounded_{name}": _eq_19(given, p, RING_RADIUS.value) for name, p in _PRESSURES.items()},
+            "shortfall": 1 - _stall_by_eq_12(given) / _full_pressure(given),
+            **{f"law_{name}": 1 - float(law[0] / law[-1]) for name, law in laws.items()},
+        },
+        series=tuple(_fall_figure(given, p, share, laws[name]) for name, p in _PRESSURES.items()),
+    )
+
+
+def _departures(scene: Scene) -> dict[str, Found]:
+    """With the true wall pressure of a full chamber; corrected, with Eq. 12's at the printed radius."""
+    full = _full_pressure(scene)
+    return {
+        f"departure_{name}": Found(
+            value=1 - float(np.sqrt((p - full) / (p + full))), corrected=_eq_19(scene, p, RING_RADIUS.value)
+        )
+        for name, p in _PRESSURES.items()
+    }
+
+
+def _full_pressure(scene: Scene) -> float:
+    return float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY))
+
+
+def _stall_by_eq_12(scene: Scene) -> float:
+    """The same by Eq. 12, Pa."""
+    return paper.stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=scene.rotor.speed)
+
+
+def _eq_19(scene: Scene, pressure: float, radius: float | None = None) -> float:
+    """Fall of the velocity by Eq. 19, with the liquid volume that a radius of the ring implies by Eq. 3."""
+    disc, area = scene.disc, paper.flat_strip_area
+    volume = None if radius is None else disc.axial_width * float(area(disc=disc, surface_radius=radius))
+    fall = paper.departure(
+        disc=disc,
+        density=DENSITY,
+        angular_velocity=scene.rotor.speed,
+        gas_pressure=pressure,
+        pair_volume=volume,
+    )
+    return float(fall)
+
+
+def _relative_velocity(scene: Scene, pressure: float, share: FloatArray) -> FloatArray:
+    """u(x)/u(x_max) with the true wall pressure and one k."""
+    fills = np.array([share, 1 - share]) * scene.disc.max_fill_ratio
+    driven, other = wall_pressure_of(scene, fills, density=DENSITY)
+    squared = pressure + driven - other
+    return np.asarray(np.sqrt(squared / squared[-1]), dtype=np.float64)
+
+
+def _law_velocity(scene: Scene, pressure: float, share: FloatArray) -> FloatArray:
+    law = flow_law_of(scene)
+    return law.evaluate(fill_ratio=share * law.max_fill_ratio, gas_pressure=pressure, primed=True).velocity
+
+
+def _fall_figure(scene: Scene, pressure: float, share: FloatArray, law: FloatArray) -> Series:
+    level = _stall_by_eq_12(scene)
+    eq_19 = np.sqrt((pressure + level * (2 * share - 1)) / (pressure + level))
+    return figure(
+        f"velocity over that of a full chamber, {pressure / 1e6:.1f} MPa",
+        ("fill ratio", "1", share * scene.disc.max_fill_ratio),
+        Curve("Eq. 19", "1", eq_19, style="paper"),
+        Curve("true wall pressure, one k", "1", _relative_velocity(scene, pressure, share)),
+        Curve("calibrated law of the scene", "1", law / law[-1], style="reference"),
+    )
+
+
+def rectangular_element(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The integral of Eq. 11 against finite elements, and against the force balance of the whole liquid."""
+    fills = np.array([0.2, 0.4, 0.6, 0.8, 1.0]) * scene.disc.max_fill_ratio
+    ring, exact = ring_of(scene, tuple(fills.tolist())), wall_pressure_of(scene, fills)
+    pressure, whole_ring = found_of(ring, "wall_pressure", -1), whole_ring_pressure(scene)
+    if defect == "whole_ring":
+        pressure = dataclasses.replace(pressure, value=whole_ring)
+    moment = exact_moment(disc=scene.disc, density=scene.liquid.density, fill_ratio=scene.disc.max_fill_ratio)
+    # Net force of the liquid on all walls along the centre line.
+    force = Found(
+        value=float(ring.resultant_force.value[-1]),
+        numerical=from_half_width(float(ring.resultant_force.uncertainty[-1])),
+    )
+    shown = figure(
+        "pressure on the outer wall",
+        ("fill ratio", "1", fills),
+        Curve("finite elements", "Pa", ring.wall_pressure.value),
+        Curve("Eq. 11 integrated", "Pa", exact, style="paper"),
+    )
+    return Evidence(
+        found={
+            "wall_pressure": pressure,
+            "force_balance": force.scaled(1 / (scene.rotor.speed**2 * float(moment))),
+        },
+        reference={
+            "wall_pressure": Reference(value=float(exact[-1])),
+            "force_balance": Reference(value=1.0),
+        },
+        numbers={"whole_ring": 1 - whole_ring / float(exact[-1])},
+        series=(shown,),
+        convergence=(mesh_table(ring, "wall_pressure", "Pa", -1),),
+        status=ring.status,
+    )

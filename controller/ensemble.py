@@ -20,8 +20,7 @@ from ringbalance.controller.terms import check_fit, dynamics_of, run_models, ter
 from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
-from ringbalance.reduced_model.residual_liquid import Drawing
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, FlowLaw
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
@@ -105,8 +104,7 @@ class _Plan:
     plan: LoopPlan
     loop: LoopFactor
     """Of a member with the scene's own values."""
-    drawing: Drawing
-    """From which the residual fill of each member follows."""
+    law: FlowLaw
 
     @classmethod
     def of(
@@ -121,14 +119,14 @@ class _Plan:
             relative_error=RELATIVE_ERROR,
             most_samples=MOST_SAMPLES,
         )
-        loop, drawing = loop_factor(scene, model, algorithm), Drawing.of(scene, law=model.flow)
-        return cls(scene=scene, plan=plan, loop=loop, drawing=drawing)
+        loop = loop_factor(scene, model, algorithm)
+        return cls(scene=scene, plan=plan, loop=loop, law=model.flow)
 
     def run(self, members: Members, noise: Noise) -> MemberRuns:
         runs = self.plan.runs(members.proportional.size)
         runs["speed"], runs["proportional"] = members.velocity_factor, members.proportional
         runs["gain"] = members.moment_factor * members.influence_coefficient * np.exp(-1j * members.lag_angle)
-        runs["residual_fill"] = members.residual_fill(self.drawing)
+        runs["residual_fill"] = members.residual_fill(self.scene, law=self.law)
         runs["stays"] = self._stay(members)
         if members.gas_line is not None:
             runs["gas_line"] *= members.gas_line.T

@@ -27,7 +27,7 @@ from ringbalance.controller.rotor import Sensor, noisy_sensor
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment, paper_model
-from ringbalance.reduced_model.residual_liquid import Drawing, residual_fill_ratio
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.models import Scene
 
 EXACT = MemberUncertainty(velocity=0.0, moment=0.0, influence_coefficient=0.0, lag_angle=0.0)
@@ -98,7 +98,7 @@ def test_every_member_is_the_scalar_run(scene: Scene, chambers: int, noise: bool
         asked = replace(asked, sensor=scene.sensor)
     model = paper_model(asked)
     members = various(asked, size=size)
-    residuals = members.residual_fill(Drawing.of(asked, law=model.flow))
+    residuals = members.residual_fill(asked, law=model.flow)
     found = simulate_members(asked, model, members=members, noise=partial(member_noise, 4))
     outcomes = []
     for member in range(size):

@@ -277,8 +277,8 @@ def simulate_members(
 ) -> MemberRuns:
     """Run given members, by default `size` alike ones, and keep how each ended.
 
-    Args: `noise`: default that of an ensemble's first members with the seed 0. `controller`: default the scene's
-        target vector.
+    Args: `noise`: default that of an ensemble's first members with the seed 0. `controller`: default the
+        scene's target vector.
     Raises: SceneError, ValueError: as `simulate_ensemble`.
     """
     given = Members.alike(scene, size=size) if members is None else members

@@ -37,7 +37,7 @@ from ringbalance.verification.evidence import (
     figure,
     from_half_width,
 )
-from ringbalance.verification.orders import OrderStudy
+from ringbalance.verification.finite_elements import OrderStudy
 from ringbalance.verification.reference.transfers import (
     Drive,
     Integrator,

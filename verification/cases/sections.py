@@ -44,6 +44,7 @@ from ringbalance.verification.evidence import (
     as_found,
     figure,
 )
+from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found
 from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
 from ringbalance.verification.navier_stokes.newton import Factors, FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import (
@@ -54,7 +55,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.orders import OrderStudy, order_figure, orders_found
 
 _SLOW_SERIES: Final = 9216.0
 _INERTIA_SERIES: Final = 16515072.0

@@ -12,7 +12,7 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene import SceneError, bundled_scene, load_scene
-from ringbalance.verification.eccentric_scenes import changed
+from ringbalance.verification.papers import changed
 
 
 @pytest.fixture(scope="module")

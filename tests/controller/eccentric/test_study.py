@@ -15,7 +15,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.study import DRAWS, _EccentricStudy, eccentric_study, interval
 from ringbalance.results.requirements import Requirement
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.verification.eccentric_scenes import changed
+from ringbalance.verification.papers import changed
 
 
 @pytest.fixture(scope="module")

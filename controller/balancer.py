@@ -118,7 +118,7 @@ class Outcomes:
     traced: tuple[TracedRun, ...] = ()
 
 
-class Recommendation(Protocol):
+class _Recommendation(Protocol):
     """What `tune` answers with."""
 
     @property
@@ -209,7 +209,7 @@ class Balancer(Protocol):
         """With the settings that its formulas recommend, and those that this changed, SI; no run is made."""
         ...
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> Recommendation:
+    def recommend(self, *, progress: Callable[[str], None] | None = None) -> _Recommendation:
         """Settings, judged by runs over the draws."""
         ...
 

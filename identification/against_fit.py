@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringbalance.identification.data.kinds import KINDS
 from ringbalance.identification.intervals import covariance
 from ringbalance.identification.likelihood import Block
 from ringbalance.identification.optimisation import Optimum
@@ -60,18 +59,15 @@ def against_fit(result: FitResult) -> list[AgainstFit]:
     best = result.optimum
     numbers = _numbers(best)
     parts: dict[str, list[tuple[Block, FloatArray]]] = {}
-    at = 0
-    for block in best.residuals.problem.blocks:
-        size = block.measured.size
-        parts.setdefault(block.group, []).append((block, numbers[:, at : at + size]))
-        at += size
+    for block, rows in best.residuals.problem.rows:
+        parts.setdefault(block.group, []).append((block, numbers[:, rows]))
     return [_entry(each) for each in parts.values()]
 
 
 def _entry(parts: Sequence[tuple[Block, FloatArray]]) -> AgainstFit:
     first = parts[0][0]
-    kind, name = first.observations.kind, first.kind.column(first.observations)
-    column = KINDS[kind].column(name)
+    kind, name = first.observations.kind, first.column
+    column = first.kind.column(name)
     joined = np.concatenate([numbers for _, numbers in parts], axis=1)
     return AgainstFit(
         kind=kind,
@@ -102,10 +98,8 @@ def _numbers(best: Optimum) -> FloatArray:
     fitted = problem.at(best.t) + residuals.held @ (n - residuals.pulled)
     kept = np.r_[: best.t.size, best.t.size + free.shape[1] : effects.shape[1]]
     of_device, spread = effects[:, kept], spread[np.ix_(kept, kept)]
-    found, at = [], 0
-    for block in problem.blocks:
-        mine = slice(at, at + block.measured.size)
-        at = mine.stop
+    found = []
+    for block, mine in problem.rows:
         lower = np.linalg.inv(block.whiten)
         rows = lower @ (of_device[mine] / scale[mine][:, None])
         noise = lower / scale[mine][None, :]

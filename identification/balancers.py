@@ -16,10 +16,10 @@ import numpy as np
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.device import Models
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.parameters import FitError, Parameter
-from ringbalance.identification.predict.device import Models
-from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.physics.tube.loss import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
@@ -194,7 +194,7 @@ def parameters_for(scene: SceneFile, names: Sequence[str]) -> tuple[Parameter, .
 
 def informed(scene: SceneFile, data: Sequence[Observations]) -> list[str]:
     """Parameters that data inform."""
-    names = dict.fromkeys(name for each in data for name in PREDICTED[each.kind].informs(each))
+    names = dict.fromkeys(name for each in data for name in KINDS[each.kind].informs(each))
     instead = _side(scene).instead(scene)
     return [instead.get(name, name) for name in names]
 

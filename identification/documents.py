@@ -13,9 +13,9 @@ from ringbalance.identification.against_fit import against_fit
 from ringbalance.identification.balancers import MODEL_ERRORS, exact_inputs
 from ringbalance.identification.criticism.law_comparison import summaries
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Identified
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 from ringbalance.results.numbers import rounded
@@ -23,7 +23,6 @@ from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import in_usual_unit, si_unit, usual_unit
-from ringbalance.scene.units import format_quantity
 
 
 def fit_document(
@@ -259,9 +258,8 @@ def _noise_finding(noise: Noise) -> Finding:
     if not noise.estimated or noise.standard_deviation is None:
         return Finding(code="noise_stated", values=numbers)
     column = KINDS[kind].column(name)
-    size = f"{noise.standard_deviation:.3g}"
-    if column is not None and column.dimension is not None:
-        size = format_quantity(noise.standard_deviation, column.dimension, column.unit, digits=3)
+    assert column is not None
+    size = column.written(noise.standard_deviation)
     more: dict[str, Value] = {"size": size, "standard_deviation": noise.standard_deviation}
     return Finding(code="noise_estimated", values=numbers | more | {"freedom": round(noise.freedom or 0)})
 

@@ -8,15 +8,14 @@ from typing import Final, Literal
 import numpy as np
 
 from ringbalance.identification.balancers import both_sides, held_for, informed, models_for, parameters_for
-from ringbalance.identification.data.kinds import kinds_of
-from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Combination, Identified, combinations, verdicts
 from ringbalance.identification.intervals import Profile, covariance, profiles
 from ringbalance.identification.joint import about_pulls, joint_of, scene_as_fitted
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS, kinds_of
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import FitError, Parameter
-from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.uncertain import NORMAL_95
@@ -64,7 +63,7 @@ def problem_of(
     for each in data:
         if each.kind not in kinds_of(scene.balancer):
             raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
-        if reason := PREDICTED[each.kind].obstacle(scene, each):
+        if reason := KINDS[each.kind].obstacle(scene, each):
             raise FitError(f"{each.file}: {reason}")
     names = informed(scene, data) if parameters is None else list(parameters)
     return Problem(
@@ -157,10 +156,8 @@ def _residuals(best: Optimum) -> tuple[FileResiduals, ...]:
     """Normalised after what is no parameter has taken up its part."""
     problem, residuals = best.residuals.problem, best.residuals
     whole = best.at[: problem.measured.size] / np.sqrt(residuals.weights)
-    found, at = [], 0
-    for block in problem.blocks:
-        mine = slice(at, at + block.measured.size)
-        at += block.measured.size
+    found = []
+    for block, mine in problem.rows:
         weights = block.observations.rows_of(residuals.weights[mine])
         found.append(
             FileResiduals(

@@ -20,14 +20,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.kinds.kind import Kind, Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.parameters import Parameter
-from ringbalance.identification.predict.kinds import PREDICTED
-from ringbalance.identification.predict.predicted import PredictedKind
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
 STEP: Final = 1e-3
@@ -43,42 +44,47 @@ class Block:
     """One file of measurements, its errors made independent."""
 
     observations: Observations
-    kind: PredictedKind
-    measured: FloatArray
-    """y, shape (n,)."""
-    whiten: FloatArray
-    """L^-1, shape (n, n)."""
-    free: FloatArray
-    """B, shape (n, m)."""
+    kind: Kind
 
-    def __reduce__(self) -> Any:
-        """Pickled as its measurements; functions of a kind have no name by which another process has them."""
-        if self.kind is not PREDICTED[self.observations.kind]:
-            return super().__reduce__()
-        return Block.of, (self.observations,)
+    @classmethod
+    def of(cls, observations: Observations) -> Block:
+        """A data set by the kind that it names."""
+        return cls(observations=observations, kind=KINDS[observations.kind])
+
+    @cached_property
+    def measured(self) -> FloatArray:
+        """y, shape (n,)."""
+        return self.kind.numbers(self.observations)
+
+    @cached_property
+    def whiten(self) -> FloatArray:
+        """L^-1, shape (n, n)."""
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.kind.covariance(self.observations))))
+
+    @cached_property
+    def free(self) -> FloatArray:
+        """B, shape (n, m)."""
+        effects = self.kind.free(self.observations)
+        return effects if effects.size else np.zeros((self.measured.size, 0))
+
+    @property
+    def column(self) -> str:
+        """The measured column whose noise is stated or estimated."""
+        return self.kind.noisy_column(self.observations)
 
     @property
     def group(self) -> str:
         """Kind and column whose noise is one number."""
-        return f"{self.observations.kind} {self.kind.column(self.observations)}"
+        return f"{self.observations.kind} {self.column}"
 
     @property
     def estimated(self) -> bool:
         """Whether its noise is estimated from the residuals."""
         return not self.kind.noise_given(self.observations)
 
-    @classmethod
-    def of(cls, observations: Observations) -> Block:
-        """A data set with its whitening."""
-        kind = PREDICTED[observations.kind]
-        lower = np.linalg.cholesky(kind.covariance(observations))
-        return cls(
-            observations=observations,
-            kind=kind,
-            measured=kind.measured(observations),
-            whiten=np.linalg.inv(lower),
-            free=np.zeros((len(lower), 0)) if kind.free is None else kind.free(observations),
-        )
+    def predicted(self, scene: Any, models: Any) -> FloatArray:
+        """f of a scene."""
+        return self.kind.predict(scene, self.observations, models)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,9 +106,13 @@ class Problem:
 
     def predicted(self, scene: Any) -> FloatArray:
         """L^-1 f of all blocks."""
-        return np.concatenate(
-            [b.whiten @ b.kind.predict(scene, b.observations, self.models) for b in self.blocks]
-        )
+        return np.concatenate([b.whiten @ b.predicted(scene, self.models) for b in self.blocks])
+
+    @cached_property
+    def rows(self) -> tuple[tuple[Block, slice], ...]:
+        """Every block with the place of its numbers among those of all."""
+        ends = np.cumsum([0, *(b.measured.size for b in self.blocks)]).tolist()
+        return tuple(zip(self.blocks, (slice(*each) for each in pairwise(ends)), strict=True))
 
     @cached_property
     def _known(self) -> dict[bytes, FloatArray]:
@@ -158,12 +168,7 @@ class Problem:
     @cached_property
     def free(self) -> FloatArray:
         """L^-1 B."""
-        parts = [b.whiten @ b.free for b in self.blocks]
-        full, row, column = np.zeros((self.measured.size, sum(p.shape[1] for p in parts))), 0, 0
-        for part in parts:
-            full[row : row + part.shape[0], column : column + part.shape[1]] = part
-            row, column = row + part.shape[0], column + part.shape[1]
-        return full
+        return np.asarray(block_diag(*(b.whiten @ b.free for b in self.blocks)))
 
     @cached_property
     def group(self) -> IntArray:

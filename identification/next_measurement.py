@@ -6,45 +6,29 @@ data.  Their noise is that of the fit; a kind that was not measured has an assum
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.identification.balancers import both_sides
-from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Identified
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS, kinds_of
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.units import DIMENSIONS, format_quantity
 
 ASSUMED_NOISE: Final = 0.01
 """Standard deviation of a kind that was not measured, relative to the largest that is predicted."""
-_FRACTIONS: Final = (0.3, 0.5, 0.7)
-"""Of the largest fill."""
-_PRESSURES: Final = (0.8, 1.0, 1.25)
-"""Of the scene's gas pressure."""
-_TIMES: Final = (0.05, 0.2, 0.8)
-"""s, of valve-open."""
 _BEYOND: Final = (0.5, 1.0, 2.0)
 """Of the middle of what was measured, or of what makes the vibration at the start."""
-_VOLTAGES: Final = (0.25, 0.5, 1.0)
-"""Of the largest; where the scene gives none, those of the data alone."""
-_MOTION_TIMES: Final = (0.1, 0.4, 1.0)
-"""s, of positioning."""
-_SPEEDS: Final = 9
-"""From half of the lowest speed of the scene to the highest one."""
 _WORTHWHILE: Final = 0.9
 """Ratio of widths up to which one measurement is advised; beyond it, many of them would be needed."""
 _AT_ALL: Final = 0.99
-Grid = Mapping[str, Sequence[float]]
 _RANK: Final = 1e-12
 
 
@@ -99,15 +83,15 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
     best = result.optimum
     problem, t = best.residuals.problem, best.t
     scene, measured = problem.scene_at(t), {block.observations.kind: block for block in problem.blocks}
-    of_kinds = {kind: measured[kind].observations if kind in measured else None for kind in _grids(scene)}
-    offered = [_offered_rows(scene, kind, before) for kind, before in of_kinds.items()]
+    offered = [
+        _offered_rows(scene, kind, measured[kind].observations if kind in measured else None)
+        for kind in kinds_of(scene.balancer)
+    ]
     asked = replace(problem, blocks=tuple(Block.of(each) for each in offered if len(each)))
     changed = [(problem.scene, both_sides(problem.scene, n, sd)[1]) for n, sd in result.held.items()]
     by_parameters, by_held = asked.quick_slopes(t), asked.held_effects(t, changed)
-    at = 0
-    for block in asked.blocks:
-        mine, count = slice(at, at + block.measured.size), len(block.observations)
-        at += block.measured.size
+    for block, mine in asked.rows:
+        count = len(block.observations)
         before = measured.get(block.observations.kind)
         free = _free(problem, before, block)
         rows = np.hstack([by_parameters[mine], free, by_held[mine]])
@@ -150,51 +134,9 @@ def _first_series(block: Block) -> FloatArray:
     return np.asarray(names == block.observations.series[0], dtype=np.float64)
 
 
-def _grids(scene: AnyScene) -> dict[str, Grid]:
-    """Values of what is set, by kind and column, SI, over the ranges of a scene."""
-    return _GRIDS[scene.balancer](scene)
-
-
-def _eccentric_grids(scene: EccentricScene) -> dict[str, Grid]:
-    speeds = [point.speed for point in scene.rotor.speed_profile]
-    largest = scene.motor.maximum_voltage
-    voltages = [] if largest is None else [x * largest for x in _VOLTAGES]
-    return {
-        "run_up": {"speed": np.linspace(min(speeds) / 2, max(speeds), _SPEEDS).tolist()},
-        "positioning": {
-            "moved_mass": [1.0, 2.0],
-            "voltage": voltages,
-            "speed": [min(speeds)],
-            "time": _MOTION_TIMES,
-        },
-    }
-
-
-def _ring_grids(scene: Scene) -> dict[str, Grid]:
-    fills = [x * scene.disc.max_fill_ratio for x in _FRACTIONS]
-    pressures = [x * scene.gas.pressure for x in _PRESSURES]
-    unbalance = scene.rotor.initial_amplitude / scene.rotor.influence_coefficient
-    weights = {"unbalance": [x * unbalance for x in _BEYOND], "angle": [0.0, np.pi / 2, np.pi]}
-    injections = {"fill_ratio": fills, "pressure": pressures, "gas_time": _TIMES}
-    return {
-        "injection": injections,
-        "transfer": injections,
-        "flow": {"pressure_difference": [x * scene.gas.pressure for x in (0.1, 0.3, 1.0)]},
-        "pressure": {"fill_ratio": fills, "radius": [scene.disc.outer_radius]},
-        "trial_weight": weights,
-        "trial_amplitude": weights,
-    }
-
-
-_GRIDS: Final[Mapping[str, Callable[[Any], dict[str, Grid]]]] = {
-    "liquid_ring": _ring_grids,
-    "eccentric_mass": _eccentric_grids,
-}
-
-
 def _offered_rows(scene: AnyScene, kind: str, measured: Observations | None) -> Observations:
     """All rows of a kind's grid, each a series of its own; what is measured is that of the data's middle."""
-    grid = dict(_grids(scene)[kind])
+    grid = dict(KINDS[kind].offers(scene))
     if measured is not None:
         for name in ("gas_time", "pressure_difference", "unbalance", "voltage"):
             values = measured.columns[name] if name in grid else np.empty(0)
@@ -235,11 +177,7 @@ def _words_of(offered: Observations, row: int) -> str:
         values = offered.columns.get(column.name)
         if values is None or column.measured or column.amplitude:
             continue
-        value = float(values[row])
-        text = f"{value:.3g}"
-        if column.dimension is not None and column.dimension in DIMENSIONS:
-            text = format_quantity(value, column.dimension, column.unit, digits=3)
-        said.append(f"{column.words} {text}")
+        said.append(f"{column.words} {column.written(float(values[row]))}")
     return f"{offered.kind.replace('_', ' ')} with {', '.join(said)}"
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
-from ringbalance.identification.predict.device import Device, Models
+from ringbalance.identification.device import Device, Models
 from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.models import Scene

@@ -14,8 +14,8 @@ from itertools import combinations
 from pathlib import Path, PurePath
 from typing import Any, Final
 
-from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.identifiability import Combination
+from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.parameters import START
 from ringbalance.identification.result import FitResult, FittedParameter
 from ringbalance.identification.saved_joint import JointEntry, Place, joint_entries, place_of, put_joint

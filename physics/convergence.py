@@ -1,8 +1,8 @@
-"""How far a number is from its limit of vanishing mesh size, judged from three meshes or more.
+"""How far a number is from its limit of vanishing mesh size, judged from three meshes.
 
-Three meshes: the procedure of Celik et al. (2008), with the order capped at the formal one of the quantity at
-hand.  More: the least-squares fit of Eca and Hoekstra (2014).  Differences that are only round-off, oscillate
-or grow are said to be so; none of them is dressed up as an order.
+The procedure of Celik et al. (2008), with the order capped at the formal one of the quantity at hand.
+Differences that are only round-off, oscillate or grow are said to be so; none of them is dressed up as an
+order.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ringbalance.scene.arrays import FloatArray
 
@@ -71,22 +70,21 @@ def gci(
     round_off: float = 0.0,
     safety: float = 1.25,
 ) -> GridConvergence:
-    """Grid convergence of one number: Celik's procedure for three meshes, least squares for more.
+    """Grid convergence of one number by Celik's procedure.
 
     p = |ln|e32/e21| + q(p)| / ln r21, q(p) = ln((r21^p - s)/(r32^p - s)), s = sign(e32/e21),
     GCI = 1.25 e_a / (r21^p - 1); the half-width takes p no higher than the formal order, and no less than
     what the two coarser meshes foretell.
     Args:
-        values: of the number, finest mesh first, in any one unit, at least three.
+        values: of the number, finest mesh first, in any one unit, three.
         sizes: of the cells, finest first, in any one unit, strictly increasing.
         formal_order: at which this number should converge; a functional gains over the field it comes from.
         round_off: bound of the noise in each value, in its unit; never taken below 8 ulp of the largest
             value.
         safety: factor on the estimated error.
     Returns: The record; its uncertainty is a half-width about values[0].
-    Raises: ValueError: fewer than three values, sizes that do not grow, or a value that is not finite.
-    Source: Celik et al. (2008), doi:10.1115/1.2960953; Eca and Hoekstra (2014),
-    doi:10.1016/j.jcp.2014.01.006.
+    Raises: ValueError: not three values, sizes that do not grow, or a value that is not finite.
+    Source: Celik et al. (2008), doi:10.1115/1.2960953.
     """
     phi, h = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
     _check(phi, h, formal_order)
@@ -94,14 +92,12 @@ def gci(
     if _is_noise(phi, h, formal_order, noise):
         change = abs(float(phi[1] - phi[0]))
         return _record(GridVerdict.ROUND_OFF, phi, 0.0, 0.0, float(phi[0]), 0.0, noise + change)
-    if phi.size > 3:
-        return _from_fit(phi, _best_fit(phi, h, formal_order=formal_order), formal_order, noise, safety)
     return _from_three(phi, h, formal_order, noise, safety)
 
 
 def _check(phi: FloatArray, h: FloatArray, formal_order: float) -> None:
-    if phi.ndim != 1 or phi.size < 3 or phi.shape != h.shape:
-        raise ValueError("values and sizes must be two sequences of one length, at least three")
+    if not phi.shape == h.shape == (3,):
+        raise ValueError("values and sizes must be two sequences of three")
     if not (np.all(np.isfinite(phi)) and np.all(np.isfinite(h)) and formal_order > 0):
         raise ValueError("values and sizes must be finite, and formal_order positive")
     if h[0] <= 0 or np.any(np.diff(h) <= 0):
@@ -167,104 +163,6 @@ def _verdict(observed: float, oscillates: bool, formal_order: float) -> GridVerd
         return GridVerdict.OSCILLATORY
     near = 0.5 * formal_order <= observed <= 1.5 * formal_order
     return GridVerdict.MONOTONE if near else GridVerdict.NOT_ASYMPTOTIC
-
-
-def _from_fit(
-    phi: FloatArray, fit: _Fit, formal_order: float, noise: float, safety: float
-) -> GridConvergence:
-    error, misfit = abs(fit.error), fit.deviation + abs(fit.misfit)
-    spread = float(np.ptp(phi)) / (phi.size - 1)
-    good = fit.deviation < spread and _LOWEST_ORDER <= fit.observed_order <= 1.05 * formal_order
-    if fit.deviation < spread:
-        half_width = (safety if good else 3.0) * error + misfit
-    else:
-        half_width = 3 * fit.deviation / spread * (error + misfit)
-    changes = np.diff(phi)
-    if good:
-        verdict = _verdict(fit.observed_order, False, formal_order)
-    elif np.any(changes[1:] * changes[:-1] < 0):
-        verdict = GridVerdict.OSCILLATORY
-    else:
-        verdict = GridVerdict.DIVERGING if fit.observed_order <= 0 else GridVerdict.NOT_ASYMPTOTIC
-    index = half_width
-    return _record(verdict, phi, fit.observed_order, fit.order, fit.limit, index, half_width + noise)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Fit:
-    """One fit phi_i = limit + sum_k a_k h_i^p_k."""
-
-    limit: float
-    """phi for vanishing cells."""
-    error: float
-    """phi(h1) - limit as the fit has it."""
-    misfit: float
-    """Finest value minus the fit there."""
-    deviation: float
-    """Standard deviation of the fit, weighted as the fit was."""
-    observed_order: float
-    """Of the free fit, whether or not it was kept."""
-    order: float
-    """Highest power in the fit that was kept."""
-
-
-def _best_fit(values: FloatArray, sizes: FloatArray, *, formal_order: float) -> _Fit:
-    """The fit with a free order when that lies within [0.5, formal], else the best one of fixed orders.
-
-    Fixed orders: formal; formal/2; and, when convergence is slower than 0.5, both together.  Every fit is
-    tried with equal weights and with weights proportional to 1/h; the one with the smaller deviation is kept.
-    Args: `values`: finest first, shape (n,), at least four.
-    Source: Eca and Hoekstra (2014), section 3, doi:10.1016/j.jcp.2014.01.006; their orders 1 and 2 stand here
-        as half the formal order and the formal order.
-    """
-    h = sizes / sizes[0]
-    free = min((_free(values, h, w, formal_order) for w in _weights(h)), key=lambda fit: fit.deviation)
-    if 0.5 <= free.observed_order <= 1.05 * formal_order:
-        return free
-    powers: list[tuple[float, ...]] = [(formal_order,), (formal_order / 2,)]
-    if free.observed_order < 0.5:
-        powers.append((formal_order / 2, formal_order))
-    fits = [_linear(values, h, w, p, free.observed_order) for p in powers for w in _weights(h)]
-    return min(fits, key=lambda fit: fit.deviation)
-
-
-def _weights(h: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return np.full(h.size, 1 / h.size), (1 / h) / np.sum(1 / h)
-
-
-def _free(values: FloatArray, h: FloatArray, weights: FloatArray, formal_order: float) -> _Fit:
-    def deviation(order: float) -> float:
-        return _linear(values, h, weights, (order,), order).deviation
-
-    # The deviation may have a second valley; a coarse scan finds the right one.
-    grid = np.concatenate([-np.arange(0.1, 3.05, 0.1)[::-1], np.arange(0.1, 2.5 * formal_order, 0.1)])
-    start = float(grid[int(np.argmin([deviation(p) for p in grid]))])
-    low, high = start - 0.1, start + 0.1
-    if low <= 0 <= high:
-        low, high = (0.02, high) if start > 0 else (low, -0.02)
-    order = float(minimize_scalar(deviation, bounds=(low, high), method="bounded", options={"xatol": 1e-9}).x)
-    return _linear(values, h, weights, (order,), order)
-
-
-def _linear(
-    values: FloatArray, h: FloatArray, weights: FloatArray, powers: tuple[float, ...], observed: float
-) -> _Fit:
-    columns = np.stack([np.ones(h.size), *(h**p for p in powers)], axis=1)
-    root = np.sqrt(weights)
-    scale = np.abs(columns).max(axis=0)
-    shift = values[0]  # the fit is of changes, so that a large common value costs no digits
-    coefficients = np.linalg.lstsq(columns / scale * root[:, None], (values - shift) * root, rcond=None)[0]
-    coefficients = coefficients / scale
-    residual = values - shift - columns @ coefficients
-    freedom = max(values.size - len(powers) - 2, 1) if len(powers) == 1 else max(values.size - 3, 1)
-    return _Fit(
-        limit=float(coefficients[0] + shift),
-        error=float(np.sum(coefficients[1:])),
-        misfit=float(residual[0]),
-        deviation=float(np.sqrt(values.size * np.sum(weights * residual**2) / freedom)),
-        observed_order=observed,
-        order=max(powers),
-    )
 
 
 def _record(

@@ -95,9 +95,9 @@ def sloshing_modes(
     Args:
         fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
         modes: how many, at least 1.
-        cells: three meshes or more, finest first; default twice `default_cells` and two coarser ones, with
+        cells: three meshes, finest first; default twice `default_cells` and two coarser ones, with
             more cells along the angle for many modes.  An imported chamber is solved in its middle section.
-    Raises: ValueError: fill ratios outside (0, 1], no modes, or fewer than three meshes.
+    Raises: ValueError: fill ratios outside (0, 1], no modes, or not three meshes.
     Validity: small planar waves without viscosity on a circular surface, that is g much smaller than
     omega^2 a; the ends are flat and the section is the same along the shaft, so gravity across it drives no
     others.
@@ -107,8 +107,8 @@ def sloshing_modes(
     if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)) or modes < 1:
         raise ValueError("fill_ratio must lie within (0, 1], and at least one mode must be asked for")
     meshes = Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc, modes=modes))
-    if len(meshes.cells) < 3:
-        raise ValueError("cells must list at least three meshes, finest first")
+    if len(meshes.cells) != 3:
+        raise ValueError("cells must list three meshes, finest first")
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
     found = np.array([[_lowest(meshes, float(a), level, modes) for level in meshes.levels] for a in radii])
     widths = [
@@ -263,7 +263,7 @@ def sloshing_response(
         fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
         kinematic_viscosity: nu, m^2/s, zero or more; zero leaves resonance without a limit.
         frequency_ratio: s, above 0; 1 for gravity.
-        cells: three meshes or more, finest first; default those of `sloshing_modes`.
+        cells: three meshes, finest first; default those of `sloshing_modes`.
     Returns: SloshingResponse; status says where the waves might not be small, or gravity leaves no ring.
     Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
     Validity: small planar waves, of an imported chamber those of its middle section: waves along the shaft,

@@ -1,4 +1,8 @@
-"""Standard streams of the process: in any encoding, closed, full, or with a reader that goes away."""
+"""Standard streams of the process: in any encoding, closed, full, or with a reader that goes away.
+
+Characters that an encoding lacks get readable equivalents, lambda for λ, +/- for ±, um for µm: nothing that
+prints has to know encodings.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +11,129 @@ import io
 import os
 import re
 import sys
+import unicodedata
 from collections.abc import MutableMapping
 from typing import TYPE_CHECKING, BinaryIO, Final, TextIO, cast
 
-from ringbalance import plain_text
+ERRORS: Final = "ringbalance.streams"
+"""Name under which `in_ascii` is registered with `codecs`."""
+
+_EQUIVALENTS: Final = {
+    **dict(zip("▁▂▃▄▅▆▇█", "12345678", strict=True)),
+    **dict.fromkeys("‘’‚‛′ʼ´", "'"),
+    **dict.fromkeys("“”„‟″«»", '"'),
+    **dict.fromkeys("−‐–—―─━╌", "-"),
+    **dict.fromkeys("│┃╎", "|"),
+    **dict.fromkeys("·⋅∙×", "*"),
+    **dict.fromkeys("•●▪✓", "*"),
+    "±": "+/-",
+    "≤": "<=",
+    "≥": ">=",
+    "≠": "!=",
+    "≈": "~",
+    "∝": "~",
+    "√": "sqrt",
+    "∞": "inf",
+    "∂": "d",
+    "→": "->",
+    "←": "<-",
+    "⇒": "=>",
+    "°": "deg",
+    "µ": "u",
+    "μ": "u",
+    "\u2126": "ohm",
+    "∫": "int",
+    "∇": "grad",
+    "ß": "ss",
+    "ø": "o",
+    "Ø": "O",
+    "æ": "ae",
+    "Æ": "AE",
+    "œ": "oe",
+    "Œ": "OE",
+    "đ": "d",
+    "ł": "l",
+    "Ł": "L",
+    "\u2044": "/",
+    "\u2215": "/",
+    "\u200b": "",
+    "\ufeff": "",
+    "©": "(c)",
+    "®": "(R)",
+    "€": "EUR",
+    "£": "GBP",
+}
+_UNKNOWN: Final = "?"
+_FIRST_RAW, _LAST_RAW = 0xDC80, 0xDCFF
+_RAW_OFFSET: Final = 0xDC00
+
+
+def in_ascii(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Replace the first character that could not be encoded; an error handler for `codecs.register_error`.
+
+    Args: `error`: as raised by an encoder.
+    Returns: ASCII text, or the original byte of a file name that is not UTF-8, and where encoding resumes.
+    Raises: UnicodeError: anything but an encoding error.
+    """
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text, at = error.object, error.start
+    code = ord(text[at])
+    if _FIRST_RAW <= code <= _LAST_RAW:
+        return bytes([code - _RAW_OFFSET]), at + 1
+    return _in_context(text, at), at + 1
+
+
+def _equivalent(character: str) -> str:
+    """ASCII equivalent of one character.
+
+    Args: `character`: any one character.
+    Returns: ASCII text, empty for marks without width; "?" when there is no equivalent.
+    """
+    if character.isascii():
+        return character
+    if character in _EQUIVALENTS:
+        return _EQUIVALENTS[character]
+    if unicodedata.combining(character):
+        return ""
+    decomposed = unicodedata.normalize("NFKD", character)
+    if decomposed != character:
+        return "".join(map(_equivalent, decomposed))
+    return _greek(character) or _UNKNOWN
+
+
+def _greek(character: str) -> str:
+    words = unicodedata.name(character, "").split()
+    if words[:1] != ["GREEK"] or "LETTER" not in words:
+        return ""
+    name = words[-1].replace("LAMDA", "LAMBDA").lower()
+    return name.capitalize() if "CAPITAL" in words else name
+
+
+def _in_context(text: str, at: int) -> str:
+    """The equivalent, with ^ or _ before a raised or lowered part and spaces around the name of a letter."""
+    before, character, after = text[at - 1 : at] if at else "", text[at], text[at + 1 : at + 2]
+    found = _equivalent(character)
+    mark = _mark(character)
+    if mark:
+        return found if _mark(before) == mark else mark + found
+    if not _greek(character) or found == _EQUIVALENTS.get(character):
+        return found
+    lead = " " if before.isascii() and before.isalpha() else ""
+    return lead + found + (" " if after.isalnum() and not _mark(after) else "")
+
+
+def _mark(character: str) -> str:
+    kind = unicodedata.decomposition(character).split(" ", 1)[0] if character else ""
+    return {"<super>": "^", "<sub>": "_"}.get(kind, "")
+
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
 
-LAST_STANDARD: Final = 2
-WITHOUT_DOCSTRINGS: Final = 2
-NARROWEST: Final = 20
+_LAST_STANDARD: Final = 2
+_WITHOUT_DOCSTRINGS: Final = 2
+_NARROWEST: Final = 20
 WIDEST: Final = 10_000
 
 
@@ -48,7 +164,7 @@ def prepare_streams() -> str:
     """
     closed = sys.stdout is None
     _occupy_closed_descriptors()
-    codecs.register_error(plain_text.ERRORS, plain_text.replace)
+    codecs.register_error(ERRORS, in_ascii)
     sys.stdout = _tolerant(sys.stdout, "standard output")
     sys.stderr = _tolerant(sys.stderr, "standard error")
     return "standard output is closed; nothing was computed" if closed else ""
@@ -56,7 +172,7 @@ def prepare_streams() -> str:
 
 def interpreter_error() -> str:
     """Why this interpreter cannot run the commands. Returns: One sentence; empty when it can."""
-    if sys.flags.optimize < WITHOUT_DOCSTRINGS:
+    if sys.flags.optimize < _WITHOUT_DOCSTRINGS:
         return ""
     return "needs docstrings, which PYTHONOPTIMIZE=2 (python -OO) removes: unset it or set it to 1"
 
@@ -67,7 +183,7 @@ def drop_unusable_size(environment: MutableMapping[str, str]) -> None:
     Args: `environment`: of the process; COLUMNS below 20 and LINES below 1 are removed, and what is no
         number.
     """
-    for name, least in (("COLUMNS", NARROWEST), ("LINES", 1)):
+    for name, least in (("COLUMNS", _NARROWEST), ("LINES", 1)):
         value = environment.get(name, "")
         if not (re.fullmatch("[0-9]{1,6}", value) and least <= int(value) <= WIDEST):
             environment.pop(name, None)
@@ -85,7 +201,7 @@ def discard_unwritten() -> None:
 def _occupy_closed_descriptors() -> None:
     """Put the null device where a standard stream is closed: no file opened later takes its number."""
     descriptor = os.open(os.devnull, os.O_RDWR)
-    while descriptor <= LAST_STANDARD:
+    while descriptor <= _LAST_STANDARD:
         os.set_inheritable(descriptor, True)
         descriptor = os.open(os.devnull, os.O_RDWR)
     os.close(descriptor)
@@ -96,7 +212,7 @@ def _tolerant(stream: TextIO | None, title: str) -> TextIO:
     if stream is None:
         return open(os.devnull, "w", encoding="utf-8")
     if isinstance(stream, io.TextIOWrapper):
-        stream.reconfigure(errors=plain_text.ERRORS)
+        stream.reconfigure(errors=ERRORS)
         # With PYTHONUNBUFFERED there is no buffer in between.
         if type(getattr(stream.buffer, "raw", stream.buffer)) is io.FileIO:
             return _over_named_file(stream, title)

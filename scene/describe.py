@@ -99,53 +99,48 @@ def _lines_of(parts: tuple[str, ...]) -> Iterator[_Line]:
     return (_LINES[path] for path in dict.fromkeys(paths))
 
 
-def usual_unit(path: str) -> str:
-    """Unit in which a value of a scene is described; empty without one."""
-    line = _LINES.get(path)
-    if line is not None:
-        return line.shown.unit
-    dimension, units = _declared_elsewhere(path)
-    return units.get(dimension, next(iter(DIMENSIONS[dimension].units))) if dimension else ""
-
-
-def si_unit(path: str) -> str:
-    """SI unit of a value of a scene, such as "kg m"; "1" for a number without one."""
-    line = _LINES.get(path)
-    dimension = _declared_elsewhere(path)[0] if line is None else line.dimension
-    return next(iter(DIMENSIONS[dimension].units)).replace("*", " ") if dimension else "1"
-
-
-def _declared_elsewhere(path: str) -> tuple[str, Mapping[str, str]]:
-    """Dimension of a value of another kind of scene, and that kind's usual units; empty without."""
+def _line_at(path: str) -> _Line:
+    """How a value of any kind of scene is described; by its path where its declaration has no name for it."""
+    if path in _LINES:
+        return _LINES[path]
     table, _, key = path.split("[")[0].partition(".")
     for kind in map(scene_kind, balancers()):
         keys = kind.schema.tables[table].keys if table in kind.schema.tables else {}
         takes = keys[key].takes if key in keys else None
         if isinstance(takes, Reader) and takes.dimension:
-            return takes.dimension, kind.usual_units
-    return "", {}
+            unit = kind.usual_units.get(takes.dimension, next(iter(DIMENSIONS[takes.dimension].units)))
+            return _Line(path=path, shown=Shown(path, unit), dimension=takes.dimension)
+    return _Line(path=path, shown=Shown(path), dimension="")
+
+
+def usual_unit(path: str) -> str:
+    """Unit in which a value of a scene is described; empty without one."""
+    return _line_at(path).shown.unit
+
+
+def si_unit(path: str) -> str:
+    """SI unit of a value of a scene, such as "kg m"; "1" for a number without one."""
+    dimension = _line_at(path).dimension
+    return next(iter(DIMENSIONS[dimension].units)).replace("*", " ") if dimension else "1"
 
 
 def usual_name(path: str) -> str:
     """Name of a value of a scene, such as "bore d"; its path where it has none."""
-    line = _LINES.get(path)
-    return line.shown.name if line is not None else path
+    return _line_at(path).shown.name
 
 
 def in_usual_unit(path: str, value: float) -> float:
     """A value of a scene, SI, in its usual unit."""
-    line = _LINES.get(path)
-    dimension = _declared_elsewhere(path)[0] if line is None else line.dimension
-    if not dimension:
+    line = _line_at(path)
+    if not line.dimension:
         return value
-    return float(format_quantity(value, dimension, usual_unit(path), digits=_EXACT).split(" ")[0])
+    return float(format_quantity(value, line.dimension, line.shown.unit, digits=_EXACT).split(" ")[0])
 
 
 def scene_fault(scene: Scene, path: str, *, problem: str, allowed: str) -> Fault:
     """The error about a value of a loaded scene that only a later room finds; raise `SceneError` with it."""
     table, key = path.split(".")
-    line = _LINES.get(path) or _Line(path=path, shown=Shown(key), dimension="")
-    written = toml_text(_written(line, _value(scene, path)))
+    written = toml_text(_written(_line_at(path), _value(scene, path)))
     return Fault(file=scene.file, table=table, key=key, value=written, problem=problem, allowed=allowed)
 
 

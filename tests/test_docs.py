@@ -16,7 +16,6 @@ import ringbalance as rb
 from ringbalance.cli import COMMANDS
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.document import results_document
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (
@@ -110,7 +109,7 @@ def test_names_that_pages_mention_exist() -> None:
 
 
 def test_the_promised_keys_of_verify_are_there(paper_scene: Scene) -> None:
-    (case,) = results_document(rb.run_cases(["claim_01_volume"], scene=paper_scene))
+    (case,) = [each.to_dict() for each in rb.run_cases(["claim_01_volume"], scene=paper_scene)]
     assert {"id", "kind", "verdict", "quantities"} <= set(case)
     promised = {"name", "unit", "value", "reference", "error", "uncertainty", "limit", "verdict"}
     assert promised <= set(case["quantities"][0])

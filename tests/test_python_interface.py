@@ -111,14 +111,6 @@ def test_an_algorithm_of_one_s_own_runs_and_is_named() -> None:
     assert usual.to_dict()["controller"] == "target_vector"
 
 
-@pytest.mark.parametrize("weaker", [1e-2, 1e-4, 0.3])
-def test_no_advice_is_given_on_settings_that_an_own_algorithm_does_not_have(weaker: float) -> None:
-    run = rb.simulate(short(), flow_law=rb.paper_law(short()), controller=Wrapped(weaker))
-    assert not run.settled
-    for key in ("proportional", "integral_time", "gas_time_offset"):
-        assert key not in run.status
-
-
 def test_a_sensor_of_one_s_own_is_what_the_algorithm_sees() -> None:
     times: list[float] = []
 

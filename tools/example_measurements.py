@@ -17,9 +17,8 @@ import numpy.typing as npt
 
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.identification.balancers import models_for
-from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.scene import AnyScene, bundled_scene, load_scene, write_whole
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.describe import in_usual_unit, usual_name, usual_unit
@@ -94,7 +93,7 @@ def _observations(kind: str, columns: Mapping[str, npt.ArrayLike], chamber: Sequ
 def _measured(kind: str, plan: Observations, random: np.random.Generator) -> Observations:
     """The plan with what the truth predicts, and noise."""
     scene = truth(kind)
-    found = PREDICTED[kind].predict(scene, plan, models_for(scene))
+    found = KINDS[kind].predict(scene, plan, models_for(scene))
     columns = dict(plan.columns)
     if kind == "trial_amplitude":
         size = _VIBRATION_NOISE["liquid_ring"]
@@ -103,7 +102,7 @@ def _measured(kind: str, plan: Observations, random: np.random.Generator) -> Obs
         columns |= _vibrations(kind, found[: len(plan)] + 1j * found[len(plan) :], scene, random)
     else:
         noise = _RELATIVE_NOISE[kind] * found if kind in _RELATIVE_NOISE else _ANGLE_NOISE
-        columns[PREDICTED[kind].column(plan)] = found + noise * random.standard_normal(len(plan))
+        columns[KINDS[kind].noisy_column(plan)] = found + noise * random.standard_normal(len(plan))
     return _observations(kind, columns, plan.chamber.tolist())
 
 

@@ -21,17 +21,16 @@ import scene_reference
 from drag_coefficient_doc import document_tables
 from typesetting import typeset
 
-from ringbalance.identification.data.kinds import KINDS as FIT_KINDS
-from ringbalance.identification.data.kinds import DataKind
-from ringbalance.reports.equations import equations as report_equations
+from ringbalance.identification.kinds.kind import Kind
+from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.reports.prose import equations as report_equations
 from ringbalance.reports.saved import saved_cases
 from ringbalance.results.rows import sentences
 from ringbalance.scene import write_whole
 from ringbalance.verification.catalogue import load_cases
-from ringbalance.verification.document import case_document, definition_document
+from ringbalance.verification.result import definition_document
 from ringbalance.verification.runner import paper_scene, run_case
 from ringbalance.verification.standing import HEADS, standing_rows
-from ringbalance.verification.validation.kinds import KINDS
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 EQUATIONS: Final = ROOT / "reports" / "data" / "equations.json.xz"
@@ -39,26 +38,8 @@ _BLOCK: Final = re.compile(r"<!-- table: (\w+) -->\n.*?<!-- end -->", re.DOTALL)
 _PLACE: Final = re.compile(r"\{(\w+)[^}]*\}")
 
 
-def kind_table() -> str:
-    """Kinds of data and their columns."""
-    return _markdown(
-        ("kind", "measured column", "what it is", "further columns"),
-        [
-            (
-                f"`{name}`",
-                f"`{kind.measured}`",
-                kind.title,
-                "; ".join(
-                    f"`{column}`: {text}" for column, text in {**kind.columns, **kind.optional}.items()
-                ),
-            )
-            for name, kind in KINDS.items()
-        ],
-    )
-
-
-def fit_kind_table() -> str:
-    """Kinds of data that a fit takes, and their columns."""
+def kind_table(*balancers: str) -> str:
+    """Kinds of measurement that scenes of some balancers predict, or of test benches, and their columns."""
     return _markdown(
         ("kind", "what it is", "measured", "further columns"),
         [
@@ -68,12 +49,13 @@ def fit_kind_table() -> str:
                 "; ".join(_explained(kind, measured=True)),
                 "; ".join(_explained(kind, measured=False)),
             )
-            for name, kind in FIT_KINDS.items()
+            for name, kind in KINDS.items()
+            if kind.balancer in balancers and (kind.balancer or kind.stated)
         ],
     )
 
 
-def _explained(kind: DataKind, *, measured: bool) -> list[str]:
+def _explained(kind: Kind, *, measured: bool) -> list[str]:
     """The columns that are measured, or the others, with what they hold."""
     letters = ["`chamber`: letter of the driven chamber"] if kind.has_chamber and not measured else []
     return letters + [
@@ -124,8 +106,8 @@ def equations() -> bytes:
 PARTS: Final[Mapping[str, Callable[[], Mapping[str, str]]]] = MappingProxyType(
     {
         "docs/scene-file.md": scene_reference.tables,
-        "docs/measurements.md": lambda: {"kinds": kind_table()},
-        "docs/fit.md": lambda: {"fit_kinds": fit_kind_table()},
+        "docs/measurements.md": lambda: {"kinds": kind_table("")},
+        "docs/fit.md": lambda: {"fit_kinds": kind_table("liquid_ring", "eccentric_mass")},
         "docs/findings.md": lambda: {"findings": finding_table()},
         "docs/is-k-50-right.md": document_tables,
         "README.md": lambda: {"standing": standing_table(_documents())},
@@ -151,9 +133,7 @@ def _documents() -> list[dict[str, Any]]:
     """Cases that compare with measurements, run; of the others their text."""
     scene = paper_scene()
     return [
-        case_document(run_case(case.id, scene=scene))
-        if case.kind == "validation"
-        else definition_document(case)
+        run_case(case.id, scene=scene).to_dict() if case.kind == "validation" else definition_document(case)
         for case in load_cases()
     ]
 

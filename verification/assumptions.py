@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
@@ -11,6 +12,7 @@ from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import RestsOn
 from ringbalance.verification.eccentric_scenes import changed
+from ringbalance.verification.evidence import Evidence
 
 KNOWN: Final = ("given", "measured")
 """Origins of a value that somebody vouches for: it is taken as it stands."""
@@ -83,6 +85,33 @@ def overridden(scene: Any, overrides: Mapping[str, float | Literal["absent"]]) -
         change: Callable[..., Any] = _CHANGES.get(scene.balancer, _with_part)
         scene = change(scene, table, **{key: value})
     return scene
+
+
+def widened(
+    evidence: Evidence, scene: Any, assumptions: Sequence[Assumption], *, at: Callable[[Any], Evidence]
+) -> Evidence:
+    """Evidence with the reach of its assumed inputs: the case computed at all corners of their ranges.
+
+    What moves is the error, so an input that moves number and reference alike counts for nothing.
+    Args: `at`: what is judged on another scene, or a part of it.
+    """
+    if not assumptions:
+        return evidence
+
+    def errors(of: Any) -> Mapping[str, float]:
+        there = at(of)
+        exact = {name: reference.value for name, reference in there.reference.items()}
+        return {name: found.value - exact.get(name, 0.0) for name, found in there.found.items()}
+
+    here = errors(scene)
+    paths = [one.path for one in assumptions]
+    corners = itertools.product(*((one.low, one.high) for one in assumptions))
+    moved = [errors(overridden(scene, dict(zip(paths, corner, strict=True)))) for corner in corners]
+    found = dict(evidence.found)
+    for name, error in here.items():
+        changes = [one[name] - error for one in moved]
+        found[name] = found[name].moved(min(changes), max(changes))
+    return dataclasses.replace(evidence, found=found)
 
 
 def _range(one: RestsOn, scene: Any, value: float, origin: str) -> tuple[float, float, str]:

@@ -1,20 +1,44 @@
-"""All cases, found by their folders, in the order in which they are reported."""
+"""All cases, found by their folders: the program's in the order in which they are reported, and a user's own.
+
+What is wrong with a case of a user's own is a `CaseError` in one sentence and stops no other.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
+import inspect
 import re
-from collections.abc import Sequence
+import sys
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib.resources import files
-from types import SimpleNamespace
-from typing import Final, cast
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any, Final, SupportsFloat, cast
+
+import numpy as np
 
 from ringbalance.verification import cases
 from ringbalance.verification.case import CaseDefinition, CaseError
-from ringbalance.verification.evidence import CaseCode
+from ringbalance.verification.evidence import (
+    CaseCode,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Reference,
+    as_found,
+)
 
 _PAPERS: Final = ("liquid_ring", "eccentric_mass")
+_TEXT: Final = "case.toml"
+_CODE: Final = "case.py"
+_JUDGED: Final = (NotRunError, ValueError, ArithmeticError, RuntimeError)
+"""What the run of a case makes a verdict of."""
 
 
 @lru_cache(maxsize=1)
@@ -86,3 +110,159 @@ def _by_number(case_id: str) -> list[str]:
     number = re.fullmatch(r"(?:claim)?_?0*(\d+)\w*", case_id)
     wanted = f"claim_{int(number[1]):02d}_" if number else None
     return [known for known in case_ids() if wanted and known.startswith(wanted)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnCase:
+    """A case of a user's own, in a folder outside the program that holds `case.toml` and `case.py`."""
+
+    folder: Path
+    definition: CaseDefinition
+
+    def code(self) -> CaseCode:
+        """Its functions. Raises: CaseError: they cannot be loaded, or take something else than they must."""
+        path = self.folder / _CODE
+        module = _loaded(path)
+        compute = getattr(module, "compute", None)
+        if not callable(compute):
+            raise CaseError(f"{path}: there is no function compute(scene, level, defect=None)")
+        takes_defect = len(inspect.signature(compute).parameters) > 2
+        built_in = [mutation.id for mutation in self.definition.must_fail if not mutation.scene]
+        if built_in and not takes_defect:
+            raise CaseError(
+                f"{path}: compute takes no third argument, the mutation to build in; mutation "
+                f'"{built_in[0]}" needs it, because it changes no value of the scene'
+            )
+        judged = tuple(quantity.name for quantity in self.definition.quantity)
+        return _Code(path=path, module=module, judged=judged, takes_defect=takes_defect)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Code:
+    """What the run of a case asks for, from functions that may give plain numbers."""
+
+    path: Path
+    module: ModuleType
+    judged: tuple[str, ...]
+    """Names of the quantities that case.toml judges."""
+    takes_defect: bool
+
+    def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
+        """As `CaseCode.compute`."""
+        arguments = (scene, level, defect) if self.takes_defect else (scene, level)
+        found = self._called(self.module.compute, *arguments)
+        if isinstance(found, Mapping):
+            found = Evidence(found=self._numbers("compute", found, Found, as_found))
+        if not isinstance(found, Evidence):
+            raise CaseError(
+                f"{self.path}: compute gives {_kind(found)}, not an Evidence or numbers by quantity"
+            )
+        self._check_names("compute", found.found, complete=True)
+        return dataclasses.replace(found, reference={**found.reference, **self._reference(scene)})
+
+    def _reference(self, scene: Any) -> Mapping[str, Reference]:
+        """What judged quantities are compared with, by name; nothing where the case has none."""
+        given = getattr(self.module, "reference", {})
+        values = self._called(given, scene) if callable(given) else given
+        if not isinstance(values, Mapping):
+            raise CaseError(f"{self.path}: reference gives {_kind(values)}, not references by quantity")
+        self._check_names("reference", values, complete=False)
+        return self._numbers("reference", values, Reference, _as_references)
+
+    def _called(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return function(*arguments)
+        except (*_JUDGED, CaseError):
+            raise
+        except Exception as error:
+            raise CaseError(f"{self.path}: {_described(error, self.path)}") from error
+
+    def _numbers(
+        self, where: str, values: Mapping[str, Any], kind: type, made: Callable[..., Any]
+    ) -> Mapping[str, Any]:
+        """Records by name, plain numbers made into such."""
+        plain = {name: _number(value) for name, value in values.items() if not isinstance(value, kind)}
+        for name, number in plain.items():
+            if number is None:
+                raise CaseError(
+                    f'{self.path}: {where} gives {_kind(values[name])} for "{name}", not a number or a '
+                    f"{kind.__name__}"
+                )
+        return {**values, **made(**plain)}
+
+    def _check_names(self, where: str, values: Mapping[str, Any], *, complete: bool) -> None:
+        strange = [name for name in values if name not in self.judged]
+        missing = [name for name in self.judged if name not in values] if complete else []
+        if strange or missing:
+            what = f'gives "{strange[0]}", which is not judged' if strange else f'lacks "{missing[0]}"'
+            raise CaseError(f"{self.path}: {where} {what}; {_TEXT} judges {', '.join(self.judged)}")
+
+
+def own_cases(folder: Path) -> tuple[list[OwnCase], list[CaseError]]:
+    """The cases in a folder, or the one that it is, by name, and what is wrong with others."""
+    folders = [folder] if (folder / _TEXT).is_file() else _below(folder)
+    cases, errors = [], []
+    for place in folders:
+        try:
+            cases.append(OwnCase(folder=place, definition=_definition(place / _TEXT)))
+        except CaseError as error:
+            errors.append(error)
+    if not folders:
+        errors.append(CaseError(f"{folder}: there is no folder with a {_TEXT} in it"))
+    return cases, errors
+
+
+def _below(folder: Path) -> list[Path]:
+    try:
+        return sorted(path.parent for path in folder.glob(f"*/{_TEXT}"))
+    except OSError:
+        return []
+
+
+def _definition(path: Path) -> CaseDefinition:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise CaseError(f"{path}: it cannot be read: {error}") from error
+    return CaseDefinition.parse(text, source=str(path))
+
+
+def _loaded(path: Path) -> ModuleType:
+    """A file's module, not entered in `sys.modules`: each run has one of its own."""
+    spec = spec_from_file_location(f"own_case_{path.parent.name}", path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise CaseError(f"{path}: there is no such file")
+    module = module_from_spec(spec)
+    writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise CaseError(f"{path}: {_described(error, path)}") from error
+    finally:
+        sys.dont_write_bytecode = writes
+    return module
+
+
+def _number(value: object) -> float | None:
+    """A number, of numpy's too; None for what is none."""
+    if isinstance(value, str) or not isinstance(value, SupportsFloat) or np.ndim(cast(Any, value)):
+        return None
+    return float(value)
+
+
+def _as_references(**values: float) -> Mapping[str, Reference]:
+    return {name: Reference(value=value) for name, value in values.items()}
+
+
+def _described(error: Exception, path: Path) -> str:
+    """An exception in one line, with the line of the case's own file that it comes from."""
+    lines = [
+        frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)
+    ]
+    line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
+    place = "" if line is None else f"line {line}: "
+    return f"{place}{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def _kind(value: object) -> str:
+    return f"a value of type {type(value).__name__}"

@@ -2,16 +2,48 @@
 
 from __future__ import annotations
 
-import dataclasses
-import itertools
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
-from ringbalance.verification.assumptions import Assumption, overridden
-from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Quantity, fill
-from ringbalance.verification.evidence import COVERAGE_FACTOR, Evidence, Found, Level, Reference
-from ringbalance.verification.verdicts import Comparison, Verdict, judge_quantity
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.results.numbers import given
+from ringbalance.results.result import Result, Rows, Table
+from ringbalance.results.rows import Finding
+from ringbalance.results.rows import Quantity as Row
+from ringbalance.verification.assumptions import Assumption
+from ringbalance.verification.case import CAUSES, NEEDS_REFERENCE, CaseDefinition, Quantity, fill
+from ringbalance.verification.evidence import (
+    COVERAGE_FACTOR,
+    Convergence,
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Reference,
+    Series,
+)
+from ringbalance.verification.typed_record import plain
+from ringbalance.verification.verdicts import Comparison, Verdict
+
+Document = dict[str, Any]
+_LISTED: Final = {"id", "kind", "about", "paper", "number", "title", "claim", "cost"}
+_DEPARTS: Final = {Verdict.CORRECTED, Verdict.REFUTED, Verdict.INCONCLUSIVE}
+_AS_DEFINED: Final = _LISTED | {
+    *("protects", "assumes", "does_not_cover", "equations", "headline", "judged_on", "left_out"),
+}
+"""What a record has as its case.toml has it."""
+_CODES: Final = {
+    Verdict.PASSED: "case_holds",
+    Verdict.CONFIRMED: "case_holds",
+    Verdict.FAILED: "case_failed",
+    Verdict.NOT_RUN: "case_not_run",
+}
+"""Finding of a verdict; that of the others is "case_departs"."""
+_DIGITS: Final = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +70,42 @@ class QuantityResult:
         judged_alone = self.quantity.metric not in NEEDS_REFERENCE
         return reach if certain and judged_alone else comparison.half_width + reach
 
+    def to_dict(self) -> Document:
+        """The quantity as its case's JSON has it."""
+        found, reference = self.found, self.reference
+        return {
+            **vars(self.quantity),
+            "value": None if found is None else found.value,
+            "reference": None if reference is None else reference.value,
+            "uncertainty": self.half_width,
+            "reference_uncertainty": None if reference is None else COVERAGE_FACTOR * reference.uncertainty,
+            **_found(found, reference),
+            "verdict": self.verdict.value,
+        }
+
+    def row(self) -> Row:
+        """The found number with its interval."""
+        quantity, document = self.quantity, _found(self.found, self.reference)
+        exact = not document["value_uncertainty"]
+        return Row(
+            key=quantity.name,
+            name=quantity.title,
+            value=None if self.found is None else self.found.value,
+            unit=quantity.unit,
+            lower=None if exact else document["value_low"],
+            upper=None if exact else document["value_high"],
+            digits=_DIGITS,
+        )
+
+    def cells(self) -> tuple[str, ...]:
+        """Title, number, what it is compared with, half-width of the comparison, and verdict."""
+        quantity, unit = self.quantity, self.quantity.unit
+        bound = {"at_most": "≤ ", "at_least": "≥ "}.get(quantity.metric)
+        reference = None if self.reference is None else self.reference.value
+        against = given(reference, unit) if bound is None else bound + given(quantity.limit, unit)
+        width = given(self.half_width, unit, digits=2) if self.half_width else ""
+        return quantity.title, self.row().text, against, width, self.verdict.value
+
 
 @dataclass(frozen=True, kw_only=True)
 class MutationResult:
@@ -56,9 +124,20 @@ class MutationResult:
         """Whether the case was judged with this defect, and came out as it must."""
         return self.judged and self.verdict is self.expect
 
+    def to_dict(self) -> Document:
+        """The mutation as its case's JSON has it."""
+        return {
+            "id": self.id,
+            "must_fail": self.what,
+            "expect": self.expect.value,
+            "verdict": self.verdict.value,
+            "failed": self.caught,
+            "status": self.status,
+        }
 
-@dataclass(frozen=True, kw_only=True)
-class CaseResult:
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class CaseResult(Result):
     """One case, run or not."""
 
     definition: CaseDefinition
@@ -102,6 +181,63 @@ class CaseResult:
             return ""
         return fill(text, self.numbers)
 
+    @property
+    def consequence(self) -> str:
+        """The sentence for a designer, empty where the case was not run."""
+        run = self.verdict is not Verdict.NOT_RUN
+        return self.filled(self.definition.consequence_of(self.verdict)) if run else ""
+
+    def to_dict(self) -> Document:
+        """The result and all that a report shows of it; SI units, or the unit named beside the number."""
+        definition = self.definition
+        return {
+            **_part(definition, _AS_DEFINED),
+            "verdict": self.verdict.value,
+            "quantities": [quantity.to_dict() for quantity in self.quantities],
+            "explanation": self.filled(definition.explanation),
+            "consequence": self.consequence,
+            "reference": {k: v for k, v in vars(definition.reference).items() if k != "doubts"},
+            "doubts": [text for doubt in definition.reference.doubts if (text := self.filled(doubt))],
+            "cause": CAUSES[definition.cause] if self.verdict in _DEPARTS else "",
+            "judgement": self.filled(definition.judgement),
+            "rests_on": [vars(one) for one in self.assumptions],
+            "level": self.level,
+            "status": self.status,
+            "scene": self.scene_name,
+            "scene_sha256": self.scene_sha256,
+            "time_s": self.time_s,
+            "mutations": [mutation.to_dict() for mutation in self.mutations],
+            "declared_mutations": [
+                {k: v for k, v in vars(mutation).items() if k != "scene"} for mutation in definition.must_fail
+            ],
+            "broken": self.broken,
+            **_evidence(self.evidence),
+        }
+
+    def rows(self) -> Rows:
+        """Verdict, mutations, and every judged quantity beside what it is compared with."""
+        definition, run = self.definition, self.evidence is not None
+        values = {"verdict": self.verdict.value, "claim": definition.claim}
+        consequence = (("consequence", self.consequence),) if definition.kind == "claim" else ()
+        verdict = Finding(code=_CODES.get(self.verdict, "case_departs"), values=values)
+        mutations = [
+            Finding(
+                code="mutation_caught" if each.caught else "mutation_missed",
+                values={"what": each.what, "verdict": each.verdict.value, "expect": each.expect.value},
+            )
+            for each in self.mutations
+        ]
+        heads = ("quantity", "found", "reference or limit", "±", "verdict")
+        table = Table(heads=heads, rows=[each.cells() for each in self.quantities] if run else [])
+        return Rows(
+            title=f"{definition.id}  {kind_text(definition)}  {self.verdict}",
+            quantities=tuple(each.row() for each in self.quantities) if run else (),
+            findings=(verdict, *mutations),
+            facts=consequence if run else (("status", self.status),),
+            tables=(table,),
+            listed=0,
+        )
+
 
 def _named_numbers(result: QuantityResult) -> dict[str, float]:
     name, found, comparison = result.quantity.name, result.found, result.comparison
@@ -127,62 +263,103 @@ def _named_numbers(result: QuantityResult) -> dict[str, float]:
     return named
 
 
-def widened(
-    evidence: Evidence, scene: Any, assumptions: Sequence[Assumption], *, at: Callable[[Any], Evidence]
-) -> Evidence:
-    """Evidence with the reach of its assumed inputs: the case computed at all corners of their ranges.
-
-    What moves is the error, so an input that moves number and reference alike counts for nothing.
-    Args: `at`: what is judged on another scene, or a part of it.
-    """
-    if not assumptions:
-        return evidence
-
-    def errors(of: Any) -> Mapping[str, float]:
-        there = at(of)
-        exact = {name: reference.value for name, reference in there.reference.items()}
-        return {name: found.value - exact.get(name, 0.0) for name, found in there.found.items()}
-
-    here = errors(scene)
-    paths = [one.path for one in assumptions]
-    corners = itertools.product(*((one.low, one.high) for one in assumptions))
-    moved = [errors(overridden(scene, dict(zip(paths, corner, strict=True)))) for corner in corners]
-    found = dict(evidence.found)
-    for name, error in here.items():
-        changes = [one[name] - error for one in moved]
-        found[name] = found[name].moved(min(changes), max(changes))
-    return dataclasses.replace(evidence, found=found)
+def kind_text(definition: CaseDefinition) -> str:
+    """Such as "code verification", or "claim 12"."""
+    number = "" if definition.number is None else f" {definition.number}"
+    return definition.kind.replace("_", " ") + number
 
 
-def judge(definition: CaseDefinition, evidence: Evidence) -> tuple[QuantityResult, ...]:
-    """Every quantity of a case. Raises: ValueError: what was found is not what the case judges."""
-    against = evidence.reference
-    names = {quantity.name for quantity in definition.quantity}
-    if set(evidence.found) != names or not set(against) <= names:
-        raise ValueError(
-            f"{definition.id}: judged are {sorted(names)}, found {sorted(evidence.found)}, "
-            f"referenced {sorted(against)}"
-        )
-    return tuple(
-        _judge_one(definition, quantity, evidence.found[quantity.name], against.get(quantity.name))
-        for quantity in definition.quantity
-    )
+def definition_document(definition: CaseDefinition) -> Document:
+    """What a list of cases says of one of them."""
+    return _part(definition, _LISTED) | {"mutations": [mutation.id for mutation in definition.must_fail]}
 
 
-def _judge_one(
-    definition: CaseDefinition, quantity: Quantity, found: Found, reference: Reference | None
-) -> QuantityResult:
-    judgement = judge_quantity(
-        kind=definition.kind,
-        metric=quantity.metric,
-        limit=quantity.limit,
-        found=found,
-        reference=reference if quantity.metric in NEEDS_REFERENCE else None,
-    )
-    return QuantityResult(
-        quantity=quantity,
-        verdict=judgement.verdict,
-        found=found,
-        reference=reference,
-        comparison=judgement.comparison,
-    )
+def _part(definition: CaseDefinition, names: set[str]) -> Document:
+    return {name: value for name, value in plain(definition).items() if name in names}
+
+
+def _found(found: Found | None, reference: Reference | None) -> Document:
+    """Expanded uncertainties of a found number, and the standard ones of V&V 20 by their symbols there."""
+    if found is None:
+        names = ("error", "value_uncertainty", "value_low", "value_high", "numerical_uncertainty")
+        return dict.fromkeys((*names, "input_uncertainty", "corrected", "validation"))
+    low, high = found.reach
+    error = None if reference is None else found.value - reference.value
+    known = COVERAGE_FACTOR * math.hypot(found.numerical, found.input)
+    parts = {
+        "u_num": found.numerical,
+        "u_input": found.input_standard_uncertainty,
+        "u_D": 0.0 if reference is None else reference.uncertainty,
+    }
+    return {
+        "error": error,
+        "value_uncertainty": known + max(-low, high),
+        "value_low": found.value + low - known,
+        "value_high": found.value + high + known,
+        "numerical_uncertainty": COVERAGE_FACTOR * found.numerical,
+        "input_uncertainty": COVERAGE_FACTOR * parts["u_input"],
+        "corrected": found.corrected,
+        "validation": {"E": error, **parts, "u_val": math.hypot(*parts.values())},
+    }
+
+
+def _evidence(evidence: Evidence | None) -> Document:
+    if evidence is None:
+        return {"numbers": {}, "series": [], "convergence": [], "tables": []}
+    return {
+        "numbers": {name: float(value) for name, value in evidence.numbers.items()},
+        "series": [_series(series) for series in evidence.series],
+        "convergence": [_convergence(study) for study in evidence.convergence],
+        "tables": [
+            {
+                "name": table.name,
+                "columns": {
+                    name: [value if isinstance(value, str) else float(value) for value in values]
+                    for name, values in table.columns.items()
+                },
+                "units": dict(table.units),
+            }
+            for table in evidence.tables
+        ],
+    }
+
+
+def _series(series: Series) -> Document:
+    return {
+        "name": series.name,
+        "x": {**vars(series.x), "values": _numbers(series.x.values)},
+        "y": [_curve(curve) for curve in series.y],
+        "log": series.log,
+    }
+
+
+def _curve(curve: Curve) -> Document:
+    given = {key: value for key, value in vars(curve).items() if value is not None}
+    return {
+        key: _numbers(value) if key in ("values", "uncertainty") else value for key, value in given.items()
+    }
+
+
+def _convergence(study: Convergence) -> Document:
+    lists = {key: getattr(study, key) for key in ("observed_order", "error", "value")}
+    shown = vars(study) | {key: None if v is None else _numbers(v) for key, v in lists.items()}
+    return {"h": _numbers(shown.pop("size")), **shown}
+
+
+def _numbers(values: npt.ArrayLike) -> list[float | None]:
+    """A curve may have gaps: a value that is not finite there is none."""
+    return [float(v) if np.isfinite(v) else None for v in np.asarray(values, dtype=np.float64).ravel()]
+
+
+def merge_saved(document: Sequence[Document], saved: Sequence[Mapping[str, Any]]) -> list[Document]:
+    """The records, with the `saved` result on the same scene for each heavy case that was not run."""
+    earlier = {(case["id"], case["scene_sha256"]): dict(case) for case in saved}
+    return [_merged(case, earlier.get((case["id"], case["scene_sha256"]))) for case in document]
+
+
+def _merged(case: Document, earlier: Document | None) -> Document:
+    keep = case["cost"] == "heavy" and case["verdict"] == Verdict.NOT_RUN.value
+    if not keep or earlier is None or earlier["verdict"] == Verdict.NOT_RUN.value:
+        return case
+    status = f"kept from an earlier run of {earlier.get('date', 'an unknown date')}"
+    return earlier | {"about": case["about"], "status": status}

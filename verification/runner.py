@@ -13,19 +13,13 @@ from typing import Any
 from ringbalance.scene import AnyScene, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers, beside
-from ringbalance.verification.assumptions import assumptions_of, overridden
-from ringbalance.verification.case import CaseDefinition, Mutation
+from ringbalance.verification.assumptions import assumptions_of, overridden, widened
+from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
 from ringbalance.verification.eccentric_scenes import driven_scene
-from ringbalance.verification.evidence import CaseCode, Evidence, Level, NotRunError
-from ringbalance.verification.result import (
-    CaseResult,
-    MutationResult,
-    QuantityResult,
-    judge,
-    widened,
-)
-from ringbalance.verification.verdicts import Verdict, combine
+from ringbalance.verification.evidence import CaseCode, Evidence, Found, Level, NotRunError, Reference
+from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
+from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
 
 Progress = Callable[[CaseResult], None]
 PAPER_SCENE = "liquid_ring_paper"
@@ -53,18 +47,8 @@ def run_case(case_id: str, *, scene: Scene, level: Level = "light", mutations: b
     Raises: KeyError: an unknown case.
     """
     definition, code = load_case(case_id), case_code(case_id)
-    return run_on(definition, code, scene=scene_of(definition, scene), level=level, mutations=mutations)
-
-
-def run_on(
-    definition: CaseDefinition, code: CaseCode, *, scene: Scene, level: Level, mutations: bool
-) -> CaseResult:
-    """As `run_case`, of a case given by its text and its code, on the scene exactly as given."""
-    result = run_definition(definition, code, scene=scene, level=level)
-    if not mutations or result.verdict is Verdict.NOT_RUN:
-        return result
-    caught = mutate_definition(definition, code, scene=scene, level=level)
-    return dataclasses.replace(result, mutations=caught)
+    given = scene_of(definition, scene)
+    return run_definition(definition, code, scene=given, level=level, mutations=mutations)
 
 
 def run_definition(
@@ -73,35 +57,55 @@ def run_definition(
     *,
     scene: Scene,
     level: Level = "light",
-    defect: str | None = None,
+    mutations: bool = False,
 ) -> CaseResult:
-    """Run and judge one case given by its text and its code, on the scene exactly as given.
+    """As `run_case`, of a case given by its text and its code, on the scene exactly as given."""
+    result = _judged(definition, code, None, scene=scene, level=level)
+    if not mutations or result.verdict is Verdict.NOT_RUN:
+        return result
+    affordable = [m for m in definition.must_fail if level == "heavy" or m.cost == "light"]
+    pairs = [(m, _judged(definition, code, m, scene=scene, level=level)) for m in affordable]
+    caught = tuple(
+        MutationResult(
+            id=mutation.id,
+            what=mutation.what,
+            expect=mutation.expect,
+            verdict=mutated.verdict,
+            status=mutated.status,
+            judged=mutated.evidence is not None,
+        )
+        for mutation, mutated in pairs
+    )
+    return dataclasses.replace(result, mutations=caught)
 
-    Raises: KeyError: an unknown mutation.
-    """
+
+def _judged(
+    definition: CaseDefinition, code: CaseCode, mutation: Mutation | None, *, scene: Scene, level: Level
+) -> CaseResult:
+    """One run, with one of the case's mutations where one is given."""
     start = time.perf_counter()
     outcome = partial(_outcome, definition, scene=scene, level=level)
     if definition.cost == "heavy" and level == "light":
         return outcome(status="heavy: run with --level heavy")
-    if definition.shape == "sector" and _imported(scene):
+    if definition.shape == "sector" and scene.mesh_digest:
         return outcome(status=_ABOUT_A_SECTOR)
-    mutation = None if defect is None else _mutation(definition, defect)
+    prescribed = {} if mutation is None else mutation.scene
+    built_in = None if mutation is None or prescribed else mutation.id
     try:
-        mutated = scene if mutation is None else overridden(scene, mutation.scene)
-        built_in = None if mutation is None or mutation.scene else mutation.id
+        mutated = overridden(scene, prescribed)
         evidence = code.compute(mutated, level, built_in)
-        prescribed = {} if mutation is None else mutation.scene
         rests = [one for one in definition.rests_on if one.path not in prescribed]
         assumptions = assumptions_of(rests, mutated)
         at = partial(_evidence_at, code, level, built_in, (mutated, evidence))
         by_corners = [one for one in assumptions if not one.covered]
         evidence = widened(evidence, mutated, by_corners, at=at)
-        quantities = judge(definition, evidence)
+        quantities = _quantities(definition, evidence)
     except NotRunError as error:
         return outcome(status=str(error))
     except (ValueError, ArithmeticError, RuntimeError) as error:
         # A case that breaks down has not shown what it is there to show.
-        return outcome(status=f"{type(error).__name__}: {error}", verdict=_broken_down(definition))
+        verdict = Verdict.INCONCLUSIVE if definition.kind in ("claim", "validation") else Verdict.FAILED
+        return outcome(status=f"{type(error).__name__}: {error}", verdict=verdict)
     verdict = combine(
         kind=definition.kind,
         verdicts=[result.verdict for result in quantities],
@@ -109,9 +113,8 @@ def run_definition(
     )
     if not evidence.status.ok and verdict not in (Verdict.FAILED, Verdict.REFUTED):
         verdict = Verdict.INCONCLUSIVE
-    result = outcome(status=evidence.status.text, verdict=verdict)
     return dataclasses.replace(
-        result,
+        outcome(status=evidence.status.text, verdict=verdict),
         quantities=quantities,
         evidence=evidence,
         assumptions=assumptions,
@@ -135,8 +138,38 @@ def _evidence_at(
         raise ValueError(f"not at every value of an assumed input: {error}") from error
 
 
-def _broken_down(definition: CaseDefinition) -> Verdict:
-    return Verdict.INCONCLUSIVE if definition.kind in ("claim", "validation") else Verdict.FAILED
+def _quantities(definition: CaseDefinition, evidence: Evidence) -> tuple[QuantityResult, ...]:
+    """Every quantity of a case. Raises: ValueError: what was found is not what the case judges."""
+    against = evidence.reference
+    names = {quantity.name for quantity in definition.quantity}
+    if set(evidence.found) != names or not set(against) <= names:
+        raise ValueError(
+            f"{definition.id}: judged are {sorted(names)}, found {sorted(evidence.found)}, "
+            f"referenced {sorted(against)}"
+        )
+    return tuple(
+        _judge_one(definition, quantity, evidence.found[quantity.name], against.get(quantity.name))
+        for quantity in definition.quantity
+    )
+
+
+def _judge_one(
+    definition: CaseDefinition, quantity: Quantity, found: Found, reference: Reference | None
+) -> QuantityResult:
+    judgement = judge_quantity(
+        kind=definition.kind,
+        metric=quantity.metric,
+        limit=quantity.limit,
+        found=found,
+        reference=reference if quantity.metric in NEEDS_REFERENCE else None,
+    )
+    return QuantityResult(
+        quantity=quantity,
+        verdict=judgement.verdict,
+        found=found,
+        reference=reference,
+        comparison=judgement.comparison,
+    )
 
 
 def _outcome(
@@ -154,45 +187,11 @@ def _outcome(
     )
 
 
-def _imported(scene: Any) -> bool:
-    return bool(scene.mesh_digest)
-
-
 def scene_of(definition: CaseDefinition, scene: Scene) -> Any:
     """What a case is run on: the scene at hand, the paper's own disc or its rotor with eccentric masses."""
     if definition.paper == DRIVEN:
         return driven_scene()
     return paper_scene() if definition.judged_on == "paper" else scene
-
-
-def _mutation(definition: CaseDefinition, defect: str) -> Mutation:
-    found = [mutation for mutation in definition.must_fail if mutation.id == defect]
-    if not found:
-        raise KeyError(f"{definition.id} has no mutation {defect}")
-    return found[0]
-
-
-def mutate_definition(
-    definition: CaseDefinition, code: CaseCode, *, scene: Scene, level: Level = "light"
-) -> tuple[MutationResult, ...]:
-    """Run a case once with each of its mutations; "light" leaves out those that are heavy."""
-    if definition.cost == "heavy" and level == "light":
-        return ()
-    affordable = [m for m in definition.must_fail if level == "heavy" or m.cost == "light"]
-    results = []
-    for mutation in affordable:
-        result = run_definition(definition, code, scene=scene, level=level, defect=mutation.id)
-        results.append(
-            MutationResult(
-                id=mutation.id,
-                what=mutation.what,
-                expect=mutation.expect,
-                verdict=result.verdict,
-                status=result.status,
-                judged=result.evidence is not None,
-            )
-        )
-    return tuple(results)
 
 
 def run_cases(

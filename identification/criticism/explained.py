@@ -57,10 +57,8 @@ def shares_explained(best: Optimum) -> tuple[Explained, ...]:
 def _shares(best: Optimum) -> Iterator[Explained]:
     problem, residuals = best.residuals.problem, best.residuals
     scale, parts, expected = residuals.scale, best.at, problem.at(problem.start)
-    taken, at = residuals.leverage(best.slopes), 0
-    for block in problem.blocks:
-        rows = slice(at, at + block.measured.size)
-        at += block.measured.size
+    taken = residuals.leverage(best.slopes)
+    for block, rows in problem.rows:
         null = basis_of(scale[rows, None] * _null(block))
         left = block.measured.size - null.shape[1]
         freedom = block.measured.size - float(np.sum(taken[rows]))

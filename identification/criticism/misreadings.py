@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.rotor import chamber_letters
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.kinds.kind import Observations
 from ringbalance.scene.arrays import FloatArray
 
 _LONGEST_TIME: Final = 10.0

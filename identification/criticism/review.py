@@ -17,9 +17,9 @@ from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.ranges import ComparedColumn, compared_columns
 from ringbalance.identification.criticism.readings import Reading, other_readings
 from ringbalance.identification.criticism.residual_tests import Criticism, LinearFit
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.device import Device
+from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.predict.device import Device
 from ringbalance.identification.result import FitResult
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
@@ -145,7 +145,7 @@ def _by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, Float
 
 def _predicted(block: Block, scene: Scene, problem: Problem, exponent: float | None) -> FloatArray:
     """By the other law; flow at rest follows a power of the pressure through its middle value."""
-    own = block.kind.predict(scene, block.observations, problem.models)
+    own = block.predicted(scene, problem.models)
     if block.observations.kind != "flow" or exponent is None:
         return own
     pressure = block.observations.columns["pressure_difference"]
@@ -255,24 +255,21 @@ def _titles(observations: Observations, size: int) -> StringArray:
 def _rotation(result: FitResult) -> FloatArray:
     """Rotates a vibration's real and imaginary part into those along its predicted change and across."""
     problem, t = result.optimum.residuals.problem, result.optimum.t
-    predicted, turn, at = problem.at(t), np.eye(problem.measured.size), 0
-    for block in problem.blocks:
-        size, rows = block.measured.size, len(block.observations)
-        if size == 2 * rows:
-            along = block.observations.rows_of(predicted[at : at + size])
+    predicted, turn = problem.at(t), np.eye(problem.measured.size)
+    for block, mine in problem.rows:
+        rows = len(block.observations)
+        if block.measured.size == 2 * rows:
+            along = block.observations.rows_of(predicted[mine])
             angle = np.arctan2(along[:, 1], along[:, 0])
-            i = at + np.arange(rows)
+            i = mine.start + np.arange(rows)
             turn[i, i] = turn[i + rows, i + rows] = np.cos(angle)
             turn[i, i + rows], turn[i + rows, i] = np.sin(angle), -np.sin(angle)
-        at += size
     return turn
 
 
 def _order(problem: Problem, size: int) -> FloatArray:
     """Row of its file that each residual is of; the two parts of a vibration have one."""
-    order, at = np.zeros(size), 0
-    for block in problem.blocks:
-        rows, count = len(block.observations), block.measured.size
-        order[at : at + count] = np.tile(np.arange(float(rows)), count // rows)
-        at += count
+    order = np.zeros(size)
+    for block, mine in problem.rows:
+        order[mine] = np.resize(np.arange(float(len(block.observations))), block.measured.size)
     return order

@@ -1,6 +1,6 @@
 """What the liquid ring in one chamber does to its disc: volume, wall pressure, moment and force.
 
-Every number comes from finite elements on three meshes or more and carries the half-width that the grid
+Every number comes from finite elements on three meshes and carries the half-width that the grid
 convergence of exactly this number gives it, with what that cannot see: rounding, and liquid that gravity
 moves unmodelled.  With gravity across the shaft each number is the mean over a turn.
 """
@@ -96,7 +96,7 @@ def ring_quantities(
         gravity: g, m/s^2; zero leaves it out.
         shaft: "horizontal" turns gravity across the chamber, "vertical" points it along -z.
         dimension: 2 or 3; default 2, or 3 for a vertical shaft with gravity, which 2 cannot describe.
-        cells: meshes, finest first, each with half the cells of the one before; default `default_cells`
+        cells: three meshes, finest first, each with half the cells of the one before; default `default_cells`
             and two coarser ones; they decide the dimension when given.
         turn_samples: even number of angles of gravity over a turn; default enough for a mean within
             1e-8.
@@ -104,7 +104,7 @@ def ring_quantities(
         `closed` is False and the values are those without gravity, their half-widths widened by all that
         gravity could do to the liquid there.
     Raises: ValueError: fill ratios outside [0, 1], or above 0 but too small for a mesh; density, speed or
-        number of samples that make no sense; two dimensions for gravity along the shaft; fewer than three
+        number of samples that make no sense; two dimensions for gravity along the shaft; not three
         meshes.
     Source: Eqs. 3 to 12 of the liquid-ring paper, with exact plates; Celik et al. (2008),
         doi:10.1115/1.2960953.
@@ -146,8 +146,8 @@ def _meshes(
 ) -> tuple[tuple[int, ...], ...]:
     finest = default_cells(disc=disc, dimension=dimension)
     meshes = tuple(cells) if cells else tuple(tuple(n // k for n in finest) for k in (1, 2, 4))
-    if len(meshes) < 3 or any(len(c) != len(meshes[0]) for c in meshes):
-        raise ValueError("cells must list at least three meshes of one dimension, finest first")
+    if len(meshes) != 3 or any(len(c) != len(meshes[0]) for c in meshes):
+        raise ValueError("cells must list three meshes of one dimension, finest first")
     return meshes
 
 

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import runpy
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -34,58 +30,6 @@ def test_the_line_to_run_says_sudo_only_where_it_exists(root: Path, tmp_path: Pa
     assert ("sudo" in result.stdout) == sudo
     assert ("as root" in result.stdout) != sudo
     assert "apt-get install -y --no-install-recommends some-package" in result.stdout
-
-
-@pytest.fixture
-def other_pythons(root: Path) -> dict[str, Any]:
-    """What tools/other_pythons.py defines."""
-    return runpy.run_path(str(root / "tools" / "other_pythons.py"))
-
-
-def test_supported_versions_are_read_from_a_specifier(other_pythons: dict[str, Any]) -> None:
-    assert other_pythons["supported"](">=3.11,<3.14") == ["3.11", "3.12", "3.13"]
-
-
-def test_only_a_python_that_starts_counts(
-    other_pythons: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    script(tmp_path / "shims/python3.12", "echo no such version >&2; exit 127")
-    script(tmp_path / "shims/python3.13", "echo 3.11")
-    script(tmp_path / "pyenv/versions/3.12.9/bin/python", "echo 3.12")
-    monkeypatch.setenv("PATH", os.pathsep.join([str(tmp_path / "absent"), str(tmp_path / "shims")]))
-    monkeypatch.setenv("PYENV_ROOT", str(tmp_path / "pyenv"))
-    assert other_pythons["interpreters"](["3.12", "3.13"]) == {
-        "3.12": tmp_path / "pyenv/versions/3.12.9/bin/python",
-        "3.13": None,
-    }
-
-
-@pytest.mark.parametrize("code", [0, 2])
-def test_each_further_python_is_tested_and_a_failure_is_a_failure(
-    other_pythons: dict[str, Any],
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-    code: int,
-) -> None:
-    commands: list[list[str]] = []
-
-    def run(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
-        commands.append(command)
-        return subprocess.CompletedProcess(command, code)
-
-    def interpreters(versions: list[str]) -> dict[str, Path | None]:
-        return {"3.98": None} | {version: Path(f"/opt/{version}") for version in versions}
-
-    main: Callable[[], int] = other_pythons["main"]
-    monkeypatch.setitem(main.__globals__, "interpreters", interpreters)
-    monkeypatch.setattr(subprocess, "run", run)
-    assert main() == (1 if code else 0)
-    running = f"3.{sys.version_info.minor}"
-    versions = [version for version in ("3.11", "3.12", "3.13") if version != running]
-    target = {"3.11": "test", "3.12": "test-short", "3.13": "test"}
-    expected = [["make", target[one], f"VENV=.venv-{one}", f"PYTHON=/opt/{one}"] for one in versions]
-    assert commands == (expected[:1] if code else expected)
-    assert "Python 3.98: not on this machine" in capfd.readouterr().out
 
 
 def test_no_room_is_imported_by_its_folder_s_name(root: Path, room_order: tuple[str, ...]) -> None:

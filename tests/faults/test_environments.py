@@ -158,44 +158,12 @@ def test_a_reader_of_messages_that_goes_away_stops_nothing() -> None:
     assert json.loads(found.stdout)["lambda"]
 
 
-@pytest.mark.parametrize(
-    "content",
-    [b"", b"\x00\x01\xff\xfe", b"\xff\xfe" + "name = 1".encode("utf-16-le"), b"name = " + b"[" * 5000],
-    ids=["empty", "binary", "utf-16", "nested"],
-)
-def test_a_file_that_is_no_scene(content: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_bytes(content)
-    assert_ended(run(["calibrate", str(path)]), 2)
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["x" * 300, "x/" * 5000, ".", "missing\n.toml", "\udcff.toml", ""],
-    ids=lambda name: ascii(name)[:12],
-)
-def test_a_scene_that_is_no_file(name: str, tmp_path: Path) -> None:
-    found = run(["calibrate", os.fsencode(name)], cwd=tmp_path)
-    assert_ended(found, 2)
-    assert found.stdout == b""
-
-
 @pytest.mark.skipif(not POSIX, reason="file names are bytes only there")
 def test_a_file_name_that_is_not_utf_8(tmp_path: Path) -> None:
     path = os.fsencode(tmp_path) + b"/\xff.toml"
     Path(os.fsdecode(path)).write_bytes(PAPER.read_bytes())
     for words in ([b"calibrate", path], [b"compare", path, path, b"--law", b"paper"]):
         assert_ended(run(words), 0, 1)
-
-
-@pytest.mark.parametrize(
-    "change", [lambda text: b"\xef\xbb\xbf" + text, lambda text: text.replace(b"\n", b"\r\n")]
-)
-def test_a_scene_written_on_windows(change: object, tmp_path: Path) -> None:
-    assert callable(change)
-    path = tmp_path / "scene.toml"
-    path.write_bytes(change(PAPER.read_bytes()))
-    assert_ended(run(["simulate", str(path), "--law", "paper"]), 0)
 
 
 def test_the_same_bits_whatever_the_number_of_threads() -> None:

@@ -46,20 +46,6 @@ if __name__ == "__main__":
     except KeyboardInterrupt:
         sys.exit(130)
 """
-SPREAD = """
-import multiprocessing, threading, time
-from ringbalance.verification.runner import paper_scene, run_cases
-
-def end_the_worker():
-    while not (workers := multiprocessing.active_children()):
-        time.sleep(0.01)
-    workers[0].kill()
-
-if __name__ == "__main__":
-    threading.Thread(target=end_the_worker).start()
-    for result in run_cases(["claim_01_volume", "gci_celik2008"], scene=paper_scene(), workers=2):
-        print(result.definition.id, result.verdict)
-"""
 CODES = {signal.SIGKILL: -signal.SIGKILL, signal.SIGTERM: 130, signal.SIGINT: 130}
 
 
@@ -109,15 +95,6 @@ def test_a_worker_ends_with_its_parent(ending: signal.Signals, group: bool, tmp_
     assert told == ""
     if ending is not signal.SIGKILL:
         assert time.monotonic() - start < 10
-
-
-def test_a_worker_that_the_system_ends_loses_no_case(tmp_path: Path) -> None:
-    (tmp_path / "spread.py").write_text(SPREAD)
-    command = [sys.executable, str(tmp_path / "spread.py")]
-    child = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
-    assert child.returncode == 0, child.stderr
-    assert child.stdout.split() == ["claim_01_volume", "confirmed", "gci_celik2008", "passed"]
-    assert "Traceback" not in child.stderr
 
 
 @pytest.mark.parametrize("number", range(6))

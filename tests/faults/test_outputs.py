@@ -19,14 +19,6 @@ pytestmark = pytest.mark.faults
 PAPER = str(bundled_scene("liquid_ring_paper"))
 LAUNCH = [sys.executable, "-c", "import sys; from ringbalance.cli import main; sys.exit(main())"]
 # Drawing takes long, and these tests are about where files go.
-UNDRAWN = """
-import sys
-from ringbalance.cli import main
-from ringbalance.reports.pictures import process
-from ringbalance.reports.pictures.opengl import OpenGL
-process.find_opengl = lambda: OpenGL(available=False, window="", text="no OpenGL here")
-sys.exit(main())
-"""
 NOBODY = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
 WRITE = """
 import sys
@@ -86,15 +78,6 @@ def test_a_sub_folder_on_another_device_is_written(mount: Mount, tmp_path: Path)
     done = write(tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert names(tmp_path / "out") == {"figures/one", "page"}
-
-
-def test_plot_writes_to_a_mount_point(mount: Mount, tmp_path: Path) -> None:
-    out = mount(tmp_path / "m", "-t", "tmpfs", "none")
-    command = [sys.executable, "-c", UNDRAWN, "plot", PAPER, "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
-    assert done.returncode == 1, done.stderr
-    assert len(list((out / "fields").glob("*.vtu"))) == 2
-    assert [path.name for path in out.iterdir()] == ["fields"]
 
 
 def test_a_read_only_output_is_refused_before_the_work(mount: Mount, tmp_path: Path) -> None:

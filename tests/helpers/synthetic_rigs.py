@@ -18,10 +18,10 @@ import numpy.typing as npt
 
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.identification.balancers import model_errors
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import fit
-from ringbalance.identification.predict.device import Models
-from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.result import FitResult
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -101,10 +101,10 @@ def measured(
     """What a rig measures of one kind, in six to eight rows or that many times more."""
     chambers, columns = _plan(kind, truth, random, times)
     plan = observations(kind, columns, chambers)
-    found = PREDICTED[kind].predict(truth, plan, models)
+    found = KINDS[kind].predict(truth, plan, models)
     if kind in ("transfer", "flow"):
         sd = random.uniform(*_RELATIVE_NOISE) * np.sqrt(np.mean(found**2))
-        name = PREDICTED[kind].column(plan)
+        name = KINDS[kind].noisy_column(plan)
         return observations(kind, columns | {name: found + sd * random.standard_normal(found.size)}, chambers)
     change = found[: len(plan)] + 1j * found[len(plan) :]
     return observations(kind, columns | _readings(kind, truth, change, random), chambers)

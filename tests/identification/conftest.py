@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ringbalance.identification.data.kinds import KINDS, template
+from ringbalance.identification.kinds.registry import template
 
 ROWS = {
     "trial_weight": ("0,0,10,90,a", "100,0,11.5,85,a", "100,180,9.2,97,a"),
@@ -14,6 +14,11 @@ ROWS = {
     "flow": ("20,4.1,a", "50,6.9,a", "100,10.2,a"),
     "pressure": ("44.5,0.25,210,a", "44.5,0.4,330,a"),
     "run_up": ("90,400,10,a", "200,900,30,a"),
+    "friction": ("0.0371,5200,a", "0.0330,8100,a"),
+    "tube_at_rest": ("100,1.2,1,180,998,1,a", "150,1.5,1,180,998,1,a"),
+    "vessel": ("1.5,4,10,1,293,1,1,a", "2.5,3,10,1,293,1,1,a"),
+    "wave_frequency": ("1.519,0.3333,a", "1.6,0.5,a"),
+    "vibration": ("62.2,4,a", "50.1,3,a"),
     "positioning": ("0.1,1.5,100,3,a", "0.2,1.5,100,8,a"),
 }
 
@@ -27,4 +32,4 @@ def filled(kind: str) -> str:
 @pytest.fixture(scope="session")
 def sound_files() -> dict[str, str]:
     """Text by kind."""
-    return {kind: filled(kind) for kind in KINDS}
+    return {kind: filled(kind) for kind in ROWS}

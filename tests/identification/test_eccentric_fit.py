@@ -19,12 +19,12 @@ from ringbalance.controller.eccentric_mass.scene_records import (
     eccentric_scene,
 )
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Identified
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import _offered_rows, _words_of, next_measurement
 from ringbalance.identification.parameters import FitError
-from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.paths import value_at, with_values_at
@@ -57,7 +57,7 @@ def observed(
 
 def run_up(true: EccentricScene, seed: int) -> Observations:
     plain = observed("run_up", {"speed": SPEEDS, "amplitude": np.ones(24), "phase": np.zeros(24)})
-    found = PREDICTED["run_up"].predict(true, plain, None)
+    found = KINDS["run_up"].predict(true, plain, None)
     draw = np.random.default_rng(seed).standard_normal(48)
     vector = (found + NOISE * draw).reshape(2, -1)
     amplitude, phase = np.hypot(*vector), np.arctan2(vector[1], vector[0])
@@ -67,7 +67,7 @@ def run_up(true: EccentricScene, seed: int) -> Observations:
 def positioning(true: EccentricScene, seed: int, noise: float = 0.002) -> Observations:
     times, volts = np.tile(np.linspace(0.05, 1.0, 10), 3), np.repeat([6.0, 9.0, 12.0], 10)
     columns = {"time": times, "voltage": volts, "speed": np.full(30, 10.5), "angle": np.zeros(30)}
-    found = PREDICTED["positioning"].predict(true, observed("positioning", columns), None)
+    found = KINDS["positioning"].predict(true, observed("positioning", columns), None)
     return observed(
         "positioning", columns | {"angle": found + noise * np.random.default_rng(seed).standard_normal(30)}
     )
@@ -119,11 +119,11 @@ def test_the_second_mass_moves_as_the_first_one_would_in_its_place(scene: Eccent
     )
     data = positioning(one, 4)
     second = replace(data, columns=dict(data.columns) | {"moved_mass": np.full(30, 2.0)})
-    predict = PREDICTED["positioning"].predict
+    predict = KINDS["positioning"].predict
     assert predict(other, second, None) == pytest.approx(predict(one, data, None), rel=1e-12)
     arms = {"masses.friction_arm[0]", "masses.friction_arm[1]"}
     for each, name in ((data, "masses.friction_arm[0]"), (second, "masses.friction_arm[1]")):
-        assert arms & set(PREDICTED["positioning"].informs(each)) == {name}
+        assert arms & set(KINDS["positioning"].informs(each)) == {name}
     found = fit(scene, data=[second], parameters=["masses.friction_arm[1]", "masses.friction_arm[0]"])
     assert found.parameters[0].verdict is Identified.IDENTIFIED
     assert found.parameters[1].verdict is Identified.STRUCTURALLY
@@ -147,7 +147,7 @@ def test_the_next_speed_narrows_as_expected(scene: EccentricScene) -> None:
     chosen = next(i for i in range(len(offered)) if _words_of(offered, i) == told.gains[0].candidate)
     speed = offered.columns["speed"][[chosen]]
     plain = observed("run_up", {"speed": speed, "amplitude": np.ones(1), "phase": np.zeros(1)})
-    real, imaginary = PREDICTED["run_up"].predict(first.scene, plain, None)
+    real, imaginary = KINDS["run_up"].predict(first.scene, plain, None)
     row = {
         "speed": speed,
         "amplitude": np.hypot([real], [imaginary]),
@@ -182,7 +182,7 @@ def test_a_mass_reaches_the_speed_at_which_motor_and_friction_balance(scene: Ecc
         "speed": np.full(2, speed),
         "angle": np.zeros(2),
     }
-    start, end = PREDICTED["positioning"].predict(stiff, observed("positioning", columns), None)
+    start, end = KINDS["positioning"].predict(stiff, observed("positioning", columns), None)
     arm = plant.friction_arm_1 * plant.moment
     a, b, c = arm, plant.drive_damping + 2 * arm * speed, arm * speed**2 - plant.drive_gain * volts
     steady = (-b + math.sqrt(b * b - 4 * a * c)) / (2 * a)
@@ -196,7 +196,7 @@ def test_a_long_motion_is_that_of_its_parts(scene: EccentricScene) -> None:
         many = np.ones(len(times))
         return {"time": np.array(times), "voltage": 9 * many, "speed": 10.5 * many, "angle": 0 * many}
 
-    predict = PREDICTED["positioning"].predict
+    predict = KINDS["positioning"].predict
     whole = predict(scene, observed("positioning", columns([60.0])), None)
     parts = predict(scene, observed("positioning", columns([20.0, 40.0, 60.0])), None)
     assert whole[0] == pytest.approx(parts[-1], rel=1e-4)
@@ -210,7 +210,7 @@ def test_friction_holds_a_small_voltage(scene: EccentricScene) -> None:
         "angle": np.zeros(1),
     }
     stiff = with_values_at(scene, {"rotor.stiffness": 1e7})
-    assert PREDICTED["positioning"].predict(stiff, observed("positioning", columns), None)[0] == 0.0
+    assert KINDS["positioning"].predict(stiff, observed("positioning", columns), None)[0] == 0.0
 
 
 def test_every_uncertain_quantity_can_be_changed(scene: EccentricScene) -> None:

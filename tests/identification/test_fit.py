@@ -12,12 +12,12 @@ from scipy.stats import t as student_t
 from synthetic_rigs import covered, fitted, measured, observations, rig
 
 from ringbalance.identification.balancers import model_errors
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import fit, problem_of
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.parameters import FitError
-from ringbalance.identification.predict.device import Models
-from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
@@ -124,7 +124,7 @@ def test_held_inputs_widen_the_interval(paper_scene: Scene) -> None:
 def injected(scene: Scene, *, sd: float) -> Observations:
     """Injections with a reading of its own before and after each, and its noise stated."""
     plan = measured("injection", scene, Models.of(scene), np.random.default_rng(11))
-    found = PREDICTED["injection"].predict(scene, plan, Models.of(scene))
+    found = KINDS["injection"].predict(scene, plan, Models.of(scene))
     rows, random = len(plan), np.random.default_rng(12)
     noise = sd * (random.standard_normal((2, rows)) + 1j * random.standard_normal((2, rows)))
     before, after = START + noise[0], START + found[:rows] + 1j * found[rows:] + noise[1]
@@ -148,7 +148,7 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
     The errors of the models are in the covariance.  The grid is sheared along the ridge, which keeps the area
     of its cells.
     """
-    kind, models = PREDICTED["injection"], Models.of(scene)
+    kind, models = KINDS["injection"], Models.of(scene)
     covariance = sd**2 * np.eye(2 * len(data))
     for name in model_errors(scene):
         low, high = (kind.predict(with_model_error(scene, name, n), data, models) for n in (-1, 1))
@@ -164,7 +164,7 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
             bore, factor = places[i, j] = values + widths * offset
             moved = with_value(scene=scene, quantity="bore", value=float(bore))
             moved = with_value(scene=moved, quantity="lambda_factor", value=float(factor))
-            left = kind.measured(data) - kind.predict(moved, data, models)
+            left = kind.numbers(data) - kind.predict(moved, data, models)
             log_density[i, j] = (
                 -(left @ precision @ left + ((bore - scene.tube.bore) / (5e-5 / 1.96)) ** 2) / 2
             )
@@ -196,7 +196,7 @@ def test_a_held_input_that_the_data_pull_off_its_statement(paper_scene: Scene) -
     plan = observations(
         "pressure", {"radius": np.linspace(0.04, 0.0445, 6), "fill_ratio": 0.25, "pressure": 1.0}
     )
-    right = PREDICTED["pressure"].predict(scene, plan, Models.of(scene))
+    right = KINDS["pressure"].predict(scene, plan, Models.of(scene))
     data = replace(
         plan,
         columns=dict(plan.columns) | {"pressure": 1.03 * right},

@@ -18,8 +18,8 @@ from ringbalance.identification.balancers import informed
 from ringbalance.identification.criticism.law_comparison import LawComparison
 from ringbalance.identification.criticism.residual_tests import Criticism
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.kinds import KINDS, template
-from ringbalance.identification.data.reading import _observations_of, read_observations
+from ringbalance.identification.kinds.registry import KINDS, template
+from ringbalance.identification.reading import observations_of, read_observations
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -240,7 +240,7 @@ def test_the_page_has_every_kind_and_its_example_can_be_read(paper_scene: Scene)
     page = generated_docs.text_of("docs/fit.md")
     assert generated_docs.fresh(page, generated_docs.PARTS["docs/fit.md"]()) == page
     example = page.split("## Files of measurements")[1].split("```")[1].lstrip("\n")
-    found, faults = _observations_of(example.encode(), file="example", scene=paper_scene)
+    found, faults = observations_of(example.encode(), file="example", scene=paper_scene)
     assert faults == ()
     assert found is not None
     assert len(found) == 3

@@ -9,8 +9,8 @@ import foreign_rigs
 import pytest
 
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.reading import read_observations
 from ringbalance.identification.fitting import fit
+from ringbalance.identification.reading import read_observations
 from ringbalance.identification.result import FitResult
 from ringbalance.scene import load_scene
 

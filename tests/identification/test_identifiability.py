@@ -10,11 +10,11 @@ import numpy.typing as npt
 import pytest
 from synthetic_rigs import READINGS, observations
 
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import DEPENDENT, Identified, _power_text
-from ringbalance.identification.predict.device import Models
-from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -38,13 +38,13 @@ def noisy(
 ) -> Observations:
     """What a scene measures, to a thousandth."""
     plan = observations(kind, columns, chambers)
-    found = PREDICTED[kind].predict(scene, plan, Models.of(scene))
+    found = KINDS[kind].predict(scene, plan, Models.of(scene))
     random = np.random.default_rng(1)
     seen = found + 1e-3 * np.sqrt(np.mean(found**2)) * random.standard_normal(found.size)
     if kind == "trial_weight":
         vector = 1e-5 + seen[: len(plan)] + 1j * seen[len(plan) :]
         return observations(kind, columns | {"amplitude": np.abs(vector), "phase": np.angle(vector)})
-    return observations(kind, columns | {PREDICTED[kind].column(plan): seen}, chambers)
+    return observations(kind, columns | {KINDS[kind].noisy_column(plan): seen}, chambers)
 
 
 def pressures(scene: Scene, *, speeds: npt.ArrayLike | None = None) -> Observations:
@@ -119,7 +119,7 @@ def injections(
     }
     chambers = [("ABCD" * rows)[i] for i in range(rows)]
     plan = observations("injection", columns, chambers)
-    found = PREDICTED["injection"].predict(scene, plan, Models.of(scene))
+    found = KINDS["injection"].predict(scene, plan, Models.of(scene))
     error = noise * (random.standard_normal((2, rows)) + 1j * random.standard_normal((2, rows)))
     after, before = 1e-6 + found[:rows] + 1j * found[rows:] + error[0], 1e-6 + error[1]
     readings: tuple[FloatArray, ...] = (np.abs(before), np.angle(before), np.abs(after), np.angle(after))

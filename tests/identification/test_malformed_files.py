@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from ringbalance.cli import main
-from ringbalance.identification.data.kinds import KINDS
-from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.data.reading import read_observations
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.identification.reading import read_observations
 from ringbalance.scene import SceneError, bundled_scene
 from ringbalance.scene.faults import MOST_SHOWN
 from ringbalance.scene.models import Scene

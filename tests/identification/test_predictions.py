@@ -12,9 +12,9 @@ from synthetic_rigs import READINGS, observations
 
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.predict.device import Device, Models
-from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.device import Device, Models
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrated_model
@@ -27,7 +27,7 @@ from ringbalance.scene.uncertain import with_value
 
 
 def predicted(scene: Scene, data: Observations) -> FloatArray:
-    return PREDICTED[data.kind].predict(scene, data, Models.of(scene))
+    return KINDS[data.kind].predict(scene, data, Models.of(scene))
 
 
 def test_the_quick_law_is_the_calibrated_one(paper_scene: Scene) -> None:
@@ -88,7 +88,7 @@ def _misses_a_line(scene: Scene, models: Models) -> float:
     places = np.linspace(0.45, 0.55, 5)
     moved = np.array(
         [
-            PREDICTED["injection"].predict(
+            KINDS["injection"].predict(
                 with_value(scene=scene, quantity="hump_position", value=place), data, models
             )
             for place in places.tolist()
@@ -164,7 +164,7 @@ def test_the_vibration_without_weight_is_free_in_each_series(paper_scene: Scene)
         observations("trial_weight", {"unbalance": [0, 1e-4, 0, 1e-4], "angle": [0, 1, 0, 1]}),
         series=np.array(["a", "a", "b", "b"]),
     )
-    effect = PREDICTED["trial_weight"].free
+    effect = KINDS["trial_weight"].free
     assert effect is not None
     free = effect(data)
     assert np.linalg.matrix_rank(free) == 4
@@ -200,7 +200,7 @@ def test_errors_of_readings_that_serve_twice(shared: bool) -> None:
         changes = errors[:, 1:] - errors[:, :-1]
     else:
         changes = np.diff(random.standard_normal((200_000, 3, 2)), axis=2)[:, :, 0]
-    np.testing.assert_allclose(PREDICTED["injection"].covariance(data)[:3, :3], np.cov(changes.T), atol=0.03)
+    np.testing.assert_allclose(KINDS["injection"].covariance(data)[:3, :3], np.cov(changes.T), atol=0.03)
 
 
 def test_a_stated_noise_of_amplitude_and_phase() -> None:
@@ -215,7 +215,7 @@ def test_a_stated_noise_of_amplitude_and_phase() -> None:
         1j * (0.7 + 0.01 / 1.96 * random.standard_normal(400_000))
     )
     expected = np.cov(np.stack([seen.real, seen.imag]))
-    np.testing.assert_allclose(PREDICTED["trial_weight"].covariance(data), expected, rtol=0.02)
+    np.testing.assert_allclose(KINDS["trial_weight"].covariance(data), expected, rtol=0.02)
 
 
 @pytest.mark.parametrize(
@@ -232,7 +232,7 @@ def test_a_stated_noise_of_numbers(kind: str, column: str) -> None:
     """95 of 100 normal errors of the covariance lie within the stated uncertainty, row by row."""
     stated = np.array([0.02, 0.3])
     data = replace(observations(kind, {column: [1.0, 2.0]}), uncertainty={column: stated})
-    covariance = PREDICTED[kind].covariance(data)
+    covariance = KINDS[kind].covariance(data)
     errors = np.random.default_rng(4).multivariate_normal(np.zeros(2), covariance, size=100_000)
     np.testing.assert_allclose(np.mean(np.abs(errors) <= stated, axis=0), 0.95, atol=0.005)
     assert covariance[0, 1] == 0

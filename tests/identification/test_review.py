@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, Review, _power_of
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.device import Device, Models
 from ringbalance.identification.fitting import fit
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import (
     NextMeasurement,
     _offered_rows,
     _words_of,
     next_measurement,
 )
-from ringbalance.identification.predict.device import Device, Models
-from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
 from ringbalance.scene import bundled_scene, load_scene
@@ -54,7 +54,7 @@ def transfers(
 ) -> Observations:
     """Volumes moved, with a noise of one per cent."""
     plain = observed("transfer", SET | {"volume": np.ones(ROWS)}, {})
-    volume = PREDICTED["transfer"].predict(true, plain, models)
+    volume = KINDS["transfer"].predict(true, plain, models)
     sigma = share * volume
     noisy = volume + sigma * np.random.default_rng(seed).standard_normal(ROWS)
     return replace(
@@ -137,7 +137,7 @@ def test_the_expected_gain_is_that_of_fits_made_again(
     best = first.optimum
     offered = _offered_rows(best.residuals.problem.scene_at(best.t), "transfer", data)
     chosen = next(g for g in told.gains if g.candidate == _words_of(offered, row))
-    volume = PREDICTED["transfer"].predict(first.scene, offered, Models.of(paper_scene))
+    volume = KINDS["transfer"].predict(first.scene, offered, Models.of(paper_scene))
     more = replace(some(offered, [row], volume=volume[[row]]), file="more.csv")
     again = fit(paper_scene, data=[data, more], parameters=["bore"])
     widths = [r.parameters[0].profile.high - r.parameters[0].profile.low for r in (first, again)]

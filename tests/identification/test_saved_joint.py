@@ -15,9 +15,9 @@ from synthetic_rigs import Rig, fitted, rig
 from ringbalance.cli import main
 from ringbalance.controller.members import Members, MemberUncertainty
 from ringbalance.identification.balancers import changed
-from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.predict.device import Device, Models
-from ringbalance.identification.predict.kinds import PREDICTED
+from ringbalance.identification.device import Device, Models
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
 from ringbalance.mesh.geometry import chamber_volume
@@ -54,15 +54,15 @@ def saved(made: Rig, result: FitResult, folder: Path) -> Scene:
 
 
 def predicted(scene: Scene, data: Observations) -> FloatArray:
-    return PREDICTED[data.kind].predict(scene, data, Models.of(scene))
+    return KINDS[data.kind].predict(scene, data, Models.of(scene))
 
 
 def slope(scene: Scene, data: Observations) -> float:
     """Of data over prediction, without the vibration that is no quantity of the device."""
-    kind = PREDICTED[data.kind]
-    x, y = predicted(scene, data), kind.measured(data)
-    if kind.free is not None:
-        starts = kind.free(data)
+    kind = KINDS[data.kind]
+    x, y = predicted(scene, data), kind.numbers(data)
+    starts = kind.free(data)
+    if starts.size:
         x, y = (v - starts @ np.linalg.lstsq(starts, v, rcond=None)[0] for v in (x, y))
     return float(x @ y / (x @ x))
 

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.data.measurements import Observations
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Identified
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import next_measurement
-from ringbalance.identification.predict.kinds import PREDICTED
 from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.verification.validation.kinds import measurements
+from ringbalance.verification.validation.comparison import measurements
 
 WASHER, WASHER_95 = 12.4e-6, 0.5e-6
 """kg m; the second one is the expanded uncertainty (95 %) of each washer."""
@@ -60,7 +60,7 @@ def test_amplitudes_alone_give_the_coefficient(paper_scene: Scene) -> None:
     true = rotor(paper_scene, coefficient=1.3, amplitude=9e-6, phase=-2.0)
     unbalance = np.append(0.0, np.full(8, 6e-6))
     angle = np.append(0.0, np.tile(np.radians([0.0, 90.0, 180.0, 270.0]), 2))
-    exact = PREDICTED["trial_amplitude"].predict(true, observed(unbalance, angle, unbalance, None), None)
+    exact = KINDS["trial_amplitude"].predict(true, observed(unbalance, angle, unbalance, None), None)
     noisy = exact + 0.05e-6 * np.random.default_rng(1).standard_normal(9)
     result = fit(rotor(paper_scene), data=[observed(unbalance, angle, noisy, None)])
     low, high = result.parameter("influence_coefficient").interval
@@ -75,7 +75,7 @@ def test_amplitudes_alone_give_the_coefficient(paper_scene: Scene) -> None:
 def test_phase_and_lag_are_not_identified_by_themselves(paper_scene: Scene) -> None:
     unbalance, angle = np.repeat([0.0, 6e-6], [1, 4]), np.radians([0.0, 0.0, 90.0, 180.0, 270.0])
     scene = rotor(paper_scene)
-    exact = PREDICTED["trial_amplitude"].predict(scene, observed(unbalance, angle, unbalance, None), None)
+    exact = KINDS["trial_amplitude"].predict(scene, observed(unbalance, angle, unbalance, None), None)
     data = observed(unbalance, angle, exact, np.full(5, 0.1e-6))
     result = fit(scene, data=[data], parameters=["lag_angle", "initial_phase"])
     assert {each.verdict for each in result.parameters} == {Identified.STRUCTURALLY}

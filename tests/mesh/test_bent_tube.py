@@ -64,26 +64,3 @@ def test_nodes_stand_at_their_stations_on_their_section_nodes() -> None:
     left = offset[1] * tangent[0] - offset[0] * tangent[1]
     assert np.allclose(left, section.doflocs[0, tube.section_node])
     assert np.allclose(tube.mesh.doflocs[2], section.doflocs[1, tube.section_node])
-
-
-def test_every_slab_has_the_sections_cells() -> None:
-    tube = _tube()
-    assert np.array_equal(np.bincount(tube.slab), np.full(8, 24))
-    middle = np.asarray(tube.half_station)[Basis(tube.mesh, ElementHex2()).element_dofs[-1]]
-    assert np.array_equal(middle, 2 * tube.slab + 1)
-
-
-@pytest.mark.parametrize(
-    "segments",
-    [
-        (),
-        (Segment(length=0.0),),
-        (Segment(length=1.0, cells=0),),
-        (Segment(length=1.0, ratio=0.0),),
-        (Segment(length=0.5, turn=1.1),),
-    ],
-)
-def test_impossible_paths_are_refused(segments: tuple[Segment, ...]) -> None:
-    section = SectionMesh(around=2, across=2).mesh()
-    with pytest.raises(ValueError, match=r"segments|tight"):
-        swept_tube(section=section, segments=segments)

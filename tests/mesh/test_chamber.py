@@ -45,13 +45,6 @@ def test_every_boundary_facet_has_one_name(disc: Disc) -> None:
         assert np.array_equal(np.sort(named), np.sort(mesh.boundary_facets()))
 
 
-def test_nodes_on_a_plate_are_evenly_spaced(disc: Disc) -> None:
-    chamber = chamber_mesh(disc=disc, surface_radius=25e-3, cells=(4, 8))
-    face = chamber.places[:, chamber.grid[:, -1]]
-    steps = np.hypot(*np.diff(face, axis=1))
-    np.testing.assert_allclose(steps, steps[0], rtol=1e-12)
-
-
 def test_surface_radii_are_kept_as_given(disc: Disc) -> None:
     radii = np.linspace(30e-3, 36e-3, 17)
     chamber = chamber_mesh(disc=disc, surface_radius=radii, cells=(2, 8))
@@ -67,13 +60,6 @@ def test_cells_stay_square_down_to_a_micrometre(disc: Disc, depth: float, cells:
     assert chamber.quality()[0] > 0.95
     assert chamber.mesh.nelements == np.prod(cells)
     assert chamber.mesh.doflocs.shape[1] == np.prod([2 * n + 1 for n in cells])
-
-
-def test_aspect_is_that_of_the_cells(disc: Disc) -> None:
-    sector = replace(disc, plate_thickness=0.0)
-    chamber = chamber_mesh(disc=sector, surface_radius=44e-3, cells=(1, 10))
-    longest = disc.outer_radius * disc.central_angle / 10
-    assert chamber.quality()[1] == pytest.approx(longest / 0.5e-3, rel=0.02)
 
 
 def test_a_folded_cell_is_seen(disc: Disc) -> None:

@@ -186,22 +186,6 @@ def test_what_facets_may_miss_holds_what_they_miss(disc: Disc, kind: CellKind) -
     assert np.all(np.abs(centres[0] - centres[1]) < error.centroid)
 
 
-def test_flat_walls_miss_nothing() -> None:
-    assert drawing_error(box(kind="tetra"), fill_ratio=np.array([0.3])).volume == pytest.approx(
-        TOLERANCE * (X1 - X0) * 2 * HALF * WIDTH, rel=1e-3
-    )
-
-
-def test_empty_and_full_chambers_end_at_the_walls(disc: Disc) -> None:
-    meshed = replace(disc, geometry=disc_chamber(disc, (2, 8, 1), kind="tetra10"))
-    empty, full = surface_radius(disc=meshed, fill_ratio=[0.0, 1.0])
-    for each in (liquid_area, liquid_first_moment, wall_square):
-        held, whole = (each(disc=meshed, surface_radius=a) for a in (empty, full))
-        assert abs(held) <= 1e-15 * whole
-    whole = disc.axial_width * liquid_area(disc=meshed, surface_radius=full)
-    assert whole == pytest.approx(chamber_volume(disc=meshed), rel=1e-15)
-
-
 @pytest.mark.parametrize("quantity", ["outer_radius", "inner_radius", "axial_width", "central_angle"])
 def test_a_stretched_chamber_has_the_table_of_its_mesh_moved(disc: Disc, quantity: str) -> None:
     """Stretched sectors stay sectors; the integrals over the moved nodes are made again for comparison."""
@@ -237,19 +221,6 @@ def test_a_stretched_chamber_beside_its_middle_keeps_its_moment_across(disc: Dis
     columns = chamber_table(moved).columns[:, 0]
     angle = turn * (1.05 if quantity == "central_angle" else 1.0)
     assert columns[2] / columns[1] == pytest.approx(np.tan(angle), rel=2e-4)
-
-
-def test_a_chamber_stretched_twice_comes_from_its_own_mesh(disc: Disc) -> None:
-    geometry = disc_chamber(disc, (2, 8, 1), kind="hexahedron27")
-    dimensions = {name: getattr(disc, name) for name in STRETCHED}
-    once = geometry.stretched(dimensions=dimensions, quantity="outer_radius", value=45e-3)
-    twice = once.stretched(
-        dimensions=dimensions | {"outer_radius": 45e-3}, quantity="axial_width", value=31e-3
-    )
-    assert twice.stretch is not None
-    assert twice.stretch.base is geometry
-    volumes = [chamber_table(each).volume for each in (once, twice)]
-    assert volumes[1] == pytest.approx(volumes[0] / 2, rel=1e-12)
 
 
 def test_a_surface_that_crosses_one_edge_of_a_wall_twice() -> None:

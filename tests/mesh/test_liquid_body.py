@@ -84,11 +84,6 @@ def test_a_tilted_surface_is_followed() -> None:
     assert np.abs(level.value(_surface(body))).max() < 1e-9
 
 
-def test_a_body_of_linear_cells_has_a_curved_surface_on_straight_walls() -> None:
-    body = liquid_body(_sector(6, "hexahedron"), Level(constant=0.7**2 / 2))
-    assert np.abs(np.hypot(*_surface(body)[:, :2].T) - 0.7).max() < 1e-9
-
-
 def test_a_rib_on_the_wall_and_nameless_walls_stay() -> None:
     def ribbed(cube: np.ndarray) -> np.ndarray:
         bulge = 0.1 * np.exp(-(((cube[..., 1] - 0.5) / 0.1) ** 2))
@@ -105,9 +100,3 @@ def test_a_rib_on_the_wall_and_nameless_walls_stay() -> None:
     assert body.names == ("outer_wall", "end_back", "other_walls", FREE_SURFACE)
     angle = np.arctan2(*_surface(body)[:, 1::-1].T)
     assert np.abs(angle).min() > 0.05
-
-
-@pytest.mark.parametrize("radius", [0.4, 1.1])
-def test_a_surface_outside_the_chamber_is_refused(radius: float) -> None:
-    with pytest.raises(ValueError, match="surface radius"):
-        liquid_body(_sector(2), Level(constant=radius**2 / 2))

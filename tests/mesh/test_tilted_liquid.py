@@ -90,13 +90,6 @@ def test_added_liquid_enters_at_the_surface() -> None:
     np.testing.assert_allclose(found.centroid[1], change, rtol=1e-5)
 
 
-def test_a_flat_wall_that_is_dry_in_its_middle_holds_a_closed_ring() -> None:
-    found = tilted_liquid(table(), length=1e-4, vertical=False, turn=4, fills=(0.005, 0.05, 0.8))
-    assert np.all(found.closed)
-    deep = tilted_liquid(table(), length=5e-3, vertical=False, turn=4, fills=(0.001, 0.8))
-    assert not np.any(deep.closed[0])
-
-
 def test_a_flat_wall_that_gravity_dries_in_its_middle_holds_no_closed_ring() -> None:
     """The concentric surface leaves 0.05 mm there, less than gravity takes unless it points to the wall."""
     a, length = X1 - 5e-5, 3e-3

@@ -132,11 +132,3 @@ def test_curvature_counts_as_rotation() -> None:
     )
     assert against < 0.0 < along
     assert gentle == pytest.approx(0.0, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("re", "rotation"), [(0.0, 1.0), (-1.0, 1.0), (np.nan, 1.0), (1.0, -1.0), (1.0, np.inf)]
-)
-def test_bad_numbers_are_refused(re: float, rotation: float) -> None:
-    with pytest.raises(ValueError, match="reynolds"):
-        BentTubeFlow.of(segments=STRAIGHT, cells=COARSE, reynolds=re, rotation_reynolds=rotation)

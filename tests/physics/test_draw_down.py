@@ -103,9 +103,3 @@ def test_liquid_below_the_port_feeds_it_with_less_head() -> None:
     )
     inviscid = float(draw_down_depth(flow_rate=5e-6, acceleration=PULL, bore=BORE))
     assert inviscid < above < inviscid + 0.02 * (on_the_wall - inviscid)
-
-
-@pytest.mark.parametrize("acceleration", [0.0, -1.0, math.inf, math.nan])
-def test_a_disc_at_rest_is_refused(acceleration: float) -> None:
-    with pytest.raises(ValueError, match="at rest"):
-        draw_down_depth(flow_rate=1e-5, acceleration=acceleration, bore=BORE)

@@ -140,48 +140,6 @@ def test_impossible_sequences_are_refused(values: tuple[float, ...], sizes: tupl
         gci(values=values, sizes=sizes, formal_order=2.0)
 
 
-@pytest.mark.parametrize("order", [1.0, 2.0, 3.5])
-def test_least_squares_finds_a_pure_power(order: float) -> None:
-    sizes = (1.0, 1.5, 2.0, 3.0, 4.0)
-    found = gci(values=sequence(order, sizes), sizes=sizes, formal_order=4.0)
-    assert found.observed_order == pytest.approx(order, rel=1e-4)
-    assert found.extrapolated == pytest.approx(1.0, abs=1e-5)
-    assert found.uncertainty == pytest.approx(0.125, rel=1e-3)
-
-
-def test_least_squares_sees_through_scatter() -> None:
-    sizes = tuple(np.linspace(1, 3, 7))
-    noise = 2e-3 * np.array([1, -1, 1, -1, 1, -1, 1])
-    values = np.array(sequence(2.0, sizes)) + noise
-    found = gci(values=list(values), sizes=sizes, formal_order=2.0)
-    assert found.observed_order == pytest.approx(2.0, abs=0.3)
-    assert abs(values[0] - 1.0) <= found.uncertainty <= 0.3
-
-
-def test_least_squares_beyond_the_formal_order_falls_back_and_covers() -> None:
-    sizes = (1.0, 1.5, 2.0, 3.0)
-    found = gci(values=sequence(5.0, sizes, 1e-3), sizes=sizes, formal_order=2.0)
-    assert found.order <= 2.0
-    assert found.uncertainty >= 1e-3
-    assert found.verdict is GridVerdict.NOT_ASYMPTOTIC
-
-
-def test_least_squares_calls_growing_changes_diverging() -> None:
-    values = [1.0 + 0.1 * np.log(h) for h in (1, 2, 4)] + [1.0 + 0.1 * np.log(5)]
-    found = gci(
-        values=[-v / h for v, h in zip(values, (1, 2, 4, 5), strict=True)],
-        sizes=(1, 2, 4, 5),
-        formal_order=2.0,
-    )
-    assert found.verdict is GridVerdict.DIVERGING
-
-
-def test_least_squares_says_oscillation() -> None:
-    found = gci(values=(1.0, 1.2, 0.9, 1.3, 0.8), sizes=(1, 2, 3, 4, 5), formal_order=2.0)
-    assert found.verdict is GridVerdict.OSCILLATORY
-    assert found.uncertainty >= 0.2
-
-
 @given(
     changes=st.tuples(*[st.floats(-1e3, 1e3, allow_subnormal=False)] * 2),
     start=st.floats(-1e3, 1e3),

@@ -56,16 +56,5 @@ def test_all_loads_together_are_the_centrifugal_force_and_the_weight() -> None:
     assert ring.volume == pytest.approx(_ANGLE / 2 * _WIDTH * (1 - _A**2), rel=1e-5)
 
 
-def test_gas_pressure_adds_to_the_wall() -> None:
-    low, high = _ring(3), _ring(3, gas_pressure=1e5)
-    assert high.wall_pressure.value - low.wall_pressure.value == pytest.approx(1e5, rel=1e-9)
-
-
 def test_gravity_stronger_than_the_spin_leaves_no_ring() -> None:
     assert _ring(2, gravity=(0.8 * _OMEGA**2, 0.0, 0.0)).status.code is StatusCode.NO_RING
-
-
-def test_impossible_values_are_refused() -> None:
-    geometry = sector_chamber((1, 2, 1), radii=(0.5, 1.0), angle=_ANGLE, width=_WIDTH)
-    with pytest.raises(ValueError, match="density"):
-        solved_ring(geometry=geometry, density=0.0, angular_velocity=1.0, surface_radius=0.7)

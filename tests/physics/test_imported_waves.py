@@ -88,9 +88,3 @@ def test_a_full_ring_has_no_ends_and_is_refused() -> None:
     geometry = sector_chamber((2, 16, 2), radii=(0.5, 1.0), angle=2 * np.pi, width=1.0)
     with pytest.raises(NoPlaneWavesError):
         middle_section(geometry, surface_radius=0.75)
-
-
-def test_a_surface_that_leaves_no_liquid_is_refused() -> None:
-    geometry = sector_chamber((2, 4, 2), radii=(0.5, 1.0), angle=1.0, width=1.0)
-    with pytest.raises(ValueError, match="surface radius"):
-        middle_section(geometry, surface_radius=1.1)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ringbalance.mesh.chamber import chamber_mesh
@@ -126,16 +123,6 @@ def test_an_empty_chamber_is_exact(disc: Disc, paper_ring: RingQuantities) -> No
     assert film.moment_per_volume.value[0] == pytest.approx(limit, rel=1e-6)
 
 
-def test_moment_per_volume_is_the_derivative_of_the_moment(disc: Disc) -> None:
-    step = 1e-3
-    ring = ring_quantities(
-        disc=disc, density=RHO, angular_velocity=OMEGA, fill_ratio=[0.3 - step, 0.3, 0.3 + step]
-    )
-    rise = ring.moment.value[2] - ring.moment.value[0]
-    slope = rise / (2 * step * chamber_volume(disc=disc))
-    assert ring.moment_per_volume.value[1] == pytest.approx(slope, rel=1e-6)
-
-
 def test_three_dimensions_agree_with_two(disc: Disc) -> None:
     arguments: dict[str, Any] = {
         "disc": disc,
@@ -250,46 +237,3 @@ def test_half_widths_cover_and_are_not_padded() -> None:
 @pytest.mark.heavy
 def test_half_widths_cover_and_are_not_padded_on_many_discs() -> None:
     judge(coverage(200, seed=2))
-
-
-@given(
-    fills=st.tuples(st.floats(0.01, 0.99), st.floats(0.01, 0.99)),
-    angle=st.floats(0.4, np.pi),
-    plate=st.floats(0.0, 0.6),
-)
-def test_more_liquid_means_more_pressure_moment_and_less_reach(
-    fills: tuple[float, float], angle: float, plate: float
-) -> None:
-    disc = Disc(
-        outer_radius=0.08,
-        inner_radius=0.03,
-        axial_width=0.04,
-        central_angle=angle,
-        chambers=2,
-        plate_thickness=plate * 0.03 * np.sin(angle / 2),
-        max_fill_ratio=0.5,
-        initial_fill=0.25,
-    )
-    low, high = sorted(fills)
-    high = max(high, low + 0.005)
-    ring = ring_quantities(
-        disc=disc,
-        density=RHO,
-        angular_velocity=300.0,
-        fill_ratio=[low, high],
-        cells=[(4, 12), (2, 6), (1, 3)],
-    )
-    for name in ("liquid_volume", "wall_pressure", "moment"):
-        value = getattr(ring, name).value
-        assert value[1] > value[0] > 0
-        assert np.all(np.isfinite(getattr(ring, name).uncertainty))
-    assert ring.moment_per_volume.value[1] < ring.moment_per_volume.value[0]
-
-
-def test_without_plates_eq_7_of_the_paper_is_the_moment(disc: Disc) -> None:
-    """Eq. 7 of the liquid-ring paper leaves the plates out; without them it must be what is found."""
-    sector = replace(disc, plate_thickness=0.0)
-    ring = ring_quantities(disc=sector, density=RHO, angular_velocity=OMEGA, fill_ratio=[0.5])
-    cubes = sector.outer_radius**3 - ring.surface_radius[0] ** 3
-    paper = 2 / 3 * RHO * sector.axial_width * cubes * np.sin(sector.central_angle / 2)
-    assert abs(ring.moment.value[0] - paper) <= ring.moment.uncertainty[0]

@@ -194,10 +194,3 @@ def test_a_broken_ring_is_said_and_its_values_are_wide(disc: Disc) -> None:
     assert ring.moment.uncertainty[1] > 0.1 * exact["moment"]
     assert ring.moment_per_volume.uncertainty[0] > 0
     assert np.all(np.isfinite(ring.wall_pressure.value))
-
-
-def test_too_slow_a_disc_has_no_ring_at_any_fill(disc: Disc) -> None:
-    ring = ring_quantities(disc=disc, density=RHO, angular_velocity=10.0, fill_ratio=[0.2, 0.4], gravity=G)
-    assert ring.status.code is StatusCode.NO_RING
-    assert not np.any(ring.closed)
-    assert "rpm" in ring.status.text

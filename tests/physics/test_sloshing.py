@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from skfem import Basis, ElementQuad2, FacetBasis, LinearForm, condense, solve
-from skfem.models.poisson import laplace
 
-from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing import SloshingResponse, resonant_fills, sloshing_modes, sloshing_response
@@ -171,84 +168,6 @@ def test_a_peak_within_the_interval_is_found(disc: Disc) -> None:
     assert there.amplification_interval[0, 1] == pytest.approx(peak, rel=0.1)
 
 
-class Potential:
-    """phi of a stream function on the free surface of a chamber with plates, solved for on the same mesh."""
-
-    def __init__(self, disc: Disc, *, radius: float, cells: tuple[int, int]) -> None:
-        chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
-        self.mesh, self.grid = chamber.mesh, chamber.grid
-        self.basis = Basis(self.mesh, ElementQuad2())
-
-    def of(self, psi: Any, nodes: Any) -> tuple[Any, Any]:
-        """int grad phi . grad v = int rot psi . grad v; psi and phi at all nodes."""
-        fixed = np.zeros(self.basis.N)
-        fixed[nodes] = psi
-        rim = [self.grid[0], self.grid[-1], self.grid[:, 0], self.grid[:, -1]]
-        stiff = laplace.assemble(self.basis)
-        stream = solve(*condense(stiff, x=fixed, D=np.unique(np.concatenate(rim))))
-
-        @LinearForm  # type: ignore[untyped-decorator]  # scikit-fem has no types
-        def turned(v: Any, w: Any) -> Any:
-            return w["psi"].grad[1] * v.grad[0] - w["psi"].grad[0] * v.grad[1]
-
-        load = turned.assemble(self.basis, psi=self.basis.interpolate(stream))
-        return stream, solve(*condense(stiff, load, D=np.array([0])))
-
-    def mean(self, values: Any, row: int) -> float:
-        """Over the surface (0) or the outer wall (-1)."""
-        own = FacetBasis(self.mesh, ElementQuad2(), facets="outer_wall" if row else "free_surface")
-        return float(np.sum(own.interpolate(values) * own.dx) / np.sum(own.dx))
-
-
-def test_the_mean_potential_on_the_wall_is_that_of_the_potential_itself(disc: Disc) -> None:
-    cells, a = (8, 24), 35e-3
-    system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
-    field = Potential(disc, radius=a, cells=cells)
-    x, y = field.mesh.doflocs[:, system.nodes]
-    angles = np.arctan2(y, x) - np.arctan2(y, x).mean()
-    half = disc.central_angle / 2 - np.arcsin(disc.plate_thickness / a)
-    psi = np.cos(np.pi / 2 * angles / half) + 0.3 * np.sin(np.pi * angles / half)
-    phi = field.of(psi, system.nodes)[1]
-    assert system.potential @ psi == pytest.approx(field.mean(phi, -1) - field.mean(phi, 0), rel=1e-4)
-    assert abs(system.potential @ psi) > 1e-4
-
-
-def test_pressure_of_the_forced_waves_stands_on_surface_and_wall(disc: Disc) -> None:
-    """With plates: p' = G + c - i s phi - 2 psi is a q/(i s) all along the surface, and its mean is ours."""
-    cells, fill, s = (8, 24), 0.3, 0.8
-    a = float(surface_radius(disc=disc, fill_ratio=fill))
-    system = sloshing_system(disc=disc, surface_radius=a, cells=cells)
-    swinging = -(s**2) * system.kinetic + 2j * s * system.coriolis + system.centrifugal
-    psi = np.linalg.solve(swinging, 1j * s * (system.outflow[1] + 1j * system.outflow[2]))
-    field = Potential(disc, radius=a, cells=cells)
-    parts = [field.of(part, system.nodes) for part in (psi.real, psi.imag)]
-    stream, phi = (one + 1j * other for one, other in zip(*parts, strict=True))
-    scale = np.hypot(*field.mesh.doflocs).max()
-    drive = (field.basis.doflocs[0] + 1j * field.basis.doflocs[1]) / scale
-
-    def mean(values: Any, row: int) -> complex:
-        return field.mean(values.real, row) + 1j * field.mean(values.imag, row)
-
-    pressure = drive - 1j * s * phi - 2 * stream
-    pressure = pressure - mean(pressure, 0)
-    surface = field.grid[0]
-    angle = np.angle(field.basis.doflocs[0][surface] + 1j * field.basis.doflocs[1][surface])
-    flux = -np.gradient(stream[surface], angle * a / scale)
-    inner = slice(8, -8)
-    error = pressure[surface] - a / scale * flux / (1j * s)
-    assert np.abs(error[inner]).max() < 0.02 * np.abs(pressure[surface]).max()
-    found = sloshing_response(
-        disc=disc,
-        fill_ratio=fill,
-        angular_velocity=OMEGA,
-        kinematic_viscosity=0.0,
-        gravity=9.81,
-        frequency_ratio=s,
-    )
-    still = mean(drive, -1) - mean(drive, 0)
-    assert found.pressure_amplification.value[0] == pytest.approx(abs(mean(pressure, -1) / still), rel=1e-3)
-
-
 def test_slow_forcing_only_tilts_the_surface(disc: Disc) -> None:
     found = sloshing_response(
         disc=disc,
@@ -329,17 +248,4 @@ def test_a_fill_without_a_ring_is_refused(disc: Disc, fill: float) -> None:
     with pytest.raises(ValueError, match="fill_ratio"):
         sloshing_response(
             disc=disc, fill_ratio=fill, angular_velocity=OMEGA, kinematic_viscosity=1e-6, gravity=9.81
-        )
-
-
-def test_nonsense_is_refused(disc: Disc) -> None:
-    with pytest.raises(ValueError, match="mode"):
-        sloshing_modes(disc=disc, fill_ratio=0.2, modes=0)
-    with pytest.raises(ValueError, match="three meshes"):
-        sloshing_modes(disc=disc, fill_ratio=0.2, cells=((8, 24), (4, 12)))
-    with pytest.raises(ValueError, match="at least one mode"):
-        resonant_fills(disc=disc, modes=0)
-    with pytest.raises(ValueError, match="angular_velocity"):
-        sloshing_response(
-            disc=disc, fill_ratio=0.2, angular_velocity=0.0, kinematic_viscosity=1e-6, gravity=9.81
         )

@@ -22,8 +22,6 @@ from ringbalance.scene.origins import Measured
 from ringbalance.scene.rules import shape, working
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
-TABLES = tuple(LIQUID_RING.tables)
-
 
 def _keys(table: str) -> set[str]:
     return set(LIQUID_RING.tables[table].keys) - {ORIGIN}
@@ -116,45 +114,3 @@ def test_derived_defaults_follow_from_what_is_known_before_them(schema: Schema) 
                 needed_table, needed_key = path.split(".")
                 assert needed_key in schema.tables[needed_table].keys
             pending.discard(f"{name}.{key}")
-
-
-def test_keys_of_the_device_as_built(
-    load: Callable[[Mapping[str, Any]], Scene], newcomer_document: dict[str, Any]
-) -> None:
-    """Left out: the defaults, marked as such; given: each as it stands in the file."""
-    scene = load(newcomer_document)
-    assert scene.controller.hold_time == pytest.approx(10 * 0.5)
-    assert (scene.gas.measured_at, scene.tube.hump_shape) == ("chamber", "arc")
-    assert scene.liquid.dissolved_gas == "saturated"
-    paths = {"controller.hold_time", "gas.measured_at", "tube.hump_shape", "liquid.dissolved_gas"}
-    assert paths <= set(scene.defaulted)
-    newcomer_document["controller"] = {"period": "0.2 s"}
-    assert load(newcomer_document).controller.hold_time == pytest.approx(2.0)
-    newcomer_document["controller"] |= {"hold_time": "3 s"}
-    newcomer_document["gas"]["measured_at"] = "shaft"
-    newcomer_document["tube"] |= {"hump_shape": "point", "hump_radius": "40 mm"}
-    newcomer_document["liquid"]["dissolved_gas"] = "none"
-    newcomer_document["uncertainty"] = {"hump_position": 0.1}
-    given = load(newcomer_document)
-    assert (given.controller.hold_time, given.gas.measured_at) == (3.0, "shaft")
-    assert (given.tube.hump_shape, given.liquid.dissolved_gas) == ("point", "none")
-    assert [(each.quantity, each.half_width, each.relative) for each in given.uncertainty] == [
-        ("hump_position", 0.1, False)
-    ]
-    assert not paths & set(given.defaulted)
-
-
-def test_what_stands_above_is_only_named() -> None:
-    alone = scene_reference.key_reference(ECCENTRIC_MASS, "title")
-    below = scene_reference.key_reference(ECCENTRIC_MASS, "title", above=LIQUID_RING)
-    assert "`time_limit`" in alone
-    assert "`time_limit`" not in below
-    assert "### [run], [accuracy], [fitted], [measured]" in below
-    # Of one name, but with other keys.
-    assert "`speed_profile`" in below
-
-
-def test_units_over_units_are_listed_once_each() -> None:
-    names = [f"{over}/{under}" for over in ("m", "mm", "um") for under in ("kg", "g", "mg")]
-    assert scene_reference._units(names) == "`m`, `mm`, `um` over `kg`, `g`, `mg`"
-    assert scene_reference._units(names[1:]) == ", ".join(f"`{name}`" for name in names[1:])

@@ -107,12 +107,3 @@ def test_what_lies_at_the_surface_is_found_by_its_fill(rule: str, radius: float,
     below, above = (RULES[rule](radius, fill * factor, *chamber) for factor in (1 - 1e-6, 1 + 1e-6))
     assert (above is None) == (rule == "port_under_liquid")
     assert (below is None) == (rule == "inlet_above_liquid")
-
-
-def test_the_fill_that_a_message_names_is_enough() -> None:
-    chamber = (0.0205, 0.0445, math.pi / 2, 0.002777)
-    found = RULES["port_under_liquid"](0.040, 0.2, *chamber)
-    assert found is not None
-    named = float(found.allowed.split()[-1])
-    assert RULES["port_under_liquid"](0.040, 1.01 * named / 2, *chamber) is None
-    assert RULES["port_under_liquid"](0.0445, 1e-6, *chamber) is None

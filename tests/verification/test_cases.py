@@ -21,7 +21,6 @@ from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import placeholders
 from ringbalance.verification.catalogue import case_code, load_cases
-from ringbalance.verification.document import case_document
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases
@@ -90,7 +89,7 @@ def test_every_text_finds_its_numbers(results: Mapping[str, CaseResult], case: s
     result = results[case]
     for text in result.definition.prose:
         assert "{" not in result.filled(text)
-    document = case_document(result)
+    document = result.to_dict()
     assert document["explanation"]
     assert document["consequence"]
     assert document["quantities"]
@@ -375,6 +374,6 @@ def test_the_readme_has_the_table_of_what_stands_behind_each_quantity(
     results: Mapping[str, CaseResult],
 ) -> None:
     page = text_of("README.md")
-    table = standing_table([case_document(results[case.id]) for case in load_cases()])
+    table = standing_table([results[case.id].to_dict() for case in load_cases()])
     assert fresh(page, {"standing": table}) == page
     assert "| Residual liquid over the port | no data |" in page

@@ -14,7 +14,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.cli import exit_code, verify
 from ringbalance.verification.evidence import Found
-from ringbalance.verification.runner import mutate_definition, run_definition
+from ringbalance.verification.runner import run_definition
 
 
 def test_json_is_one_clean_document(capsys: pytest.CaptureFixture[str]) -> None:
@@ -87,10 +87,9 @@ def test_only_code_verification_and_missed_defects_fail_the_run(
     assert exit_code([solution]) == 0
     assert exit_code([refuted, failed]) == 1
     blind = made_up_code(defect=lambda found, _, __: found)
-    mutations = mutate_definition(claim, blind, scene=paper_scene)
-    sound = run_definition(claim, blind, scene=paper_scene)
-    assert exit_code([sound]) == 0
-    assert exit_code([dataclasses.replace(sound, mutations=mutations)]) == 1
+    broken = run_definition(claim, blind, scene=paper_scene, mutations=True)
+    assert exit_code([broken]) == 1
+    assert exit_code([dataclasses.replace(broken, mutations=())]) == 0
 
 
 _VESSEL = (

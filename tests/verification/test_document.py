@@ -10,7 +10,6 @@ import pytest
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.document import case_document, definition_document, merge_saved
 from ringbalance.verification.evidence import (
     Axis,
     Curve,
@@ -21,6 +20,7 @@ from ringbalance.verification.evidence import (
     Reference,
     Series,
 )
+from ringbalance.verification.result import definition_document, merge_saved
 from ringbalance.verification.runner import run_definition
 
 PROMISED = {"id", "kind", "verdict", "quantities"}
@@ -29,7 +29,7 @@ PROMISED_OF_QUANTITY = {"name", "unit", "value", "reference", "error", "uncertai
 
 def test_what_is_promised_is_there(claim: CaseDefinition, made_up_code: Any, paper_scene: Scene) -> None:
     code = made_up_code(found=Found(value=10.2, input=0.05))
-    document = case_document(run_definition(claim, code, scene=paper_scene))
+    document = run_definition(claim, code, scene=paper_scene).to_dict()
     assert set(document) >= PROMISED
     (quantity,) = document["quantities"]
     assert set(quantity) >= PROMISED_OF_QUANTITY
@@ -46,7 +46,7 @@ def test_a_case_that_was_not_run_is_still_listed(
     def refuse(*_: object) -> Found:
         raise NotRunError("there is no disc")
 
-    document = case_document(run_definition(claim, made_up_code(defect=refuse), scene=paper_scene))
+    document = run_definition(claim, made_up_code(defect=refuse), scene=paper_scene).to_dict()
     assert document["verdict"] == "not run"
     assert document["cause"] == ""
     assert document["status"] == "there is no disc"
@@ -58,7 +58,7 @@ def test_a_case_that_was_not_run_is_still_listed(
 def test_a_bound_without_uncertainty_has_none(claim_text: str, made_up_code: Any, paper_scene: Scene) -> None:
     text = claim_text.replace('metric = "validation"', 'metric = "at_most"')
     bound = CaseDefinition.parse(text, source="x")
-    document = case_document(run_definition(bound, made_up_code(), scene=paper_scene))
+    document = run_definition(bound, made_up_code(), scene=paper_scene).to_dict()
     assert document["quantities"][0]["uncertainty"] == 0.0
 
 
@@ -74,7 +74,7 @@ def test_gaps_in_a_curve_become_null(claim: CaseDefinition, paper_scene: Scene) 
                 series=(Series(name="s", x=axis, y=(curve,)),),
             )
 
-    document = case_document(run_definition(claim, Gappy(), scene=paper_scene))
+    document = run_definition(claim, Gappy(), scene=paper_scene).to_dict()
     (series,) = document["series"]
     assert series["y"][0]["values"] == [1.0, None]
     assert series["x"] == {"name": "x", "unit": "s", "values": [0.0, 1.0]}

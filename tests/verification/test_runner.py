@@ -17,7 +17,7 @@ from ringbalance.verification import runner
 from ringbalance.verification.assumptions import overridden
 from ringbalance.verification.case import CaseDefinition
 from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference
-from ringbalance.verification.runner import mutate_definition, run_case, run_cases, run_definition
+from ringbalance.verification.runner import run_case, run_cases, run_definition
 from ringbalance.verification.verdicts import Verdict
 
 QUICK = ("gci_celik2008", "claim_02_ring_radius", "claim_12_correction_mass")
@@ -35,7 +35,8 @@ def test_every_mutation_is_run_and_caught(
     claim: CaseDefinition, verification: CaseDefinition, made_up_code: Any, paper_scene: Scene
 ) -> None:
     for definition in (claim, verification):
-        mutations = mutate_definition(definition, made_up_code(), scene=paper_scene)
+        result = run_definition(definition, made_up_code(), scene=paper_scene, mutations=True)
+        mutations = result.mutations
         assert [mutation.id for mutation in mutations] == ["off_by_one", "thicker"]
         assert all(mutation.caught for mutation in mutations)
 
@@ -44,11 +45,12 @@ def test_a_case_that_misses_a_defect_is_broken(
     claim: CaseDefinition, made_up_code: Any, paper_scene: Scene
 ) -> None:
     blind = made_up_code(defect=lambda found, _, __: found)
-    mutations = mutate_definition(claim, blind, scene=paper_scene)
-    assert [mutation.caught for mutation in mutations] == [False, True]
-    result = run_definition(claim, blind, scene=paper_scene)
-    assert not result.broken
-    assert dataclasses.replace(result, mutations=mutations).broken
+    result = run_definition(claim, blind, scene=paper_scene, mutations=True)
+    assert [mutation.caught for mutation in result.mutations] == [False, True]
+    assert result.broken
+    assert not dataclasses.replace(result, mutations=()).broken
+    (missed,) = (finding for finding in result.rows().findings if finding.code == "mutation_missed")
+    assert missed.severity == "error"
 
 
 def test_a_mutation_that_only_breaks_down_is_not_caught(
@@ -59,7 +61,8 @@ def test_a_mutation_that_only_breaks_down_is_not_caught(
             return Found(value=10.0)
         raise ValueError("stumbled")
 
-    first, _ = mutate_definition(verification, made_up_code(defect=stumble), scene=paper_scene)
+    code = made_up_code(defect=stumble)
+    first, _ = run_definition(verification, code, scene=paper_scene, mutations=True).mutations
     assert first.verdict is Verdict.FAILED
     assert "stumbled" in first.status
     assert not first.caught
@@ -136,8 +139,8 @@ def test_a_heavy_case_waits_for_its_level(claim_text: str, made_up_code: Any, pa
         claim_text.replace("[consequence]", 'cost = "heavy"\n[consequence]', 1), source="x"
     )
     code = made_up_code()
-    assert run_definition(heavy, code, scene=paper_scene).verdict is Verdict.NOT_RUN
-    assert mutate_definition(heavy, code, scene=paper_scene) == ()
+    waiting = run_definition(heavy, code, scene=paper_scene, mutations=True)
+    assert (waiting.verdict, waiting.mutations) == (Verdict.NOT_RUN, ())
     assert run_definition(heavy, code, scene=paper_scene, level="heavy").verdict is Verdict.CONFIRMED
 
 
@@ -148,11 +151,6 @@ def test_a_scene_is_changed_by_name(paper_scene: Scene) -> None:
     assert paper_scene.disc.plate_thickness > 0
     with pytest.raises(ValueError, match="no quantity"):
         overridden(paper_scene, {"disc.colour": 1.0})
-
-
-def test_an_unknown_defect_is_refused(claim: CaseDefinition, made_up_code: Any, paper_scene: Scene) -> None:
-    with pytest.raises(KeyError, match="no mutation"):
-        run_definition(claim, made_up_code(), scene=paper_scene, defect="gremlin")
 
 
 def test_a_claim_on_the_papers_numbers_ignores_the_scene_at_hand(paper_scene: Scene) -> None:

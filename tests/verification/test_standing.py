@@ -9,7 +9,6 @@ import pytest
 from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.reduced_model.calibration_record import UNITS
 from ringbalance.verification.catalogue import load_cases
-from ringbalance.verification.document import case_document
 from ringbalance.verification.runner import paper_scene, run_case
 from ringbalance.verification.standing import HEADS, NO_DATA, SUBJECTS, budget_standing, standing_rows
 
@@ -54,7 +53,7 @@ def test_what_is_left_out_is_counted_and_what_taught_is_no_prediction(
     name: str, readings: int, judged: str, everything: str, left_out: str
 ) -> None:
     """Against the rows of the data files."""
-    case = case_document(run_case(f"measured_{name}", scene=paper_scene()))
+    case = run_case(f"measured_{name}", scene=paper_scene()).to_dict()
     subject, numbers = case["about"][0], case["numbers"]
     assert judged in _cell(case, subject=subject)
     assert everything in _cell(case, subject=subject)
@@ -64,7 +63,7 @@ def test_what_is_left_out_is_counted_and_what_taught_is_no_prediction(
 
 
 def test_the_stated_uncertainty_of_waves_follows_from_the_points_that_taught_it() -> None:
-    case = case_document(run_case("measured_waves", scene=paper_scene()))
+    case = run_case("measured_waves", scene=paper_scene()).to_dict()
     assert case["verdict"] == "confirmed"
     assert case["numbers"]["taught_width"] == pytest.approx(FREQUENCY_UNCERTAINTY, rel=0.085)
     (judged,) = (one for one in case["quantities"] if one["name"] == "calibration")

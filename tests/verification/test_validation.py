@@ -3,29 +3,41 @@
 from __future__ import annotations
 
 import math
+import tempfile
 import tomllib
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
 
 import generated_docs
 import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from ringbalance.identification.data.measurements import Measurements, MeasurementsError
+from ringbalance.identification.kinds import bench
+from ringbalance.identification.kinds.bench import laminar_ratio, tank_frequency
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.identification.reading import read_observations
 from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.verification.cases.measured_laminar_tubes.case import CALIBRATING
 from ringbalance.verification.catalogue import case_code, load_case
 from ringbalance.verification.navier_stokes.rotating_section import (
     DuctMesh,
     friction_ratio,
     solve_section_without_inertia,
 )
-from ringbalance.verification.validation import kinds
-from ringbalance.verification.validation.comparison import Comparison, ModelStatistics, compare, friction
-from ringbalance.verification.validation.kinds import KINDS, laminar_ratio, measurements, tank_frequency
+from ringbalance.verification.validation.comparison import (
+    Comparison,
+    ModelStatistics,
+    compare,
+    friction,
+    measurements,
+)
 
 _DATA = files("ringbalance.verification.validation") / "data"
 _NAMES = sorted(path.name.removesuffix(".csv") for path in _DATA.iterdir() if path.name.endswith(".csv"))
@@ -35,11 +47,12 @@ _NAMES = sorted(path.name.removesuffix(".csv") for path in _DATA.iterdir() if pa
 def test_a_data_set_says_where_it_comes_from_and_what_it_supports(name: str) -> None:
     data = measurements(name)
     assert len(data) > 5
-    assert 0 < data.source.uncertainty < 0.2
-    assert data.source.read in ("tables", "transcription", "figure")
     assert all(np.all(np.isfinite(column)) for column in data.columns.values())
     head = (_DATA / f"{name}.csv").read_text(encoding="utf-8").split("\n")
     stated = tomllib.loads("\n".join(line[2:] for line in head if line.startswith("# ")))
+    assert 0 < stated["uncertainty"] < 0.2
+    assert stated["read"] in ("tables", "transcription", "figure")
+    assert {"licence", "conditions", "supports", "does_not_support"} <= set(stated)
     assert all(value for key, value in stated.items() if key != "doi")
 
 
@@ -147,35 +160,20 @@ def test_measured_friction_drifts_from_the_correlation_as_its_error_is_taken_to(
 _HEAD = '# kind = "friction"\n# source = "me"\n# uncertainty = 0.02\n'
 
 
-def test_units_of_a_file_become_si() -> None:
-    head = _HEAD.replace("friction", "vessel")
-    data = Measurements.parsed(head + "time [ms],pressure [bar],series\n250,2,a\n500,3,b\n", file="x.csv")
-    assert data.columns["time"] == pytest.approx([0.25, 0.5])
-    assert data.columns["pressure"] == pytest.approx([2e5, 3e5])
-    assert list(data.series) == ["a", "b"]
-    assert data.uncertainty == pytest.approx([0.02, 0.02])
-
-
-def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> None:
-    text = '# kind = 3\n# sorce = "me"\n# uncertainty = 2\nreynolds,friction factor,x [furlong]\n1,2,3\n'
-    with pytest.raises(MeasurementsError) as error:
-        Measurements.parsed(text, file="bad.csv")
-    lines = str(error.value).splitlines()
-    assert all(line.startswith("bad.csv: ") for line in lines)
-    assert len(lines) == 6
-    with pytest.raises(MeasurementsError) as error:
-        Measurements.parsed(_HEAD + "reynolds,friction_factor\n100,nan\n\n200\n300,x\n", file="bad.csv")
-    assert [line.split(": ")[1] for line in str(error.value).splitlines()] == [
-        'line 5, column "friction_factor" = "nan"',
-        "line 7",
-        'line 8, column "friction_factor" = "x"',
-    ]
+def parsed(text: str) -> Observations:
+    """A file of a user."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "x.csv"
+        path.write_text(text, encoding="utf-8")
+        return read_observations([path])[0]
 
 
 @pytest.mark.parametrize(
     ("text", "named"),
     [
         ('# kind = "rain"\n# source = "me"\n# uncertainty = 0.1\na\n1\n', "rain"),
+        ('# kind = "flow"\n# source = "me"\n# uncertainty = 0.1\na\n1\n', "a scene predicts"),
+        (_HEAD.replace("# uncertainty = 0.02\n", "") + "reynolds,friction_factor\n1,1\n", "uncertainty"),
         (_HEAD + "friction_factor\n0.02\n", "reynolds"),
         (_HEAD + "reynolds,friction_factor,colour\n1000,0.02,3\n", "colour"),
         (_HEAD + "reynolds,friction_factor\n1000,0\n", "friction_factor"),
@@ -188,15 +186,15 @@ def test_all_errors_of_a_file_are_reported_together_with_row_and_column() -> Non
     ],
 )
 def test_what_cannot_be_predicted_is_refused_by_name(text: str, named: str) -> None:
-    with pytest.raises(MeasurementsError, match=named):
-        compare(Measurements.parsed(text, file="x.csv"))
+    with pytest.raises(SceneError, match=named):
+        compare(parsed(text))
 
 
 def test_a_comparison_is_confirmed_by_its_own_predictions_and_refuted_by_others() -> None:
     data = measurements("stanton_pannell_1914")
     found = compare(data)
     rows = "".join(f"{r},{f}\n" for r, f in zip(data.columns["reynolds"], found.predicted, strict=True))
-    own = compare(Measurements.parsed(_HEAD + "reynolds,friction_factor\n" + rows, file="own.csv"))
+    own = compare(parsed(_HEAD + "reynolds,friction_factor\n" + rows))
     assert own.statistics.bias == pytest.approx(0, abs=1e-12)
     assert (found.verdict, own.verdict) == ("confirmed", "confirmed")
     assert compare(data, mutation="ten_per_cent_high").verdict == "refuted"
@@ -214,19 +212,19 @@ def test_the_uncertainty_of_wave_frequencies_comes_from_tanks_that_are_not_judge
 
 def test_the_bore_of_a_tube_comes_from_a_point_that_is_not_judged() -> None:
     data = measurements("eisenklam_1958")
-    taught = compare(data.where(np.isin(data.series, kinds.CALIBRATING)))
+    taught = compare(data.where(np.isin(data.series, CALIBRATING)))
     assert taught.predicted == pytest.approx(taught.measured, rel=1e-3)
-    assert taught.measured.size == len(kinds.CALIBRATING)
+    assert taught.measured.size == len(CALIBRATING)
 
 
 def test_end_losses_that_are_left_out_are_noticed() -> None:
     data = measurements("eisenklam_1958")
     long = data.where(np.char.startswith(data.series, "tube"))
-    reynolds, slenderness = kinds.tube_numbers(long)
+    reynolds, slenderness = bench.tube_numbers(long)
     friction = slenderness * 64 / reynolds
     found = compare(long)
     pairs = zip(slenderness, reynolds, strict=True)
-    dynamic = found.predicted / (1 + np.array([kinds.tube_loss(*pair, 100.0)[0] for pair in pairs]))
+    dynamic = found.predicted / (1 + np.array([bench.tube_loss(*pair, 100.0)[0] for pair in pairs]))
     assert np.max(np.abs(found.predicted / found.measured - 1)) < 0.04
     assert np.min(dynamic * (1 + friction) / found.measured) < 0.8
 
@@ -244,7 +242,7 @@ def test_adiabatic_venting_of_a_choked_vessel_is_the_closed_form() -> None:
         "conductance [l/(s*bar)]"
     )
     text = _HEAD.replace("friction", "vessel") + f"{columns}\n1,4,10,1,293.15,1,1\n"
-    found = compare(Measurements.parsed(text, file="x.csv"))
+    found = compare(parsed(text))
     adiabatic = 5 * (2.5 ** (1 / 7) - 1)
     assert found.predicted[0] == pytest.approx((adiabatic + math.log(2.5)) / 2, rel=1e-5)
     assert found.stated[0] ** 2 - (0.1 * found.predicted[0]) ** 2 == pytest.approx(
@@ -255,7 +253,7 @@ def test_adiabatic_venting_of_a_choked_vessel_is_the_closed_form() -> None:
 def test_every_bundled_set_of_a_kind_that_is_predicted_has_its_columns() -> None:
     for name in _NAMES:
         data = measurements(name)
-        if data.source.kind in KINDS:
+        if KINDS[data.kind].stated:
             assert compare(data).predicted.size == len(data)
 
 
@@ -263,4 +261,4 @@ def test_the_page_on_measurements_lists_the_kinds_and_its_example_can_be_read() 
     page = generated_docs.text_of("docs/measurements.md")
     assert generated_docs.fresh(page, generated_docs.PARTS["docs/measurements.md"]()) == page
     example = page.split("```")[1]
-    assert len(compare(Measurements.parsed(example, file="example")).measured) == 3
+    assert len(compare(parsed(example.lstrip("\n"))).measured) == 3

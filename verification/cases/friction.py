@@ -26,8 +26,7 @@ from ringbalance.physics.tube.friction import friction_factor
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
-from ringbalance.verification.validation.comparison import friction
-from ringbalance.verification.validation.kinds import measurements
+from ringbalance.verification.validation.comparison import friction, measurements
 
 _TURBULENT: Final = 4000.0
 _STEP: Final = 1.01

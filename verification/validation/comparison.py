@@ -1,4 +1,4 @@
-"""Measurements, bundled ones or a user's own, beside the program's predictions: statistics, verdict, plot."""
+"""Observations, bundled ones or a user's own, beside the program's predictions: statistics, verdict, plot."""
 
 # ruff: noqa: ARG001 - every study has the uniform case interface
 from __future__ import annotations
@@ -7,6 +7,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -14,11 +15,13 @@ from typing import Any, Final
 import numpy as np
 from scipy import special
 
-from ringbalance.identification.data.measurements import Measurements, MeasurementsError
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.identification.reading import observations_of, read_observations
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
-from ringbalance.verification.validation.kinds import KINDS, Kind, measurements
 from ringbalance.verification.verdicts import Verdict, judge_quantity
 
 PROMISED: Final = 0.93
@@ -148,62 +151,47 @@ def _mean_uncertainty(means: FloatArray, measurement_uncertainty: float) -> floa
     return factor * float(np.std(means, ddof=1)) / math.sqrt(means.size)
 
 
-def compare(*sets: Measurements, mutation: str | None = None) -> Comparison:
+def measurements(name: str) -> Observations:
+    """The data set of a file in `data/`, by its name without ".csv"."""
+    path = files("ringbalance.verification.validation") / "data" / f"{name}.csv"
+    found, faults = observations_of(path.read_bytes(), file=path.name)
+    if found is None:
+        raise SceneError(faults)
+    return found
+
+
+def compare(*sets: Observations, mutation: str | None = None) -> Comparison:
     """Predict the points of data sets of one kind.
 
-    Raises: MeasurementsError: a kind that cannot be predicted, a column that is missing, or a measured value
-        that is not positive.
+    Raises: SceneError: a kind that cannot be predicted, or rows that it does not hold for.
     """
-    kind = _kind_of(sets[0])
+    kind = KINDS[sets[0].kind]
     for each in sets:
-        _check(each, kind)
-    predictions = [kind.predict(each) for each in sets]
+        problem = kind.obstacle(None, each)
+        if kind.stated is None:
+            problem = f"nothing predicts data of the kind {each.kind}"
+        if problem:
+            raise SceneError.of_file(each.file, problem)
+    assert kind.stated is not None
+    predicted, stated = np.concatenate([kind.stated(each) for each in sets], axis=1)
     shared = set.intersection(*(set(each.columns) for each in sets))
+    columns = {name: np.concatenate([each.columns[name] for each in sets]) for name in sorted(shared)}
+    (name,) = (column.name for column in kind.measured)
+    widths = [each.uncertainty[name] / each.columns[name] for each in sets]
     return Comparison(
-        measured=np.concatenate([each.columns[kind.measured] for each in sets]),
-        predicted=MUTATIONS[mutation] * np.concatenate([one.value for one in predictions]),
-        stated=np.concatenate([one.stated for one in predictions]),
-        uncertainty=np.concatenate([each.uncertainty for each in sets]),
+        measured=columns[name],
+        predicted=MUTATIONS[mutation] * predicted,
+        stated=stated,
+        uncertainty=np.concatenate(widths),
         series=np.concatenate([each.series for each in sets]),
-        columns={name: np.concatenate([each.columns[name] for each in sets]) for name in sorted(shared)},
+        columns=columns,
     )
 
 
-def friction(*sets: Measurements, mutation: str | None = None) -> Comparison:
+def friction(*sets: Observations, mutation: str | None = None) -> Comparison:
     """`compare` friction factors, in ascending order of the Reynolds number."""
     found = compare(*sets, mutation=mutation)
     return found.where(np.argsort(found.columns["reynolds"], kind="stable"))
-
-
-def _kind_of(data: Measurements) -> Kind:
-    """The kind of a data set. Raises: MeasurementsError: one that cannot be predicted."""
-    if data.source.kind not in KINDS:
-        raise MeasurementsError(
-            f'kind = "{data.source.kind}" cannot be predicted; allowed: {", ".join(KINDS)}'
-        )
-    return KINDS[data.source.kind]
-
-
-def _check(data: Measurements, kind: Kind) -> None:
-    wanted = (kind.measured, *kind.columns)
-    missing = [name for name in wanted if name not in data.columns]
-    known = {*wanted, *kind.optional, "uncertainty"}
-    strange = [name for name in data.columns if name not in known]
-    meaning = {kind.measured: f"the measured {kind.title}", **kind.columns}
-    faults = [f'the column "{name}" is missing: {meaning[name]}' for name in missing]
-    faults += [f'the column "{name}" is not known; allowed: {", ".join(sorted(known))}' for name in strange]
-    faults += [
-        f'the column "{name}" must be positive in every row'
-        for name in wanted
-        if name in data.columns and not np.all(data.columns[name] > 0)
-    ]
-    faults += [
-        f'the column "{name}" must not be negative'
-        for name in known & data.columns.keys() - set(wanted)
-        if not np.all(data.columns[name] >= 0)
-    ]
-    if faults:
-        raise MeasurementsError("\n".join(faults))
 
 
 def beside_judged(
@@ -260,34 +248,33 @@ def study(
     )
 
 
-def data_evidence(*sets: Measurements, unit: str, mutation: str | None = None) -> Evidence:
+def data_evidence(*sets: Observations, unit: str, mutation: str | None = None) -> Evidence:
     """Evidence of a case that compares data sets of one kind. Args: `unit`: of what was measured, SI."""
     comparison = compare(*sets, mutation=mutation)
     return Evidence(
         found=as_found(share_within=comparison.statistics.share_within, bias=abs(comparison.statistics.bias)),
         numbers=comparison.statistics.numbers(),
-        series=(comparison.scatter(_kind_of(sets[0]).title, unit),),
+        series=(comparison.scatter(KINDS[sets[0].kind].title, unit),),
     )
 
 
 def data_document(path: Path) -> dict[str, Any]:
     """Judgement of a file of measurements, as `ringbalance verify --data FILE --json` prints it.
 
-    Raises: MeasurementsError: not such a file, or too few points; with the file's name in every line.
+    Raises: SceneError: not such a file, or too few points.
     """
-    data = Measurements.read(path)
-    try:
-        kind, comparison = _kind_of(data), compare(data)
-        if len(data) < _FEWEST:
-            raise MeasurementsError(f"{len(data)} point, and {_FEWEST} are the fewest that can be judged")
-    except MeasurementsError as error:
-        raise MeasurementsError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from error
+    (data,) = read_observations([path])
+    kind, comparison = KINDS[data.kind], compare(data)
+    if len(data) < _FEWEST:
+        raise SceneError.of_file(
+            data.file, f"{len(data)} point, and {_FEWEST} are the fewest that can be judged"
+        )
     return {
         "file": str(path),
-        "kind": data.source.kind,
+        "kind": data.kind,
         "title": kind.title,
-        "source": data.source.source,
-        "measured": kind.measured,
+        "source": data.source,
+        "measured": kind.measured[0].name,
         "limit": PROMISED,
         "verdict": comparison.verdict.value,
         "statistics": vars(comparison.statistics),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -183,14 +182,6 @@ def test_a_length_that_fits_no_unit_is_its_own_error(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="the tube cannot reach the opposite port") as caught:
         load_scene(tmp_path / "my_disc.toml")
     assert "scale" not in str(caught.value)
-
-
-def test_the_file_is_found_from_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "discs").mkdir()
-    one = scene_of(tmp_path / "discs")
-    monkeypatch.chdir(tmp_path)
-    two = load_scene("discs/my_disc.toml")
-    assert replace(one, file="discs/my_disc.toml") == two
 
 
 @pytest.mark.skipif(find_spec("gmsh") is not None, reason="the extra cad is installed")

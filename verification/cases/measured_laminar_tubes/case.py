@@ -7,13 +7,22 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.measurements import Measurements
+from ringbalance.identification.kinds.bench import tube_numbers
+from ringbalance.identification.kinds.kind import Observations
 from ringbalance.scene.arrays import BoolArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level
-from ringbalance.verification.validation.comparison import beside_judged, compare, data_evidence
-from ringbalance.verification.validation.kinds import CALIBRATING, measurements, tube_numbers
+from ringbalance.verification.validation.comparison import beside_judged, compare, data_evidence, measurements
 
+CALIBRATING: Final = (
+    "tube 1 (bore)",
+    "tube 2 (bore)",
+    "tube 3 (bore)",
+    "tube 4 (bore)",
+    "tube 5 (bore)",
+    "cut (bore)",
+)
+"""Points of Eisenklam that gave the bore of their tube, and are not judged."""
 _DEVELOPED: Final = 0.0125
 """L/(d Re) from which an undeveloped profile was expected to cost no more than the interval of the outlet."""
 _CONTRADICTED: Final = 1.5e5
@@ -39,7 +48,7 @@ def compute(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return dataclasses.replace(found, numbers={**found.numbers, **more})
 
 
-def _kinds(data: Measurements) -> tuple[BoolArray, BoolArray, BoolArray]:
+def _kinds(data: Observations) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Points that taught a bore, those that contradict others, and those where flow could develop."""
     taught = np.isin(data.series, CALIBRATING)
     cut = np.char.startswith(data.series, "cut")

@@ -8,13 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.measurements import Measurements
+from ringbalance.identification.kinds.kind import Observations
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, figure
-from ringbalance.verification.validation.comparison import MUTATIONS
-from ringbalance.verification.validation.kinds import measurements
+from ringbalance.verification.validation.comparison import MUTATIONS, measurements
 
 _WASHER: Final = 12.4e-6
 """Unbalance of a washer, kg m."""
@@ -91,11 +90,11 @@ def _calibrated(rotor: Rotor, amplitudes: list[float]) -> Rotor:
     )
 
 
-def _amplitude(run: Measurements, series: str, washers: int) -> float:
+def _amplitude(run: Observations, series: str, washers: int) -> float:
     """Mean over all speeds, m."""
     return float(np.mean(_chosen(run, series, washers)))
 
 
-def _chosen(run: Measurements, series: str, washers: int) -> FloatArray:
+def _chosen(run: Observations, series: str, washers: int) -> FloatArray:
     here = (run.series == series) & (run.columns["washers"] == washers)
     return np.asarray(run.columns["amplitude"][here], dtype=np.float64)

@@ -9,8 +9,7 @@ import numpy as np
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.validation.comparison import Comparison, beside_judged, friction
-from ringbalance.verification.validation.kinds import measurements
+from ringbalance.verification.validation.comparison import Comparison, beside_judged, friction, measurements
 
 _FULLY_ROUGH: Final = 70.0
 

@@ -6,11 +6,10 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.measurements import Measurements
+from ringbalance.identification.kinds.kind import Observations
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, as_found
-from ringbalance.verification.validation.comparison import Comparison, beside_judged, friction
-from ringbalance.verification.validation.kinds import measurements
+from ringbalance.verification.validation.comparison import Comparison, beside_judged, friction, measurements
 
 _LAMINAR: Final = 1800.0
 _TURBULENT: Final = 4000.0
@@ -49,7 +48,7 @@ def _left_out() -> dict[str, Comparison]:
     }
 
 
-def _mckeon(low: float, high: float) -> Measurements:
+def _mckeon(low: float, high: float) -> Observations:
     data = measurements("mckeon_2004")
     reynolds = data.columns["reynolds"]
     return data.where((reynolds >= low) & (reynolds < high))

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.identification.data.measurements import Observations
+from ringbalance.identification.kinds.kind import Observations
 from ringbalance.reduced_model.injection.dynamics import WORKSPACE, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.march import advance

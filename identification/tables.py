@@ -89,24 +89,6 @@ class Table:
         """The column of series, or one series for all rows."""
         return np.array(self.texts(SERIES) if SERIES in self.heads else ("one",) * len(self.rows))
 
-    def header_faults(self, *, known: Collection[str], needed: Collection[str]) -> Iterator[Fault]:
-        """Keys of the header that are not known, and those that are missing."""
-        for key in self.header:
-            if key not in known:
-                problem = f"this key of the first lines is not known{did_you_mean(key, known)}"
-                yield data_fault(self.file, toml_text(key), problem, allowed=", ".join(known))
-        for key in needed:
-            if key not in self.header:
-                problem = f'the key "{key}" is missing in the first lines, marked #'
-                yield data_fault(self.file, "", problem)
-
-    def text_faults(self, keys: Iterable[str]) -> Iterator[Fault]:
-        """Values of keys of the header that must be text, and are not."""
-        for key in keys:
-            value = self.header.get(key, "")
-            if not isinstance(value, str):
-                yield data_fault(self.file, key, "it is not text", value=toml_text(value), allowed='"..."')
-
     def texts(self, head: str) -> tuple[str, ...]:
         """The cells of a column of text."""
         at = self.heads.index(head)

@@ -1,20 +1,15 @@
-"""Measurements by others that come with the program, and each kind of them as the program predicts it.
-
-A new kind is an entry of `KINDS`.
-"""
+"""What is measured on test benches without a balancer, and how the program predicts it with no scene."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from importlib.resources import files
-from types import MappingProxyType
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.data.measurements import Measurements, MeasurementsError
+from ringbalance.identification.kinds.kind import Kind, Observations, column, positive
 from ringbalance.physics.gas import HEAT_CAPACITY_RATIO, GasLine
 from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.sloshing_system import sloshing_system
@@ -23,19 +18,10 @@ from ringbalance.physics.tube.local_losses import entrance_loss, exit_loss
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Tube
 
-_WIDEST: Final = 20
+_WIDEST: Final = 20.0
 """Long over short side of a duct that is accepted."""
 _TERMS: Final = 100
 """Up to which odd terms of a series are summed that fall like 1/n^5."""
-CALIBRATING: Final = (
-    "tube 1 (bore)",
-    "tube 2 (bore)",
-    "tube 3 (bore)",
-    "tube 4 (bore)",
-    "tube 5 (bore)",
-    "cut (bore)",
-)
-"""Points of Eisenklam that gave the bore of their tube, and are not judged."""
 _LAMINAR: Final = 100.0
 """Critical Re over the usual one, for flow that is known to be laminar."""
 CONDUCTANCE_UNCERTAINTY: Final = 0.1
@@ -45,37 +31,11 @@ _CRITICAL_RATIO: Final = 0.5
 _STEPS: Final = 2000
 _RADIUS: Final = 1e4
 """Of the chamber, in widths of the tank."""
-_DEPTHS: Final = (0.01, 10.0)
 _CELLS: Final = (8, 16)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Prediction:
-    """What the program says of each point, SI."""
-
-    value: FloatArray
-    stated: FloatArray
-    """Expanded uncertainty (95 %) that it states."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Kind:
-    """One kind of data."""
-
-    title: str
-    measured: str
-    """Column that is predicted."""
-    columns: Mapping[str, str]
-    """Columns that the prediction needs, with what they hold."""
-    optional: Mapping[str, str] = field(default_factory=dict)
-    """Columns that it uses where they are there."""
-    predict: Callable[[Measurements], _Prediction]
-
-
-def measurements(name: str) -> Measurements:
-    """The data set of a file in `data/`, by its name without ".csv"."""
-    path = files("ringbalance.verification.validation") / "data" / f"{name}.csv"
-    return Measurements.parsed(path.read_text(encoding="utf-8"), file=f"{name}.csv")
+Stated = tuple[FloatArray, FloatArray]
+"""What is predicted of each row, SI, and the expanded uncertainty (95 %) that the program states of it."""
 
 
 def laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
@@ -90,11 +50,9 @@ def laminar_ratio(aspect_ratio: FloatArray) -> FloatArray:
     return np.where(aspect_ratio > 0, ratio, 1.0)
 
 
-def _friction(data: Measurements) -> _Prediction:
+def _friction(data: Observations) -> Stated:
     none = np.zeros(len(data))
     aspect, roughness = (data.columns.get(name, none) for name in ("aspect_ratio", "relative_roughness"))
-    if not np.all((aspect == 0) | ((aspect >= 1) & (aspect <= _WIDEST))):
-        raise MeasurementsError(f"aspect_ratio must be 0 or from 1 to {_WIDEST} in every row")
     reynolds, ratio = data.columns["reynolds"], laminar_ratio(aspect)
 
     def each(formula: Callable[..., Any]) -> FloatArray:
@@ -107,24 +65,22 @@ def _friction(data: Measurements) -> _Prediction:
             )
         return found
 
-    return _Prediction(value=each(friction_factor), stated=each(friction_uncertainty))
+    return each(friction_factor), each(friction_uncertainty)
 
 
-def _pressure(data: Measurements) -> _Prediction:
+def _pressure(data: Observations) -> Stated:
     """(rho u^2/2) (k + 1) with k of friction, entrance and exit; no bend, no rotation."""
     columns = {"laminar": np.zeros(len(data)), **data.columns}
-    if not np.all(np.isin(columns["laminar"], (0.0, 1.0))):
-        raise MeasurementsError("laminar must be 0 or 1 in every row")
     reynolds, slenderness = tube_numbers(data)
     critical = np.where(columns["laminar"] > 0, _LAMINAR, 1.0)
     rows = zip(slenderness, reynolds, critical, strict=True)
     k, half_width = np.array([tube_loss(*(float(value) for value in row)) for row in rows]).T
     velocity = reynolds * columns["kinematic_viscosity"] / columns["bore"]
     dynamic = columns["density"] * velocity**2 / 2
-    return _Prediction(value=dynamic * (k + 1), stated=dynamic * half_width)
+    return dynamic * (k + 1), dynamic * half_width
 
 
-def tube_numbers(data: Measurements) -> tuple[FloatArray, FloatArray]:
+def tube_numbers(data: Observations) -> tuple[FloatArray, FloatArray]:
     """Re and L/d of each point."""
     columns = data.columns
     velocity = columns["flow"] / (np.pi / 4 * columns["bore"] ** 2)
@@ -165,29 +121,33 @@ def _tube(slenderness: float) -> Tube:
     )
 
 
-def _vessel_time(data: Measurements) -> _Prediction:
+def _vessel_time(data: Observations) -> Stated:
     """Times of a gas vessel: middle of both limits, stated as wide as these and the conductance leave it.
 
     Gas that exchanges heat with the walls lies between isothermal and adiabatic. With tau of `GasLine`,
     filling takes 1/gamma of the isothermal time when adiabatic; venting has dp/dt = -gamma (p/tau)
     sqrt(T/T_0) phi with T/T_0 = (p/p_start)^((gamma - 1)/gamma), integrated here.
     """
-    _checked(data)
     columns = {"critical_ratio": np.full(len(data), _CRITICAL_RATIO), **data.columns}
     names = ("pressure", "start_pressure", "far_pressure", "temperature", "volume", "conductance")
     rows = zip(*(columns[name] for name in (*names, "critical_ratio")), strict=True)
     limits = np.array([_limits(*(float(value) for value in row)) for row in rows])
     middle = limits.mean(axis=1)
     half = np.abs(limits[:, 1] - limits[:, 0]) / 2
-    return _Prediction(value=middle, stated=np.hypot(half, CONDUCTANCE_UNCERTAINTY * middle))
+    return middle, np.hypot(half, CONDUCTANCE_UNCERTAINTY * middle)
 
 
-def _checked(data: Measurements) -> None:
+def _no_duct(_: object, data: Observations) -> str:
+    aspect = data.columns.get("aspect_ratio", np.zeros(1))
+    return (
+        "aspect_ratio is long over short side, from 1 on, or 0" if np.any((aspect > 0) & (aspect < 1)) else ""
+    )
+
+
+def _not_between(_: object, data: Observations) -> str:
     reached, start, far = (data.columns[name] for name in ("pressure", "start_pressure", "far_pressure"))
-    if not np.all((reached - start) * (far - reached) > 0):
-        raise MeasurementsError("pressure must lie between start_pressure and far_pressure in every row")
-    if "critical_ratio" in data.columns and not np.all(data.columns["critical_ratio"] < 1):
-        raise MeasurementsError("critical_ratio must be below 1 in every row")
+    between = np.all((reached - start) * (far - reached) > 0)
+    return "" if between else "pressure must lie between start_pressure and far_pressure in every row"
 
 
 def _limits(
@@ -220,13 +180,10 @@ def _adiabatic_venting(ratio: float, far: float, b: float) -> float:
     return float(-np.trapezoid(1 / (gamma * falling * cooled * phi), falling))
 
 
-def _frequency(data: Measurements) -> _Prediction:
-    given = data.columns["depth_over_width"]
-    if not np.all((given >= _DEPTHS[0]) & (given <= _DEPTHS[1])):
-        raise MeasurementsError(f"depth_over_width must lie from {_DEPTHS[0]} to {_DEPTHS[1]} in every row")
-    depths, place = np.unique(given, return_inverse=True)
+def _frequency(data: Observations) -> Stated:
+    depths, place = np.unique(data.columns["depth_over_width"], return_inverse=True)
     found = np.array([tank_frequency(float(depth)) for depth in depths])[place]
-    return _Prediction(value=found, stated=FREQUENCY_UNCERTAINTY * found)
+    return found, FREQUENCY_UNCERTAINTY * found
 
 
 def tank_frequency(depth: float) -> float:
@@ -251,52 +208,80 @@ def tank_frequency(depth: float) -> float:
     return float(lowest) / math.sqrt(surface)
 
 
-KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
-    {
-        "friction": Kind(
-            title="Darcy friction factor of a long straight tube or duct at rest",
-            measured="friction_factor",
-            columns={"reynolds": "Reynolds number with the hydraulic diameter and the mean velocity"},
-            optional={
-                "relative_roughness": "ks/d, grain of the wall over the bore; smooth without this column",
-                "aspect_ratio": "long over short side of a rectangular duct; 0, or no such column, "
-                "for a tube",
-            },
-            predict=_friction,
+_measured: Final = partial(positive, measured=True)
+_optional: Final = partial(column, optional=True, lowest=0.0)
+BENCH: Final[Mapping[str, Kind]] = {
+    "friction": Kind(
+        title="Darcy friction factor of a long straight tube or duct at rest",
+        columns=(
+            _measured("friction_factor", "measured"),
+            positive("reynolds", "Reynolds number with the hydraulic diameter and the mean velocity"),
+            _optional(
+                "relative_roughness", "ks/d, grain of the wall over the bore; smooth without this column"
+            ),
+            _optional(
+                "aspect_ratio",
+                "long over short side of a rectangular duct; 0, or no such column, for a tube",
+                highest=_WIDEST,
+            ),
         ),
-        "tube_at_rest": Kind(
-            title="pressure that drives liquid through a straight smooth tube at rest",
-            measured="pressure",
-            columns={
-                "flow": "volume of liquid in a time",
-                "bore": "of the tube",
-                "length": "of the tube, whose entrance is rounded and whose outlet is open",
-                "density": "of the liquid",
-                "kinematic_viscosity": "of the liquid",
-            },
-            optional={"laminar": "1 where flow is known to be laminar, whatever Re; 0 without this column"},
-            predict=_pressure,
+        stated=_friction,
+        obstacle=_no_duct,
+    ),
+    "tube_at_rest": Kind(
+        title="pressure that drives liquid through a straight smooth tube at rest",
+        columns=(
+            _measured("pressure [kPa]", "between both ends"),
+            positive("flow [ml/s]", "volume of liquid in a time"),
+            positive("bore [mm]", "of the tube"),
+            positive("length [mm]", "of the tube, whose entrance is rounded and whose outlet is open"),
+            positive("density [kg/m^3]", "of the liquid"),
+            positive("kinematic_viscosity [mm^2/s]", "of the liquid"),
+            _optional(
+                "laminar",
+                "1 where flow is known to be laminar, whatever Re; 0 without this column",
+                highest=1.0,
+                whole=True,
+            ),
         ),
-        "vessel": Kind(
-            title="time in which a vessel fills with air or vents it, taken as an ideal gas",
-            measured="time",
-            columns={
-                "pressure": "reached after that time, absolute",
-                "start_pressure": "at time zero, absolute",
-                "far_pressure": "at the other end of the line, absolute: of the supply, or the surroundings",
-                "temperature": "of the gas at the start, in K",
-                "volume": "of the vessel",
-                "conductance": "C of valve and line (ISO 6358), known to 10 %",
-            },
-            optional={"critical_ratio": "b of valve and line; 0.5 without this column"},
-            predict=_vessel_time,
+        stated=_pressure,
+    ),
+    "vessel": Kind(
+        title="time in which a vessel fills with air or vents it, taken as an ideal gas",
+        columns=(
+            _measured("time [s]", "from the start"),
+            positive("pressure [bar]", "reached after that time, absolute"),
+            positive("start_pressure [bar]", "at time zero, absolute"),
+            positive(
+                "far_pressure [bar]",
+                "at the other end of the line, absolute: of the supply, or the surroundings",
+            ),
+            positive("temperature [K]", "of the gas at the start"),
+            positive("volume [l]", "of the vessel"),
+            positive("conductance [l/(s*bar)]", "C of valve and line (ISO 6358), known to 10 %"),
+            _optional("critical_ratio", "b of valve and line; 0.5 without this column", highest=0.999),
         ),
-        "wave_frequency": Kind(
-            title="lowest natural frequency of liquid in a rectangular tank, sigma sqrt(L/g)",
-            measured="frequency_ratio",
-            columns={"depth_over_width": "depth of the liquid over the width L of the tank"},
-            predict=_frequency,
+        stated=_vessel_time,
+        obstacle=_not_between,
+    ),
+    "wave_frequency": Kind(
+        title="lowest natural frequency of liquid in a rectangular tank, sigma sqrt(L/g)",
+        columns=(
+            _measured("frequency_ratio", "measured"),
+            column(
+                "depth_over_width",
+                "depth of the liquid over the width L of the tank",
+                lowest=0.01,
+                highest=10.0,
+            ),
         ),
-    }
-)
-"""Kinds of data that the program can predict."""
+        stated=_frequency,
+    ),
+    "vibration": Kind(
+        title="vibration of a rotor with washers at one place",
+        columns=(
+            _measured("amplitude [um]", "zero to peak"),
+            column("washers", "their number", lowest=0.0, highest=100.0),
+        ),
+    ),
+}

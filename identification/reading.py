@@ -1,4 +1,4 @@
-"""From files of measurements to observations that a fit can use, or everything that is wrong with them.
+"""From files of measurements to observations of a kind, or everything that is wrong with them.
 
 What a file states of the uncertainty of its measured columns is at the end: 95 %, absolute, SI, row by row.
 """
@@ -8,15 +8,14 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from ringbalance.identification.data.kinds import AMPLITUDES, KINDS, Column, DataKind, kinds_of, unknown_kind
-from ringbalance.identification.data.measurements import SOURCE_KEYS, Observations
-from ringbalance.identification.data.tables import (
+from ringbalance.identification.kinds.kind import Column, Kind, Observations
+from ringbalance.identification.kinds.registry import AMPLITUDES, KINDS, kinds_of
+from ringbalance.identification.tables import (
     Table,
     data_fault,
     decoded,
@@ -33,14 +32,19 @@ from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import FieldError, parse_quantity
 
-AMPLITUDE: Final = "amplitude"
-_NEEDED: Final = ("kind", "source")
+_AMPLITUDE: Final = "amplitude"
+_UNCERTAINTY: Final = "uncertainty"
+_TEXTS: Final = (
+    *("kind", "source", "uncertainty_from", "where", "doi", "licence", "read", "conditions"),
+    *("supports", "does_not_support"),
+)
+"""Keys of the first lines that hold text."""
 _ROUNDED: Final = 0.01
 """Of a full chamber's fill, as it may be written down."""
 
 
-def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observations, ...]:
-    """The observations of each file, for a scene.
+def read_observations(paths: Iterable[Path], *, scene: AnyScene | None = None) -> tuple[Observations, ...]:
+    """The observations of each file, for a scene; for none those of test benches.
 
     Raises: SceneError: all that is wrong with any of the files, each error with line and column.
     """
@@ -49,7 +53,7 @@ def read_observations(paths: Iterable[Path], *, scene: AnyScene) -> tuple[Observ
     for path in paths:
         content, wrong = read_content(path)
         if not wrong:
-            observations, wrong = _observations_of(content, file=file_name(path), scene=scene)
+            observations, wrong = observations_of(content, file=file_name(path), scene=scene)
             found += [observations] if observations else []
         faults += in_order(wrong)
     faults += [*_given_twice(found), *_known_already(found, scene)]
@@ -66,18 +70,17 @@ def _given_twice(found: Iterable[Observations]) -> Iterator[Fault]:
         first.setdefault(each.sha256, each.file)
 
 
-def _known_already(found: Iterable[Observations], scene: AnyScene) -> Iterator[Fault]:
+def _known_already(found: Iterable[Observations], scene: AnyScene | None) -> Iterator[Fault]:
     """Files that the scene was fitted to: its [uncertainty] has what they say."""
-    known = {each.sha256 for each in scene.measured.files}
     for each in found:
-        if each.sha256 in known:
+        if scene is not None and each.sha256 in {known.sha256 for known in scene.measured.files}:
             problem = f"{scene.file} was fitted to this file already, so that it would count twice"
             allowed = "the scene as it was before, with all files together"
             yield data_fault(each.file, "", problem, allowed=allowed)
 
 
-def _observations_of(
-    content: bytes, *, file: str, scene: AnyScene
+def observations_of(
+    content: bytes, *, file: str, scene: AnyScene | None = None
 ) -> tuple[Observations | None, tuple[Fault, ...]]:
     """The observations of a file's bytes, or all that is wrong with it."""
     text, undecoded = decoded(content, file=file)
@@ -86,79 +89,73 @@ def _observations_of(
     table, faults = parse_table(text, file=file)
     if table is None:
         return None, faults
-    kind, wrong = _kind(table, scene)
-    if kind is None:
-        return None, (*faults, *wrong)
+    wrong = [*faults, *_kind_faults(table, scene)]
+    if len(wrong) > len(faults):
+        return None, tuple(wrong)
+    kind = KINDS[str(table.header["kind"])]
     wrong += _header_faults(table, kind)
     heads = list(_head_faults(table, kind))
     if heads:
-        return None, (*faults, *wrong, *heads)
+        return None, (*wrong, *heads)
     columns, cell_faults = _columns(table, kind)
-    wrong += cell_faults
-    wrong += _chamber_faults(table, scene) if kind.has_chamber else []
-    wrong += _fill_faults(table, scene, columns) if kind is not KINDS["pressure"] else []
     uncertainty, stated_faults = _stated_uncertainty(table, kind, columns)
-    wrong += [*stated_faults, *_repeated(table)]
-    if faults or wrong:
-        return None, (*faults, *wrong)
-    found = _observations(table, kind, columns, uncertainty)
-    return replace(found, sha256=hashlib.sha256(content).hexdigest()), ()
-
-
-def _observations(
-    table: Table, kind: DataKind, columns: Mapping[str, FloatArray], uncertainty: Mapping[str, FloatArray]
-) -> Observations:
-    """Amplitudes as the file's convention has them become zero to peak."""
-    factor = AMPLITUDES[str(table.header.get(AMPLITUDE, "zero_to_peak"))]
+    wrong += [*cell_faults, *_faults_of_scene(table, kind, scene, columns), *stated_faults]
+    wrong += _repeated(table) if kind.balancer else ()
+    if wrong:
+        return None, tuple(wrong)
+    # Amplitudes as the file's convention has them become zero to peak.
+    factor = AMPLITUDES[str(table.header.get(_AMPLITUDE, "zero_to_peak"))]
     letters = table.texts("chamber") if kind.has_chamber else ("",) * len(table.rows)
     used = {column.name: columns[column.name] for column in kind.columns if column.name in columns}
     return Observations(
         kind=str(table.header["kind"]),
         file=table.file,
         source=str(table.header["source"]),
+        sha256=hashlib.sha256(content).hexdigest(),
         lines=np.array(table.lines, dtype=np.int64),
         series=table.series,
         chamber=np.array(letters, dtype=np.str_),
         columns=_zero_to_peak(used, kind, factor),
         uncertainty=_zero_to_peak(uncertainty, kind, factor),
-    )
+    ), ()
 
 
-def _kind(table: Table, scene: AnyScene) -> tuple[DataKind | None, list[Fault]]:
-    word = table.header.get("kind")
+def _kind_faults(table: Table, scene: AnyScene | None) -> Iterator[Fault]:
+    word, allowed = table.header.get("kind"), kinds_of("" if scene is None else scene.balancer)
     if word is None:
         problem = 'the key "kind" is missing in the first lines, marked #'
-        return None, [data_fault(table.file, "", problem, allowed=f'kind = "..." of {", ".join(KINDS)}')]
-    if not isinstance(word, str) or word not in KINDS:
-        problem, value = unknown_kind(str(word)), toml_text(word)
-        return None, [data_fault(table.file, "kind", problem, value=value, allowed=", ".join(KINDS))]
-    kind = KINDS[word]
-    if word in kinds_of(scene.balancer):
-        return kind, []
-    own = ", ".join(kinds_of(scene.balancer))
-    problem = f'the balancer of {scene.file} is "{scene.balancer}", and these data belong to another'
-    return None, [data_fault(table.file, "kind", problem, value=toml_text(word), allowed=own)]
+        yield data_fault(table.file, "", problem, allowed=f'kind = "..." of {", ".join(allowed)}')
+    elif word not in allowed:
+        problem = f"there is no such kind of data{did_you_mean(str(word), allowed)}"
+        if str(word) in KINDS and scene is None:
+            problem = "a scene predicts data of this kind: ringbalance fit"
+        elif str(word) in KINDS and scene is not None:
+            problem = f'the balancer of {scene.file} is "{scene.balancer}", which these data tell nothing of'
+        yield data_fault(table.file, "kind", problem, value=toml_text(word), allowed=", ".join(allowed))
 
 
-def _header_faults(table: Table, kind: DataKind) -> list[Fault]:
-    convention = (AMPLITUDE,) if kind.has_amplitudes else ()
-    texts_only = [key for key in SOURCE_KEYS if key != "uncertainty"]
-    faults = [
-        *table.header_faults(known=(*SOURCE_KEYS, *convention), needed=_NEEDED),
-        *table.text_faults(texts_only),
-    ]
+def _header_faults(table: Table, kind: Kind) -> Iterator[Fault]:
+    known = (*_TEXTS, _UNCERTAINTY, *([_AMPLITUDE] if kind.has_amplitudes else []))
+    for key, value in table.header.items():
+        if key not in known:
+            problem = f"this key of the first lines is not known{did_you_mean(key, known)}"
+            yield data_fault(table.file, toml_text(key), problem, allowed=", ".join(known))
+        elif key in _TEXTS and not isinstance(value, str):
+            yield data_fault(table.file, key, "it is not text", value=toml_text(value), allowed='"..."')
+    for key in ("source", *([] if kind.balancer else [_UNCERTAINTY])):
+        if key not in table.header:
+            yield data_fault(table.file, "", f'the key "{key}" is missing in the first lines, marked #')
     if not str(table.header.get("source", "-")).strip():
-        faults.append(data_fault(table.file, "source", "it is empty", allowed="rig, run and date"))
-    stated = table.header.get(AMPLITUDE)
+        yield data_fault(table.file, "source", "it is empty", allowed="rig, run and date")
+    stated = table.header.get(_AMPLITUDE)
     if kind.has_amplitudes and not (isinstance(stated, str) and stated in AMPLITUDES):
         allowed = " or ".join(f'amplitude = "{word}"' for word in AMPLITUDES)
         problem = "the first lines must say how amplitudes are counted"
         value = "missing" if stated is None else toml_text(stated)
-        faults.append(data_fault(table.file, AMPLITUDE, problem, value=value, allowed=allowed))
-    return faults
+        yield data_fault(table.file, _AMPLITUDE, problem, value=value, allowed=allowed)
 
 
-def _head_faults(table: Table, kind: DataKind) -> Iterator[Fault]:
+def _head_faults(table: Table, kind: Kind) -> Iterator[Fault]:
     known = [column.name for column in (*kind.columns, *kind.uncertainties())] + [*kind.texts]
     yield from table.name_faults(known)
     for head in table.heads:
@@ -169,7 +166,7 @@ def _head_faults(table: Table, kind: DataKind) -> Iterator[Fault]:
 
 
 def _one_head(
-    table: Table, head: str, name: str, unit: str, kind: DataKind, known: Iterable[str]
+    table: Table, head: str, name: str, unit: str, kind: Kind, known: Iterable[str]
 ) -> Iterator[Fault]:
     column = kind.column(name)
     if column is None:
@@ -188,7 +185,7 @@ def _one_head(
         yield table.head_fault(head, error.problem, error.allowed)
 
 
-def _missing(table: Table, kind: DataKind, names: set[str]) -> Iterator[Fault]:
+def _missing(table: Table, kind: Kind, names: set[str]) -> Iterator[Fault]:
     place = f"line {table.head_line}"
     needed = [column for column in kind.columns if not column.optional and column.name not in kind.one_of]
     for column in needed:
@@ -202,7 +199,7 @@ def _missing(table: Table, kind: DataKind, names: set[str]) -> Iterator[Fault]:
         yield data_fault(table.file, place, f"{len(given)} of the columns {choice}, and one is needed")
 
 
-def _columns(table: Table, kind: DataKind) -> tuple[dict[str, FloatArray], list[Fault]]:
+def _columns(table: Table, kind: Kind) -> tuple[dict[str, FloatArray], list[Fault]]:
     """Every column of numbers, SI, and the errors of its cells."""
     columns: dict[str, FloatArray] = {}
     faults: list[Fault] = []
@@ -229,25 +226,25 @@ def _range_faults(table: Table, head: str, column: Column, values: FloatArray) -
             yield table.fault(line, head, cell, error.problem, error.allowed)
 
 
-def _chamber_faults(table: Table, scene: AnyScene) -> Iterator[Fault]:
-    letters = LETTERS[: liquid_ring_scene(scene).disc.chambers]
-    for line, cell in zip(table.lines, table.texts("chamber"), strict=True):
+def _faults_of_scene(
+    table: Table, kind: Kind, scene: AnyScene | None, columns: Mapping[str, FloatArray]
+) -> Iterator[Fault]:
+    """Chambers that the disc does not have, and fills of a driven one beyond the liquid of its pair."""
+    if scene is None or not (kind.has_chamber or kind.column("gas_time")):
+        return
+    disc = liquid_ring_scene(scene).disc
+    letters, total = LETTERS[: disc.chambers], 2 * disc.initial_fill
+    for line, cell in zip(table.lines, table.texts("chamber"), strict=True) if kind.has_chamber else ():
         if len(cell) != 1 or cell not in letters:
             problem = f"the disc has no chamber of that name{did_you_mean(cell, letters)}"
             yield table.fault(line, "chamber", cell, problem, ", ".join(letters))
-
-
-def _fill_faults(table: Table, scene: AnyScene, columns: Mapping[str, FloatArray]) -> Iterator[Fault]:
-    """Fills of a driven chamber beyond the liquid of its pair."""
-    if "fill_ratio" not in columns:
-        return
-    head = next(head for head in table.heads if (split_head(head) or ("",))[0] == "fill_ratio")
-    total = 2 * liquid_ring_scene(scene).disc.initial_fill
-    rows = zip(table.lines, table.texts(head), columns["fill_ratio"].tolist(), strict=True)
-    for line, cell, fill in rows:
-        if total * (1 + _ROUNDED) < fill <= 1:
-            problem = f"the chambers of a pair hold {total:.4g} together, twice disc.initial_fill"
-            yield table.fault(line, head, cell, problem, f"from 0 to {total:.4g}")
+    for head in table.heads:
+        if (split_head(head) or ("",))[0] == "fill_ratio":
+            rows = zip(table.lines, table.texts(head), columns["fill_ratio"].tolist(), strict=True)
+            for line, cell, fill in rows:
+                if total * (1 + _ROUNDED) < fill <= 1:
+                    problem = f"the chambers of a pair hold {total:.4g} together, twice disc.initial_fill"
+                    yield table.fault(line, head, cell, problem, f"from 0 to {total:.4g}")
 
 
 def _repeated(table: Table) -> Iterator[Fault]:
@@ -263,16 +260,13 @@ def _repeated(table: Table) -> Iterator[Fault]:
             yield data_fault(table.file, f"line {line}", problem)
 
 
-def _zero_to_peak(columns: Mapping[str, FloatArray], kind: DataKind, factor: float) -> dict[str, FloatArray]:
+def _zero_to_peak(columns: Mapping[str, FloatArray], kind: Kind, factor: float) -> dict[str, FloatArray]:
     counted = {column.name for column in kind.columns if column.amplitude}
     return {name: values * (factor if name in counted else 1.0) for name, values in columns.items()}
 
 
-KEY: Final = "uncertainty"
-
-
 def _stated_uncertainty(
-    table: Table, kind: DataKind, columns: Mapping[str, FloatArray]
+    table: Table, kind: Kind, columns: Mapping[str, FloatArray]
 ) -> tuple[dict[str, FloatArray], list[Fault]]:
     """Expanded uncertainty of each measured column for which the file states one.
 
@@ -281,17 +275,19 @@ def _stated_uncertainty(
     """
     measured = [column for column in kind.measured if column.name in columns]
     result, faults = _of_header(table, kind, columns, measured)
-    if KEY in columns:
-        result = {column.name: columns[KEY] * _size(kind, columns, column.name) for column in measured}
-    own = {column.name: columns.get(f"{KEY}_{column.name}") for column in measured}
+    if _UNCERTAINTY in columns:
+        result = {
+            column.name: columns[_UNCERTAINTY] * _size(kind, columns, column.name) for column in measured
+        }
+    own = {column.name: columns.get(f"{_UNCERTAINTY}_{column.name}") for column in measured}
     result |= {name: width for name, width in own.items() if width is not None}
     return result, [*faults, *_of_zero(table, columns, result), *_partial(table, kind, result)]
 
 
 def _of_header(
-    table: Table, kind: DataKind, columns: Mapping[str, FloatArray], measured: Iterable[Column]
+    table: Table, kind: Kind, columns: Mapping[str, FloatArray], measured: Iterable[Column]
 ) -> tuple[dict[str, FloatArray], list[Fault]]:
-    stated = table.header.get(KEY)
+    stated = table.header.get(_UNCERTAINTY)
     if stated is None:
         return {}, []
     if isinstance(stated, Mapping):
@@ -299,7 +295,7 @@ def _of_header(
     if isinstance(stated, bool) or not isinstance(stated, int | float) or not 0 < stated < 1:
         problem = "it must be a number above 0 and below 1: 95 %, relative to the measured values"
         allowed = 'such as 0.02, or by column: { amplitude = "0.1 um", phase = "1 deg" }; absent: estimated'
-        return {}, [data_fault(table.file, KEY, problem, value=toml_text(stated), allowed=allowed)]
+        return {}, [data_fault(table.file, _UNCERTAINTY, problem, value=toml_text(stated), allowed=allowed)]
     return {column.name: stated * _size(kind, columns, column.name) for column in measured}, []
 
 
@@ -322,7 +318,7 @@ def _by_column(
             if not width > 0:
                 raise FieldError("an uncertainty is above zero", "leave it out where it is to be estimated")
         except FieldError as error:
-            place = f"{KEY}.{toml_text(name).strip(chr(34))}"
+            place = f"{_UNCERTAINTY}.{toml_text(name).strip(chr(34))}"
             faults.append(
                 data_fault(table.file, place, error.problem, value=toml_text(value), allowed=error.allowed)
             )
@@ -331,7 +327,7 @@ def _by_column(
     return result, faults
 
 
-def _size(kind: DataKind, columns: Mapping[str, FloatArray], name: str) -> FloatArray:
+def _size(kind: Kind, columns: Mapping[str, FloatArray], name: str) -> FloatArray:
     """What a relative uncertainty refers to: the value, or one radian for the phase of a vibration."""
     of_vibration = name.startswith("phase") and kind.has_amplitudes
     return np.ones_like(columns[name]) if of_vibration else np.abs(columns[name])
@@ -345,13 +341,13 @@ def _of_zero(
         for line, value, each in zip(table.lines, columns[name].tolist(), width.tolist(), strict=True):
             if value == 0 and each == 0:
                 problem = f"{name} is 0 there, so its uncertainty cannot be relative"
-                allowed = f'an absolute one, in a column "{KEY}_{name}"'
+                allowed = f'an absolute one, in a column "{_UNCERTAINTY}_{name}"'
                 yield data_fault(table.file, f"line {line}", problem, allowed=allowed)
 
 
-def _partial(table: Table, kind: DataKind, uncertainty: Mapping[str, FloatArray]) -> Iterator[Fault]:
+def _partial(table: Table, kind: Kind, uncertainty: Mapping[str, FloatArray]) -> Iterator[Fault]:
     """The noise of vibrations is given or estimated, all amplitudes of a file alike."""
     missing = [column.name for column in kind.measured if column.amplitude and column.name not in uncertainty]
     if uncertainty and missing:
         problem = f"stated of {', '.join(uncertainty)} and not of {', '.join(missing)}"
-        yield data_fault(table.file, KEY, problem, allowed="of every amplitude, or of nothing")
+        yield data_fault(table.file, _UNCERTAINTY, problem, allowed="of every amplitude, or of nothing")

@@ -1,12 +1,9 @@
-"""Way of one eccentric mass under a constant voltage of its motor, the other one clamped.
-
-It starts at rest from its place in the scene, on a rotor that whirls steadily at constant speed.
-"""
+"""What is measured on a rotor with eccentric masses, and how its scene predicts it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -14,20 +11,47 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.integration import plant_step, substeps
 from ringbalance.controller.eccentric_mass.plant import LOCKED, STUCK, PlantParameters, rest_state
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.identification.data.measurements import Observations
-from ringbalance.identification.predict.predicted import PredictedKind
+from ringbalance.identification.kinds.kind import (
+    Grid,
+    Kind,
+    Observations,
+    always,
+    amplitude,
+    column,
+    measured,
+    parts,
+    phase,
+    positive,
+)
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 MOST_STEPS: Final = 300_000
 """Of all motions of a file, some 0.2 s a prediction: a fit takes a minute or two."""
 _MOST_SUBSTEPS: Final = 20_000
 """Of one call of the plant, some 0.02 s: a signal, such as that of Ctrl-C, acts only between calls."""
+_VOLTAGES: Final = (0.25, 0.5, 1.0)
+"""Of the largest; where the scene gives none, those of the data alone."""
+_TIMES: Final = (0.1, 0.4, 1.0)
+"""s, of positioning."""
+_SPEEDS: Final = 9
+"""From half of the lowest speed of the scene to the highest one."""
 
 
-def _predict(scene: EccentricScene, observations: Observations, _: object) -> FloatArray:
-    """Angles moved, rad, shape (n,), by the plant's equations of motion.
+def _steady_whirls(scene: EccentricScene, observations: Observations, _: object) -> FloatArray:
+    """Vibration over the speed in the rotor's frame, m, both masses clamped where they stand at the start.
 
-    Rows of one series, mass, voltage and speed are one motion.
+    At constant speed, as in a run-up that is slow against the decay of the rotor's motion.
+    """
+    plant, angles = PlantParameters.of(scene), scene.masses.initial_angle
+    speeds = observations.columns["speed"].tolist()
+    return parts(np.array([plant.steady_whirl(speed, angles) for speed in speeds], dtype=np.complex128))
+
+
+def _positions(scene: EccentricScene, observations: Observations, _: object) -> FloatArray:
+    """Angles by which one mass has moved under a constant voltage, rad, the other one clamped.
+
+    It starts at rest from its place in the scene, on a rotor that whirls steadily at constant speed. Rows of
+    one series, mass, voltage and speed are one motion.
     """
     plant = PlantParameters.of(scene)
     found = np.empty(len(observations))
@@ -97,6 +121,54 @@ def _moved(
     return found
 
 
-POSITIONING: Final = PredictedKind.numbers(
-    lambda _: "angle", predict=_predict, informs=_informs, obstacle=_too_long
-)
+def _some_speeds(scene: EccentricScene) -> Grid:
+    speeds = [point.speed for point in scene.rotor.speed_profile]
+    return {"speed": np.linspace(min(speeds) / 2, max(speeds), _SPEEDS).tolist()}
+
+
+def _some_motions(scene: EccentricScene) -> Grid:
+    largest = scene.motor.maximum_voltage
+    return {
+        "moved_mass": [1.0, 2.0],
+        "voltage": [] if largest is None else [x * largest for x in _VOLTAGES],
+        "speed": [min(point.speed for point in scene.rotor.speed_profile)],
+        "time": _TIMES,
+    }
+
+
+ECCENTRIC_MASS: Final[Mapping[str, Kind]] = {
+    "run_up": Kind(
+        title="vibration of the rotor over its speed, both masses clamped",
+        balancer="eccentric_mass",
+        columns=(
+            positive("speed [rpm]", "of the rotor"),
+            amplitude("amplitude [um]", "of the vibration"),
+            phase("phase [deg]"),
+        ),
+        predict=_steady_whirls,
+        informs=always("rotor.stiffness", "rotor.damping", "imbalance.mass", "imbalance.phase"),
+        offers=_some_speeds,
+    ),
+    "positioning": Kind(
+        title="angle of one mass under a constant motor voltage",
+        balancer="eccentric_mass",
+        columns=(
+            column("time [s]", "from when the voltage was applied", lowest=0.0, highest=100.0),
+            column("voltage [V]", "of the motor", highest=1000.0),
+            column("speed [rpm]", "of the rotor", lowest=0.0, highest=1000.0),
+            measured("angle [deg]", "moved by the mass on its track since then, not wrapped"),
+            column(
+                "moved_mass",
+                "1 or 2, the mass that moves while the other one is clamped; 1 without this column",
+                optional=True,
+                lowest=1.0,
+                highest=2.0,
+                whole=True,
+            ),
+        ),
+        predict=_positions,
+        informs=_informs,
+        obstacle=_too_long,
+        offers=_some_motions,
+    ),
+}

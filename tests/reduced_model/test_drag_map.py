@@ -49,9 +49,10 @@ def test_a_point_is_what_law_and_tube_loss_say(
     loss = tube_loss(scene, flow.velocity)
     if flow.regime != Regime.UNDECIDED:
         assert found.regime[0, 0] == flow.regime
-    assert found.velocity[0, 0] == pytest.approx(float(flow.velocity), rel=1e-8)
-    assert found.k[0, 0] == pytest.approx(float(loss.k.value), rel=1e-8)
-    assert found.k_uncertainty[0, 0] == pytest.approx(float(loss.k.uncertainty), rel=1e-8)
+    # The law interpolates its heads, too.
+    assert found.velocity[0, 0] == pytest.approx(float(flow.velocity), rel=1e-7)
+    assert found.k[0, 0] == pytest.approx(float(loss.k.value), rel=1e-7)
+    assert found.k_uncertainty[0, 0] == pytest.approx(float(loss.k.uncertainty), rel=1e-6)
     # The law interpolates its half-widths between 257 velocities.
     assert found.velocity_uncertainty[0, 0] == pytest.approx(float(flow.uncertainty), rel=3e-2)
     assert found.in_range[0, 0] == loss.in_range

@@ -17,34 +17,6 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene import loop_models, models
 
 
-def by_grid(
-    disc: models.Disc, *, fill: float, tilt: float, turns: int = 8, cells: int = 1200
-) -> tuple[float, float]:
-    """Means over a turn of |r + G|^2 - b^2 on the wall, m^2, and of int x dA, m^3, by midpoints."""
-    r = disc.plate_thickness + (disc.outer_radius - disc.plate_thickness) * (np.arange(cells) + 0.5) / cells
-    phi = disc.central_angle * ((np.arange(cells // 2) + 0.5) / (cells // 2) - 0.5)
-    radius, angle = np.meshgrid(r, phi)
-    inside = (np.abs(angle) < half_angle(disc=disc, radius=radius)) & (radius > disc.inner_radius / 3)
-    area = radius * (r[1] - r[0]) * (phi[1] - phi[0])
-    wanted = fill * chamber_volume(disc=disc) / disc.axial_width
-    top = float(half_angle(disc=disc, radius=disc.outer_radius))
-    wall = np.linspace(-top, top, 2001)
-    wall = (wall[1:] + wall[:-1]) / 2
-    pressures, moments = [], []
-    for psi in 2 * np.pi * np.arange(turns) / turns:
-        level = radius**2 + 2 * radius * tilt * np.cos(angle - psi) + tilt**2
-        low, high = 0.0, (disc.outer_radius + tilt) ** 2
-        for _ in range(50):
-            middle = (low + high) / 2
-            deep = float(np.sum(area[inside & (level > middle)])) > wanted
-            low, high = (middle, high) if deep else (low, middle)
-        wet = inside & (level > low)
-        moments.append(float(np.sum((area * radius * np.cos(angle))[wet])))
-        on_wall = disc.outer_radius**2 + 2 * disc.outer_radius * tilt * np.cos(wall - psi) + tilt**2
-        pressures.append(float(np.mean(on_wall)) - low)
-    return float(np.mean(pressures)), float(np.mean(moments))
-
-
 def ring(
     scene: models.Scene,
     disc: models.Disc,
@@ -58,15 +30,6 @@ def ring(
     rotor = dataclasses.replace(scene.rotor, speed=10.0)
     turning = dataclasses.replace(scene, disc=disc, environment=environment, rotor=rotor)
     return TiltedRing.of(turning, np.array(fills))
-
-
-def test_the_tilted_circle_against_a_grid(table_1_scene: models.Scene) -> None:
-    disc, tilt = table_1_scene.disc, 3e-3
-    found = ring(table_1_scene, disc, tilt=tilt, fills=[0.4])
-    pressure, moment = by_grid(disc, fill=0.4, tilt=tilt)
-    assert found.closed[0]
-    assert found.wall_pressure[0] == pytest.approx(1000 * 100 / 2 * pressure, rel=2e-3)
-    assert found.moment[0] == pytest.approx(1000 * disc.axial_width * moment, rel=2e-3)
 
 
 def test_without_gravity_it_is_the_closed_form(table_1_scene: models.Scene) -> None:

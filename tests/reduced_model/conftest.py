@@ -36,7 +36,6 @@ def table_1_scene() -> models.Scene:
         sensor=loop_models.Sensor(amplitude_noise=0.0, phase_noise=0.0),
         controller=dataclasses.replace(scene.controller, **trial),  # type: ignore[arg-type]
         uncertainty=(),
-        origins={},
     )
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.intervals import covariance
 from ringbalance.identification.likelihood import Block
 from ringbalance.identification.optimisation import Optimum
-from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.uncertain import NORMAL_95
 

@@ -10,14 +10,13 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.identification.against_fit import against_fit
-from ringbalance.identification.balancers import MODEL_ERRORS, exact_inputs
-from ringbalance.identification.criticism.law_comparison import summaries
-from ringbalance.identification.criticism.review import Review
+from ringbalance.identification.criticism import Review, summaries
+from ringbalance.identification.fitting import FileResiduals, FitResult, FittedParameter, Noise, exact_inputs
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import NextMeasurement
-from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
+from ringbalance.identification.parameters import MODEL_ERRORS
 from ringbalance.results.numbers import rounded
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value

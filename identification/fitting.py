@@ -105,8 +105,8 @@ class Noise:
     standard_deviation: float | None
     """SI; None where the data give it row by row."""
     estimated: bool
-    freedom: float | None
-    """Degrees of freedom behind an estimate."""
+    degrees_of_freedom: float | None
+    """Behind an estimate."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -307,12 +307,15 @@ def _noises(best: Optimum) -> tuple[Noise, ...]:
     estimated = problem.estimated_groups
     given = dict.fromkeys(b.group for b in problem.blocks if not b.estimated)
     rows = [
-        Noise(group=name, standard_deviation=float(s), estimated=True, freedom=float(f))
+        Noise(group=name, standard_deviation=float(s), estimated=True, degrees_of_freedom=float(f))
         for name, s, f in zip(estimated, best.residuals.noise, best.freedom, strict=True)
     ]
     return (
         *rows,
-        *(Noise(group=name, standard_deviation=None, estimated=False, freedom=None) for name in given),
+        *(
+            Noise(group=name, standard_deviation=None, estimated=False, degrees_of_freedom=None)
+            for name in given
+        ),
     )
 
 

@@ -73,7 +73,7 @@ def test_trial_weights_are_a_linear_regression(paper_scene: Scene) -> None:
     assert kappa.value == pytest.approx(abs(k), rel=1e-6)
     assert lag.value == pytest.approx(-np.angle(k), rel=1e-5)
     assert found.noise[0].standard_deviation == pytest.approx(noise, rel=1e-3)
-    assert found.noise[0].freedom == pytest.approx(freedom, rel=1e-3)
+    assert found.noise[0].degrees_of_freedom == pytest.approx(freedom, rel=1e-3)
     reach = student_t.ppf(0.975, freedom) * width
     assert np.array(kappa.interval) - kappa.value == pytest.approx([-reach, reach], rel=0.02)
     assert np.array(lag.interval) - lag.value == pytest.approx([-reach / abs(k), reach / abs(k)], rel=0.02)

@@ -25,7 +25,7 @@ RUNS: Final = 5
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunResult:
+class _RunResult:
     """What one run of a balancer comes to, over the common span."""
 
     time: float
@@ -48,7 +48,7 @@ class Side:
     """As it was run, on the common rotor and tuned, with the seed of the first run."""
     tuned: Mapping[str, float]
     """Scene keys that tuning has changed, with their values, SI."""
-    results: tuple[RunResult, ...]
+    results: tuple[_RunResult, ...]
     """One for each seed."""
     models_used: tuple[ModelUsed, ...] = ()
     """Of a liquid ring: every physical term, with its model and its estimated contribution."""
@@ -107,11 +107,11 @@ class Side:
         return tuple(rows)
 
     def middle(self, name: str) -> float:
-        """Median of one number of `RunResult` over the runs."""
+        """Median of one number of `_RunResult` over the runs."""
         return float(np.quantile(self._values(name), 0.5, method="inverted_cdf"))
 
     def ends(self, name: str) -> tuple[float, float]:
-        """Smallest and largest of one number of `RunResult` over the runs."""
+        """Smallest and largest of one number of `_RunResult` over the runs."""
         values = self._values(name)
         return min(values), max(values)
 
@@ -220,7 +220,7 @@ def _side(rotor: CommonRotor, balancer: Balancer, *, span: float, runs: int) -> 
     ready = advised.lasting(span)
     found = ready.run({}, Draws.first(runs, devices=False), trace=True)
     results = tuple(
-        RunResult(
+        _RunResult(
             time=math.inf if each.settling_time is None else each.settling_time,
             residual_ratio=each.final_amplitude / rotor.amplitude,
             energy=each.energy,
@@ -238,7 +238,7 @@ _NUMBERS: Final = {
     "energy_J": "energy",
     "worst_amplitude_m": "worst_amplitude",
 }
-"""Keys of the document, each with its number of `RunResult`."""
+"""Keys of the document, each with its number of `_RunResult`."""
 _WORDS: Final = {
     "time": ("time to the limit", "s"),
     "residual_ratio": ("left over, ratio", "1"),
@@ -247,11 +247,7 @@ _WORDS: Final = {
 }
 _OFFSETS: Final = "controller.gas_time_offset."
 _UNITS: Final = {
-    "controller.proportional": ("s/um", 1e-6),
     "friction_filter.drive_speed": ("rpm", 30 / math.pi),
-    "friction_filter.pair_gain": ("V/rad", 1.0),
-    "friction_filter.speed_gain": ("V*s/rad", 1.0),
-    "lqr.state_weight": ("", 1.0),
 }
 """Of the keys that tuning may change: the usual unit in scene files, and how many of it one in SI is."""
 

@@ -15,7 +15,7 @@ from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.residual_liquid import FACTOR, Drawing
+from ringbalance.reduced_model.residual_liquid import FACTOR, residual_fill_ratios
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, in_batches
 from ringbalance.scene.models import Gas, Scene
@@ -135,10 +135,10 @@ class Members:
     draw_down: FloatArray | None = None
     """Factor of the depth over a port at which gas enters it; None: all have the scene's."""
 
-    def first(self, size: int) -> Members:
-        """The first of them."""
+    def at(self, places: slice | list[int]) -> Members:
+        """Some of them."""
         kept: dict[str, Any] = {
-            name: values if values is None else values[..., :size] for name, values in vars(self).items()
+            name: values if values is None else values[..., places] for name, values in vars(self).items()
         }
         return Members(**kept)
 
@@ -152,10 +152,10 @@ class Members:
             own["critical_ratio"] = min(own["critical_ratio"], LARGEST_RATIO)
         return replace(gas, **own)
 
-    def residual_fill(self, drawing: Drawing) -> FloatArray:
+    def residual_fill(self, scene: Scene, *, law: FlowLaw) -> FloatArray:
         """Fill at which gas enters the port of each member's driven chamber."""
         deeper = 1.0 if self.draw_down is None else self.draw_down
-        return drawing.residual(depth=deeper, velocity=self.velocity_factor)
+        return residual_fill_ratios(scene, law=law, depth=deeper, velocity=self.velocity_factor)
 
     @classmethod
     def alike(cls, scene: Scene, *, size: int) -> Members:

@@ -6,15 +6,15 @@ Chamber by closed forms, tube by its loss, regimes by `column_flow`; velocities 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from ringbalance.mesh.geometry import chamber_volume, liquid_area
-from ringbalance.physics.tube.draw_down import port_depth
+from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.chamber.values import chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.reduced_model.residual_liquid import NEARLY_EMPTY, drawn_fill, first_gas, first_stalled
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.reduced_model.tube.regime import (
     ColumnFlow,
@@ -27,24 +27,9 @@ from ringbalance.reduced_model.tube.regime import (
 )
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.designs import Designs
-from ringbalance.scene.models import Scene
 
-_ROUNDS: Final = 60
 _TOGETHER: Final = 4096
 """Designs whose arrays fit into a processor's cache."""
-_STEEPEST: Final = 0.9
-_GENTLE: Final = 0.1
-"""dg/dx before it is known, about."""
-_SAME_FILL: Final = 1e-8
-"""Error of a fill, of which the last step leaves a hundredth."""
-_ROUNDING: Final = 1e-12
-_NOTHING: Final = 1e-9
-"""Below this a fill ratio is not told from zero."""
-_SCAN: Final = 17
-_REFINEMENTS: Final = 6
-"""Of a scan, each to a sixteenth: 1e-8 of a fill is left."""
-NEARLY_EMPTY: Final = 1e-6
-"""Share of a pair's liquid with which a chamber's last liquid is looked at."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -181,99 +166,34 @@ def _lowest(tube: TubeFlow, flow: ColumnFlow[FloatArray], ends: TubeEnds) -> tup
 
 
 def _residual_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
-    """Fill at which gas enters the port of a chamber that a running tube empties: the largest such fill.
+    """Fill at which gas enters the port."""
 
-    x = g(x), g the fill at which the layer over the port is as deep as `port_depth` for the flow at x: from
-    the top down g falls with the flow, so the largest of such fills is the first to be met.
-    """
-    about = _fixed_point(tube, top, start=top, exactly=False)
-    x = _fixed_point(tube, top, start=about, exactly=True)
-    return np.where(x > _NOTHING, x, 0.0)
+    def drawn(rows: IntArray, fills: FloatArray, *, exactly: bool = True) -> FloatArray:
+        part = tube.take(rows)
+        scene = part.designs.scene
+        own, other = chamber_pressure(scene=scene, fill_ratio=np.array([fills, top[rows] - fills]))
+        flow = part.flow(part.ends(own, other), primed=True, exactly=exactly)
+        return drawn_fill(scene, flow_rate=scene.tube.area * flow.velocity)
 
-
-def _fixed_point(tube: TubeFlow, top: FloatArray, *, start: FloatArray, exactly: bool) -> FloatArray:
-    x, high, low = start.copy(), top.copy(), np.zeros_like(top)
-    before, drawn, rows = top.copy(), np.full(top.shape, np.nan), np.arange(top.size)
-    done = np.zeros(top.shape, dtype=np.bool_)
-    scene = tube.designs.scene
-    # Above, the opposite chamber leaves its port open, and its gas over the crest lets less liquid flow.
-    covered = top - _fill_at(scene, scene.tube.port_radius)
-    covered = np.where(covered < top, covered * (1 - _ROUNDING), top)
-    part = tube
-    for _ in range(_ROUNDS):
-        if rows.size == 0:
-            break
-        here = x[rows]
-        now = _drawn_fill(part, here, top[rows], exactly=exactly)
-        least = np.where(here > covered[rows], covered[rows], 0.0)
-        high[rows] = np.where(now < here, np.clip(now, least, high[rows]), high[rows])
-        low[rows] = np.where(now > here, np.maximum(now, low[rows]), low[rows])
-        step = here - before[rows]
-        slope = (now - drawn[rows]) / np.where(step == 0, np.nan, step)
-        slope = np.where(np.isfinite(slope), np.clip(slope, 0.0, _STEEPEST), _GENTLE)
-        then = np.clip(here + (now - here) / (1 - slope), np.maximum(low[rows], least), high[rows])
-        # Gas at any fill above: the top itself, or where the other port is covered.
-        stays = (now >= here) & ((here == top[rows]) | (here == covered[rows]))
-        left = (np.abs(now - here) > _SAME_FILL) & ~stays
-        before[rows], drawn[rows] = here, np.where(then > least, now, np.nan)
-        x[rows] = np.where(stays | done[rows], here, then)
-        done[rows] |= ~left
-        left = ~done[rows]
-        if np.count_nonzero(left) <= rows.size / 2:
-            rows = rows[left]
-            part = tube.take(rows)
-    return x
-
-
-def _drawn_fill(tube: TubeFlow, fill_ratio: FloatArray, top: FloatArray, *, exactly: bool) -> FloatArray:
-    """Fill down to which the flow at a fill draws gas."""
-    scene = tube.designs.scene
-    own, other = chamber_pressure(scene=scene, fill_ratio=np.array([fill_ratio, top - fill_ratio]))
-    flow = tube.flow(tube.ends(own, other), primed=True, exactly=exactly)
-    depth = port_depth(scene, flow_rate=scene.tube.area * flow.velocity)
-    return np.minimum(_fill_at(scene, scene.tube.port_radius - depth), top)
-
-
-def _fill_at(scene: Scene, radius: npt.ArrayLike) -> FloatArray:
-    """Fill ratio whose surface lies at a radius, or nearest to it."""
-    disc = scene.disc
-    level = np.clip(radius, disc.inner_radius, disc.outer_radius)
-    whole = liquid_area(disc=disc, surface_radius=disc.inner_radius)
-    return np.clip(liquid_area(disc=disc, surface_radius=level) / whole, 0.0, 1.0)
+    return first_gas(tube.designs.scene, drawn, top=top, about=partial(drawn, exactly=False))
 
 
 def _stalled_fill(tube: TubeFlow, top: FloatArray) -> FloatArray:
     """Fill at which an injection moves no liquid any more; zero where the gas drives a chamber empty.
 
-    Looked for from equal fills down, by a scan and finer ones of the step in which the flow stops: an
-    injection starts with what the tube holds while the gas is off.
+    An injection starts with what the tube holds while the gas is off.
     """
-    start, end = top / 2, NEARLY_EMPTY * top
-    moves = _moves(tube, start, end)
-    stops, first = ~moves.all(axis=0), np.argmin(moves, axis=0)
-    stalled = np.where(stops, start, 0.0)
-    rows = np.flatnonzero(stops & (first > 0))
-    if rows.size == 0:
-        return stalled
-    tube, start, end, first = tube.take(rows), start[rows], end[rows], first[rows]
-    for _ in range(_REFINEMENTS):
-        step = (end - start) / (_SCAN - 1)
-        start, end = start + (first - 1) * step, start + first * step
-        first = np.argmin(_moves(tube, start, end), axis=0)
-        first = np.where(first == 0, _SCAN - 1, first)
-    stalled[rows] = end
-    return stalled
 
+    def moves(rows: IntArray, fills: FloatArray) -> BoolArray:
+        part = tube.take(rows)
+        scene, path = part.designs.scene, part.path
+        own, other = chamber_pressure(
+            scene=scene, fill_ratio=np.array([fills, scene.disc.max_fill_ratio - fills])
+        )
+        rest, held = part.ends(own, other, driven=False), np.zeros(fills.shape, dtype=np.bool_)
+        if path.crest:
+            # Only over a crest may a column be held while the gas is off.
+            held = np.asarray(can_flow(path, rest, True) | can_flow(path, rest.reversed(), True))
+        return np.asarray(can_flow(path, part.ends(own, other), held))
 
-def _moves(tube: TubeFlow, start: FloatArray, end: FloatArray) -> BoolArray:
-    """Whether liquid moves at fills from `start` to `end`, shape (fills, n)."""
-    scene, path = tube.designs.scene, tube.path
-    fills = start + np.linspace(0.0, 1.0, _SCAN)[:, None] * (end - start)
-    own, other = chamber_pressure(
-        scene=scene, fill_ratio=np.array([fills, scene.disc.max_fill_ratio - fills])
-    )
-    rest, held = tube.ends(own, other, driven=False), np.zeros(fills.shape, dtype=np.bool_)
-    if path.crest:
-        # Only over a crest may a column be held while the gas is off.
-        held = np.asarray(can_flow(path, rest, True) | can_flow(path, rest.reversed(), True))
-    return np.asarray(can_flow(path, tube.ends(own, other), held))
+    return np.nan_to_num(first_stalled(moves, start=top / 2, end=NEARLY_EMPTY * top))

@@ -29,20 +29,16 @@ from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.friction import turbulent_share
 from ringbalance.physics.tube.state import TubeState, tube_state, tube_state_at
 from ringbalance.reduced_model.chamber.contributions import (
-    PLATES,
-    RIPPLE,
-    SLOSHING,
     Contribution,
     amplification,
     capillary_share,
     chamber_fills,
-    mean_gravity,
+    gravity_shares,
     percent,
-    range_contributions,
     range_fills,
     wall_layers,
 )
-from ringbalance.reduced_model.chamber.values import by_closed_form, chamber_pressure
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms, chamber_pressure
 from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.tube.flow import TubeFlow
@@ -207,27 +203,29 @@ def injection_time(scene: Scene) -> float:
 
     Returns: s, of `deciding_gas_time` with the flow at equal fills.
     """
-    equal = by_closed_form(scene, scene.disc.max_fill_ratio / 2)
+    *_, arm = chamber_closed_forms(scene=scene, fill_ratio=scene.disc.max_fill_ratio / 2)
     flow = scene.liquid.density * scene.tube.area * range_flow(scene).equal
-    arm = scene.disc.moment_factor * equal.moment_per_mass
-    return deciding_gas_time(scene, rate=scene.rotor.influence_coefficient * arm * flow)
+    rate = scene.rotor.influence_coefficient * scene.disc.moment_factor * float(arm) * flow
+    return deciding_gas_time(scene, rate=rate)
 
 
 def plates(scene: Scene) -> Contribution:
     """Volume that the plates take from a plain sector."""
-    return range_contributions(scene)["pressures"][PLATES]
+    disc = scene.disc
+    # Eqs. 1 and 2: S_c = theta (R2^2 - R1^2)/2, without plates.
+    bare = disc.axial_width * disc.central_angle / 2 * (disc.outer_radius**2 - disc.inner_radius**2)
+    return Contribution(value=1 - chamber_volume(disc=disc) / bare, formula="1 - V/(B theta (R2^2 - R1^2)/2)")
 
 
 def gravity_mean(scene: Scene) -> Contribution:
     """Change of wall pressure or moment, mean over a turn, of second order in g/(omega^2 a)."""
     formula = "free surface |r + g/omega^2| = b against a concentric one, at the worst fill of the range"
-    return Contribution(value=mean_gravity(scene), formula=formula)
+    return Contribution(value=gravity_shares(scene).mean, formula=formula)
 
 
 def ripple_and_sloshing(scene: Scene) -> Contribution:
     """First order in g/(omega^2 a), and what the liquid's swing at 1x makes of it."""
-    parts = range_contributions(scene).values()
-    value = max((part[RIPPLE].value or 0.0) + (part[SLOSHING].value or 0.0) for part in parts)
+    value = gravity_shares(scene).swing
     if scene.environment.shaft == "vertical":
         formula = "on a vertical shaft gravity does not turn in the disc's frame"
         return Contribution(value=value, formula=formula)

@@ -10,84 +10,120 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.geometry import chamber_volume, surface_radius
+from ringbalance.mesh.geometry import chamber_volume, liquid_area, surface_radius
 from ringbalance.physics.tube.draw_down import port_depth
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.tube.flow import column_pressure, tube_path
 from ringbalance.results.rows import Finding
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import half_widths
 
-_SAMPLES: Final = 201
-"""Fills at which gas in the port is looked for first."""
-_PIECES: Final = 32
-"""Of an interval between them; a straight line over one is good to 1e-8 of a fill."""
-_STALL_SAMPLES: Final = 65
-_STALL_ROUNDS: Final = 4
-"""Of refinement, each to a 64th: 1e-8 of a fill is left."""
 NEARLY_EMPTY: Final = 1e-6
 """Share of a pair's liquid with which a chamber's last liquid is looked at."""
 _NOTHING: Final = 1e-9
 """Below this a fill ratio is not told from zero."""
 FACTOR: Final = "draw_down_factor"
 """The scene's factor on the depth of `port_depth`, an uncertain input as any other."""
+_ROUNDS: Final = 60
+_STEEPEST: Final = 0.9
+_GENTLE: Final = 0.1
+"""dg/dx before it is known, about."""
+_SAME_FILL: Final = 1e-8
+"""Error of a fill, of which the last step leaves a hundredth."""
+_ROUNDING: Final = 1e-12
+_SCAN: Final = 17
+_REFINEMENTS: Final = 6
+"""Of a scan, each to a sixteenth: 1e-8 of a fill is left."""
+Drawn = Callable[[IntArray, FloatArray], FloatArray]
+"""Fill down to which the flow at a fill draws gas, of some rows."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Drawing:
-    """At which fills gas enters the port of a chamber that a running tube empties."""
+def fill_at(scene: Scene, radius: npt.ArrayLike) -> FloatArray:
+    """Fill ratio whose surface lies at a radius, or nearest to it."""
+    disc = scene.disc
+    level = np.clip(radius, disc.inner_radius, disc.outer_radius)
+    whole = liquid_area(disc=disc, surface_radius=disc.inner_radius)
+    return np.clip(liquid_area(disc=disc, surface_radius=level) / whole, 0.0, 1.0)
 
-    scene: Scene
-    fill_ratio: FloatArray
-    """Of the driven chamber, equally spaced."""
-    flow_rate: FloatArray
-    """Through the running tube there, m^3/s."""
-    depth: FloatArray
-    """Of the liquid over the port there, m."""
 
-    @classmethod
-    def of(cls, scene: Scene, *, law: FlowLaw) -> Drawing:
-        """Tabulate flow and depth of a scene under a law.
+def drawn_fill(scene: Scene, *, flow_rate: FloatArray, factor: npt.ArrayLike = 1.0) -> FloatArray:
+    """Fill at which the layer over the port is as deep as `port_depth` for a flow, with a factor on that."""
+    depth = np.asarray(factor) * port_depth(scene, flow_rate=flow_rate)
+    return np.minimum(fill_at(scene, scene.tube.port_radius - depth), scene.disc.max_fill_ratio)
 
-        Raises: ValueError: a disc at rest.
-        """
-        fills = np.linspace(0.0, scene.disc.max_fill_ratio, (_SAMPLES - 1) * _PIECES + 1)
-        level = surface_radius(disc=scene.disc, fill_ratio=fills)
-        rate, _ = _flow_rate(scene, law, fills)
-        return cls(
-            scene=scene, fill_ratio=fills, flow_rate=rate, depth=np.asarray(scene.tube.port_radius - level)
-        )
 
-    def residual(self, *, depth: npt.ArrayLike = 1.0, velocity: npt.ArrayLike = 1.0) -> FloatArray:
-        """Fill ratio below which gas enters the port, with factors of the draw-down depth and the velocity.
+def first_gas(scene: Scene, drawn: Drawn, *, top: FloatArray, about: Drawn | None = None) -> FloatArray:
+    """Fill at which gas enters the port of a chamber that a running tube empties: the largest such fill.
 
-        The depth over the port, r_p - a(x), equals that of `port_depth` for the flow Q = S u(x) of the law's
-        running tube; the largest such x counts, because a chamber empties from above.
-        Returns: x from 0 (no gas before the chamber is empty, or no flow) to max_fill_ratio (gas at any
-            fill), of the factors' broadcast shape.
-        """
-        factor, faster = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v)) for v in (depth, velocity)))
+    x = g(x), g the fill that the flow at x draws gas down to: from the top down g falls with the flow, so the
+    largest of such fills is the first to be met.
+    Args: `top`: of every row. `about`: a cheaper g to start with.
+    Returns: x from 0 (no gas before the chamber is empty, or no flow) to `top` (gas at any fill).
+    """
+    # Above, the opposite chamber leaves its port open, and its gas over the crest lets less liquid flow.
+    covered = top - fill_at(scene, scene.tube.port_radius)
+    covered = np.where(covered < top, covered * (1 - _ROUNDING), top)
+    start = top if about is None else _fixed_point(about, top, covered, start=top)
+    x = _fixed_point(drawn, top, covered, start=start)
+    return np.where(x > _NOTHING, x, 0.0)
 
-        def excess(places: npt.NDArray[np.intp]) -> FloatArray:
-            rate = faster[:, None] * self.flow_rate[places]
-            return factor[:, None] * port_depth(self.scene, flow_rate=rate) - self.depth[places]
 
-        last = self.fill_ratio.size - 1
-        drawn = excess(np.arange(0, last + 1, _PIECES)[None, :]) > 0
-        start = np.where(drawn.any(axis=1), last - _PIECES * np.argmax(drawn[:, ::-1], axis=1), -1)
-        places = np.clip(start[:, None], 0, last - _PIECES) + np.arange(_PIECES + 1)
-        fine = excess(places)
-        cell = _PIECES - 1 - np.argmax((fine > 0)[:, -2::-1], axis=1)
-        rows = np.arange(start.size)
-        above, under = fine[rows, cell], fine[rows, cell + 1]
-        step = self.fill_ratio[1] - self.fill_ratio[0]
-        part = above / np.where(above > under, above - under, 1.0)
-        inside = self.fill_ratio[places[rows, cell]] + step * part
-        found = np.where(start == last, self.fill_ratio[-1], np.where(start < 0, 0.0, inside))
-        # Where nothing flows, what rounding leaves over a port on the wall of a mesh is no residual.
-        return np.where(found > _NOTHING, found, 0.0)
+def _fixed_point(drawn_by: Drawn, top: FloatArray, covered: FloatArray, *, start: FloatArray) -> FloatArray:
+    x, high, low = start.copy(), top.copy(), np.zeros_like(top)
+    before, drawn, rows = top.copy(), np.full(top.shape, np.nan), np.arange(top.size)
+    done = np.zeros(top.shape, dtype=np.bool_)
+    for _ in range(_ROUNDS):
+        if rows.size == 0:
+            break
+        here = x[rows]
+        now = drawn_by(rows, here)
+        least = np.where(here > covered[rows], covered[rows], 0.0)
+        high[rows] = np.where(now < here, np.clip(now, least, high[rows]), high[rows])
+        low[rows] = np.where(now > here, np.maximum(now, low[rows]), low[rows])
+        step = here - before[rows]
+        slope = (now - drawn[rows]) / np.where(step == 0, np.nan, step)
+        slope = np.where(np.isfinite(slope), np.clip(slope, 0.0, _STEEPEST), _GENTLE)
+        then = np.clip(here + (now - here) / (1 - slope), np.maximum(low[rows], least), high[rows])
+        # Gas at any fill above: the top itself, or where the other port is covered.
+        stays = (now >= here) & ((here == top[rows]) | (here == covered[rows]))
+        left = (np.abs(now - here) > _SAME_FILL) & ~stays
+        before[rows], drawn[rows] = here, np.where(then > least, now, np.nan)
+        x[rows] = np.where(stays | done[rows], here, then)
+        done[rows] |= ~left
+        left = ~done[rows]
+        if np.count_nonzero(left) <= rows.size / 2:
+            rows = rows[left]
+    return x
+
+
+def first_stalled(
+    moves: Callable[[IntArray, FloatArray], BoolArray], *, start: FloatArray, end: FloatArray
+) -> FloatArray:
+    """Fill from `start` down to `end` at which liquid first stops moving; NaN where it moves at all.
+
+    By a scan and finer ones of the step in which it stops.
+    Args: `moves`: of some rows, whether liquid moves at fills of shape (k, rows).
+    """
+
+    def scan(rows: IntArray, start: FloatArray, end: FloatArray) -> BoolArray:
+        return moves(rows, start + np.linspace(0.0, 1.0, _SCAN)[:, None] * (end - start))
+
+    moved = scan(np.arange(start.size), start, end)
+    stops, first = ~moved.all(axis=0), np.argmin(moved, axis=0)
+    stalled = np.where(stops, start, np.nan)
+    rows = np.flatnonzero(stops & (first > 0))
+    if rows.size == 0:
+        return stalled
+    start, end, first = start[rows], end[rows], first[rows]
+    for _ in range(_REFINEMENTS):
+        step = (end - start) / (_SCAN - 1)
+        start, end = start + (first - 1) * step, start + first * step
+        first = np.argmin(scan(rows, start, end), axis=0)
+        first = np.where(first == 0, _SCAN - 1, first)
+    stalled[rows] = end
+    return stalled
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,13 +171,12 @@ class ResidualLiquid:
 
         Uncertainty of the residual fill: that of the depth, and of the velocity through it.
         """
-        drawing, top = Drawing.of(scene, law=law), scene.disc.max_fill_ratio
-        x = float(drawing.residual()[0])
+        top, x = scene.disc.max_fill_ratio, residual_fill_ratio(scene, law=law)
         rate, width = (float(v[0]) for v in _flow_rate(scene, law, np.array([x])))
         stated = half_widths(scene).get(FACTOR, 0.0) / scene.tube.draw_down_factor
         relative = math.hypot(stated, _by_flow(scene, rate, width))
         change = min(relative, 0.99)
-        low, high = (float(v) for v in drawing.residual(depth=np.array([1 - change, 1 + change])))
+        low, high = residual_fill_ratios(scene, law=law, depth=np.array([1 - change, 1 + change])).tolist()
         stalled = stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure)
         least = min(max(x, stalled), top / 2)
         usable, share = (
@@ -174,7 +209,7 @@ class ResidualLiquid:
         top, x = scene.disc.max_fill_ratio, self.fill_ratio
         rate, width = (float(v[0]) for v in _flow_rate(scene, law, np.array([x])))
         change = min(_by_flow(scene, rate, width), 0.99)
-        drawn = Drawing.of(scene, law=law).residual(depth=np.array([1 - change, 1 + change]))
+        drawn = residual_fill_ratios(scene, law=law, depth=np.array([1 - change, 1 + change]))
         stalled = [
             stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure + side * head)
             for side in (1, -1)
@@ -200,7 +235,23 @@ def reach_share(chambers: int, *, passes_on: bool = True) -> float:
 
 def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
     """Fill ratio below which gas enters the port of the driven chamber under the scene's gas pressure."""
-    return float(Drawing.of(scene, law=law).residual()[0])
+    return float(residual_fill_ratios(scene, law=law)[0])
+
+
+def residual_fill_ratios(
+    scene: Scene, *, law: FlowLaw, depth: npt.ArrayLike = 1.0, velocity: npt.ArrayLike = 1.0
+) -> FloatArray:
+    """The same with factors of the draw-down depth and of the velocity, of their broadcast shape.
+
+    Raises: ValueError: a disc at rest.
+    """
+    factor, faster = np.broadcast_arrays(np.atleast_1d(depth), np.atleast_1d(velocity))
+
+    def drawn(rows: IntArray, fills: FloatArray) -> FloatArray:
+        rate = faster[rows] * _flow_rate(scene, law, fills)[0]
+        return drawn_fill(scene, flow_rate=rate, factor=factor[rows])
+
+    return first_gas(scene, drawn, top=np.full(factor.shape, scene.disc.max_fill_ratio))
 
 
 def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float) -> float:
@@ -212,7 +263,7 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float) -> fl
     injection could correct any further.
     """
 
-    def moves(fills: FloatArray) -> BoolArray:
+    def moves(_: IntArray, fills: FloatArray) -> BoolArray:
         opposite = total - fills
         rest = law.evaluate(fill_ratio=fills, opposite_fill_ratio=opposite, gas_pressure=0.0, primed=True)
         flow = law.evaluate(
@@ -221,21 +272,9 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float) -> fl
         return flow.velocity > 0
 
     lowest = max(0.0, total - law.max_fill_ratio)
-    stopped = first_stalled(moves, start=total / 2, end=max(lowest, NEARLY_EMPTY * total))
-    return lowest if stopped is None else stopped
-
-
-def first_stalled(moves: Callable[[FloatArray], BoolArray], *, start: float, end: float) -> float | None:
-    """Fill from `start` down to `end` at which liquid first stops moving; None where it moves at all."""
-    for _ in range(_STALL_ROUNDS):
-        fills = np.linspace(start, end, _STALL_SAMPLES)
-        stopped = np.flatnonzero(~moves(fills))
-        if not stopped.size:
-            return None
-        if stopped[0] == 0:
-            return start
-        start, end = float(fills[stopped[0] - 1]), float(fills[stopped[0]])
-    return end
+    end = np.array([max(lowest, NEARLY_EMPTY * total)])
+    stalled = float(first_stalled(moves, start=np.array([total / 2]), end=end)[0])
+    return lowest if math.isnan(stalled) else stalled
 
 
 def _pair_moment(law: CalibratedLaw, total: float, fill: float) -> float:

@@ -11,10 +11,14 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import date
 from functools import partial
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.balancer import AS_GIVEN, balancer_of
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.study import eccentric_study
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
@@ -22,18 +26,24 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.pictures.fields import shown_field
-from ringbalance.reports.provenance import provenance, versions
-from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene
+from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene, provenance, versions
 from ringbalance.reports.section import Record, Work
 from ringbalance.reports.sections import begun, collected, completed
+from ringbalance.results.numbers import given, short, with_unit
 from ringbalance.scene import AnyScene, Scene, scene_table
+from ringbalance.scene.keys.declaration import Key, keys_of
+from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.schema import Table
+from ringbalance.scene.kinds import scene_kind
+from ringbalance.scene.origins import InputUncertainty, SceneFile
 from ringbalance.scene.platform.processes import Workers
+from ringbalance.scene.units import DIMENSIONS
 from ringbalance.verification import paper_numbers
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult, merge_saved
-from ringbalance.verification.runner import DRIVEN, cases_under_way
+from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
 
 Progress = Callable[[str], None]
 
@@ -244,3 +254,115 @@ def _flow_law(scene: Scene, calibration: Calibration) -> Record:
         "velocity_paper_m_s": printed["velocity"],
         "regime_paper": printed["regime"],
     }
+
+
+def collect_run(
+    scene: SceneFile,
+    *,
+    level: Level = "light",
+    scene_text: str = "",
+    pool: Workers | None = None,
+    progress: Progress | None = None,
+) -> Record:
+    """The evidence of a balancer without liquid: what its study or one run of it comes to, and the claims of
+    its paper.
+
+    Raises: SceneError: a run that takes too many samples or steps.
+    """
+    tell = progress or (lambda _: None)
+    ids = [case.id for case in load_cases() if case.paper == scene.balancer]
+    with cases_of_report(ids, scene=paper_scene(), level=level, pool=pool) as judged_cases:
+        tell("run")
+        study = _STUDIES.get(scene.balancer, _plain_study)(scene)
+        verification, kept = judged_cases(tell)
+    return {
+        "format": FORMAT,
+        "level": level,
+        "balancer": scene.balancer,
+        "versions": versions(),
+        "scene": scene_record(scene, scene_text, parameters(scene)),
+        "seeds": {"run": scene.run.seed},
+        **study,
+        "verification": verification,
+        "provenance": provenance(),
+        "pictures": {"drawn": True, "text": "", "files": []},
+        "times": {"date": date.today().isoformat(), "kept_cases": kept},
+    }
+
+
+def _plain_study(scene: SceneFile) -> Record:
+    """One run of any balancer as its scene says, as `simulate` shows it, and what the scene demands."""
+    balancer = balancer_of(scene)
+    run = balancer.run({}, AS_GIVEN, trace=True).traced[0].run
+    return {
+        "closed_loop": {"balanced": run.to_dict()},
+        "known": [each.document() for each in balancer.quantities()],
+        "run": balancer.rows(run).document(),
+        "requirements": [each.document() for each in balancer.requirements()],
+    }
+
+
+def _eccentric_study(scene: EccentricScene) -> Record:
+    """The run, balanced and with its masses locked, its loops and requirements, and the true values."""
+    study = eccentric_study(scene).document()
+    truth = {
+        "unbalance_kg_m": scene.imbalance.mass * scene.imbalance.radius,
+        "phase_rad": scene.imbalance.phase,
+        "friction_arm_m": list(scene.masses.friction_arm),
+    }
+    return {"truth": truth, "closed_loop": {"balanced": study.pop("run")}, **study}
+
+
+_STUDIES: Final[Mapping[str, Callable[..., Record]]] = MappingProxyType({"eccentric_mass": _eccentric_study})
+"""By balancer, what has more to show than one run."""
+
+
+def parameters(scene: SceneFile) -> list[Record]:
+    """Every value of a scene with its uncertainty, meaning and origin, as rows of a table."""
+    tables = scene_kind(scene.balancer).schema.tables
+    widths = {each.quantity: _width(each, tables) for each in scene.uncertainty}
+    return [
+        {
+            "group": name.replace("_", " ").capitalize(),
+            "quantity": key.replace("_", " "),
+            "value": _value(value, entry, scene.origin_of(f"{name}.{key}")),
+            "uncertainty": widths.get(f"{name}.{key}", ""),
+            "note": entry.presence.meaning,
+            "origin": scene.origin_of(f"{name}.{key}"),
+            "path": f"{name}.{key}",
+        }
+        for name, table in tables.items()
+        if table.record is not None
+        for key, entry in keys_of(table.record).items()
+        if (value := getattr(getattr(scene, name, None), key, None)) not in (None, ())
+    ]
+
+
+def _value(value: Any, entry: Key, origin: str) -> str:
+    """As the file has it; a default in the words of its declaration, or as it follows from other values."""
+    if origin != "default":
+        return _written(value, entry.takes)
+    if entry.presence.kind != "standard":
+        return _written(value, entry.takes, digits=3)
+    texts = entry.presence.default if isinstance(entry.presence.default, list) else [entry.presence.default]
+    return ", ".join(str(text).replace("*", " ") for text in texts)
+
+
+def _width(uncertain: InputUncertainty, tables: Mapping[str, Table]) -> str:
+    if uncertain.relative:
+        return with_unit(short(100 * uncertain.half_width), "%")
+    table, key = uncertain.quantity.split(".")
+    record = tables[table].record
+    return _written(uncertain.half_width, keys_of(record)[key].takes) if record else ""
+
+
+def _written(value: Any, takes: object, *, digits: int = 6) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(_written(item, takes, digits=digits) for item in value)
+    if isinstance(value, SpeedPoint):
+        return f"{given(value.speed, 'rad/s')} from {given(value.time, 's')}"
+    if isinstance(value, bool | str):
+        return str(value)
+    dimension = takes.dimension if isinstance(takes, Reader) else None
+    unit = next(iter(DIMENSIONS[dimension].units)).replace("*", " ") if dimension else ""
+    return given(value, unit, digits=digits) if unit else short(float(value), digits=digits)

@@ -1,15 +1,19 @@
-"""Wording of the report: plain text set with proper signs, no number changed; inputs by name and origin; and
-printed values that carry their place in the evidence, through any text, onto the page."""
+"""Wording of the report: plain text and equations set with proper signs; inputs by name and origin."""
 
 from __future__ import annotations
 
+import json
+import lzma
 import re
+import tomllib
 from collections.abc import Mapping
-from typing import Any, Final
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any, Final, cast
 
-from markupsafe import Markup, escape
+from markupsafe import escape
 
-from ringbalance.results.numbers import believed, shown
 from ringbalance.scene.uncertain import FITTED
 
 _GREEK: Final = {
@@ -58,10 +62,6 @@ _OWNERS: Final = {"lqr": "regulator", "masses": "eccentric masses"}
 _ALONE: Final = ("accuracy", "environment", "run", "gas.ambient_pressure")
 """Tables, and a key, whose keys need no owner."""
 _MESH: Final = "disc.mesh"
-_DIGITS: Final = 4
-_OPEN, _MIDDLE, _CLOSE = "\ue000", "\ue001", "\ue002"
-_SYMBOL: Final = re.compile(r"(?<![\w.])([A-Za-zα-ωΑ-Ω])_([A-Za-zΩ]{1,3})(?!\w)")
-_TRACED: Final = re.compile(f"{_OPEN}([^{_MIDDLE}]*){_MIDDLE}([^{_CLOSE}]*){_CLOSE}")
 
 
 def typeset(text: str) -> str:
@@ -124,72 +124,68 @@ def input_name(path: str) -> str:
     return f"{key_words(path)} of the {owner}"
 
 
-def traced(text: str, path: str) -> str:
-    """A value's text, marked with its dotted place in the evidence, such as "operating_point.k".
+GLYPHS: Final = "<!-- glyphs -->"
+_SYMBOL: Final = re.compile(r'<symbol id="([^"]+)"([^>]*/>|[^>]*>.*?</symbol>)', re.DOTALL)
+_USE: Final = re.compile(r'href="#([^"]+)"')
 
-    The mark is part of the text, so it survives sentences and tables that are made of it.
+
+@dataclass(frozen=True, kw_only=True)
+class _Equation:
+    """One displayed equation."""
+
+    latex: str
+    words: str
+    """Read aloud, or by those who cannot see it."""
+    source: str
+    """Where it stands in the paper, or what it is."""
+
+
+@cache
+def equations() -> Mapping[str, _Equation]:
+    """The displayed equations of the report's sections, by name."""
+    text = files("ringbalance.reports").joinpath("templates", "equations.toml").read_text(encoding="utf-8")
+    return {name: _Equation(**entry) for name, entry in tomllib.loads(text).items()}
+
+
+@cache
+def equation_svg(latex: str, words: str, name: str) -> str:
+    """One equation as an SVG element in the current text colour, sized in the text's em.
+
+    One that is not kept, as of a case of the user's own, is shown as its LaTeX.
+
+    Args: `name`: prefix of every id within, so that two equations on one page do not share glyphs.
     """
-    return f"{_OPEN}{path}{_MIDDLE}{text}{_CLOSE}"
+    text = _kept().get(latex)
+    if text is None:
+        return f"<code>{escape(latex)}</code>"
+    text = re.sub(r'\bid="', f'id="{name}-', text)
+    text = re.sub(r'href="#', f'href="#{name}-', text)
+    text = re.sub(r' width="([\d.]+)" height="([\d.]+)"', _in_em, text, count=1)
+    label = words.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
+    return text.replace("<svg ", f'<svg role="img" aria-label="{label}" class="math" ', 1)
 
 
-def untraced(text: str) -> str:
-    """The text alone, for a terminal."""
-    return _TRACED.sub(r"\2", text) if _OPEN in text else text
+@cache
+def _kept() -> Mapping[str, str]:
+    """SVG of the program's own equations by their LaTeX, as `tools/generated_docs.py` has set them."""
+    packed = files("ringbalance.reports").joinpath("data", "equations.json.xz").read_bytes()
+    return cast(Mapping[str, str], json.loads(lzma.decompress(packed)))
 
 
-def marked_up(value: object) -> object:
-    """Text as it goes onto the page: typeset, traced values in elements that name their place.
-
-    Markup, and what is marked `verbatim`, is left as it is.
-    """
-    if not isinstance(value, str) or isinstance(value, Markup):
-        return value
-    if _OPEN not in value:
-        return _lowered(typeset(value))
-    # Between two traces stands prose; every third part, from the first on, is such.
-    parts = _TRACED.split(value)
-    found = [escape(_lowered(typeset(parts[0])))]
-    for path, text, prose in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
-        found.append(Markup('<span data-from="{}">{}</span>').format(path, typeset(text)))
-        found.append(escape(_lowered(typeset(prose))))
-    return Markup("").join(found)
+def share_glyphs(page: str) -> str:
+    """Keeps one copy of each glyph for all equations of a page: equations are mostly the same letters."""
+    names: dict[str, str] = {}
+    renamed: dict[str, str] = {}
+    for match in _SYMBOL.finditer(page):
+        content = match[2]
+        renamed[match[1]] = names.setdefault(content, f"glyph-{len(names)}")
+    bare = _SYMBOL.sub("", page)
+    used = _USE.sub(lambda match: f'href="#{renamed.get(match[1], match[1])}"', bare)
+    sheet = "".join(f'<symbol id="{name}"{content}' for content, name in names.items())
+    hidden = 'width="0" height="0" style="position:absolute" aria-hidden="true"'
+    return used.replace(GLYPHS, f'<svg xmlns="http://www.w3.org/2000/svg" {hidden}>{sheet}</svg>', 1)
 
 
-def _lowered(text: str) -> str:
-    """Symbols such as K_B with their index below the line; other text as it is."""
-    return Markup(_SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text)))) if _SYMBOL.search(text) else text
-
-
-def evidence_at(evidence: Any, path: str) -> Any:
-    """What the evidence holds at a dotted place; in a list by position, or by the `id` of an item.
-
-    Raises: KeyError, IndexError: nothing is there.
-    """
-    for key in path.split("."):
-        if not isinstance(evidence, list):
-            evidence = evidence[key]
-        elif key.lstrip("-").isdigit():
-            evidence = evidence[int(key)]
-        else:
-            evidence = {item.get("id"): item for item in evidence}[key]
-    return evidence
-
-
-def found_at(evidence: Any, path: str) -> Any:
-    """The same; None where nothing is there."""
-    try:
-        return evidence_at(evidence, path)
-    except (KeyError, IndexError, TypeError):
-        return None
-
-
-def read(evidence: Any, path: str, unit: str, *, width: float | None = None, digits: int = 3) -> str:
-    """The evidence's value at a place in the unit that suits it, with its half-width (95 %, SI), traced."""
-    value = evidence_at(evidence, path)
-    known = believed(value, width, stated=states_uncertainty(evidence))
-    return traced(shown(value, unit, known, digits=digits if known == width else _DIGITS), path)
-
-
-def states_uncertainty(evidence: Any) -> bool:
-    """Whether the scene file says of any input how uncertain it is."""
-    return bool(evidence.get("scene", {}).get("states_uncertainty"))
+def _in_em(size: re.Match[str]) -> str:
+    width, height = (float(group) / 16 for group in size.groups())
+    return f' style="width:{width:.3f}em;height:{height:.3f}em"'

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -16,20 +16,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.reports.eccentric_evidence import collect_eccentric
-from ringbalance.reports.evidence import Progress, collect_evidence
-from ringbalance.reports.page import DOCUMENTS, case_views, page_content
+from ringbalance.reports.evidence import Progress, collect_evidence, collect_run
+from ringbalance.reports.page import DOCUMENTS, case_views, page_content, render_pages
 from ringbalance.reports.pages.cases import TABLES, is_long, table_file
 from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
-from ringbalance.reports.prose import untraced
-from ringbalance.reports.render import render_pages
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Record
 from ringbalance.reports.sections import section_view, sections_of
 from ringbalance.reports.summary import lead_sentence
+from ringbalance.reports.traced import untraced
 from ringbalance.results.result import csv_text
 from ringbalance.scene import AnyScene, Scene, liquid_ring_scene
 from ringbalance.scene.platform.files import staged
@@ -40,8 +38,10 @@ from ringbalance.verification.runner import paper_scene
 
 FILES: Final = ("evidence.json", *DOCUMENTS)
 """Of a report, the page last: where it is, all else is."""
-DRIVEN: Final[Mapping[str, Callable[..., Record]]] = MappingProxyType({"eccentric_mass": collect_eccentric})
-"""By balancer, what collects the evidence of those that have no liquid."""
+
+
+_WITH_LIQUID: Final = MappingProxyType({"liquid_ring": liquid_ring_scene})
+"""Balancers whose report calibrates, compares laws and has fields and pictures."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,14 +146,14 @@ def write_report(
         views = _Views(pool=pool)
         common: dict[str, Any] = {"level": level, "pool": pool, "progress": progress}
         common["scene_text"] = scene_text
-        if collect := DRIVEN.get(scene.balancer):
-            evidence = collect(scene, **common)
-        else:
-            ring = liquid_ring_scene(scene)
+        if narrowed := _WITH_LIQUID.get(scene.balancer):
+            ring = narrowed(scene)
             with _pictures(ring, stage, opengl) as pictures:
                 evidence = collect_evidence(ring, saved=saved, judged=views.begin_cases, **common)
                 _tell(progress, "pictures")
                 evidence["pictures"] = pictures()
+        else:
+            evidence = collect_run(scene, **common)
         _tell(progress, "page")
         evidence["times"]["total_s"] = round(time.perf_counter() - start, 1)
         evidence = _write_page(evidence, stage, views)

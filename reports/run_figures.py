@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.eccentric_mass.run import locked_run
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reports.figure import (
@@ -71,7 +71,7 @@ def _ring(_: SceneFile, simulation: Simulation) -> list[Drawing]:
 
 
 def _masses(scene: EccentricScene, run: EccentricRun) -> list[Drawing]:
-    document, locked = eccentric_document(run), eccentric_document(locked_run(scene))
+    document, locked = run.to_dict(), locked_run(scene).to_dict()
     speed = [over_speed] if max(document["speed_rad_s"]) > min(document["speed_rad_s"]) else []
     return [
         *(make(document, locked) for make in (over_time, *speed)),

@@ -18,13 +18,13 @@ from ringbalance.reports.pages import (
     chamber,
     drag_coefficient,
     eccentric,
-    extremes,
     first_page,
     loop,
     measured,
     operation,
     paper_figures,
-    trade,
+    plain,
+    studies,
     tube,
     tube_flow,
 )
@@ -59,12 +59,16 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section(name="cases", title="Claims: evidence and doubts"),
     eccentric.SECOND_BALANCER,
     Section(name="numerics", title="Numerical verification"),
-    extremes.SECTION,
-    trade.SECTION,
+    studies.EXTREMES,
+    studies.TRADE,
     Section(name="models", title="Models used, and why"),
     measured.SECTION,
     Section(name="scene", title="Scene file, mesh and versions"),
 )
+_BY_BALANCER: Final[Mapping[str, tuple[Section, ...]]] = MappingProxyType(
+    {"liquid_ring": SECTIONS, eccentric.BALANCER: eccentric.SECTIONS}
+)
+"""Of those balancers that have pages of their own."""
 Begun = dict[str, Future[Record | None]]
 PREFIXES: Final[Mapping[Place, str]] = MappingProxyType({"report": "", "annex": "A"})
 """Before the number of every section, figure, table and equation of a document."""
@@ -101,7 +105,8 @@ def completed(found: Record, apart: Begun, work: Work, pool: Workers | None) -> 
 
 def sections_of(evidence: Record) -> tuple[Section, ...]:
     """The sections of a report on the evidence's kind of balancer."""
-    return eccentric.SECTIONS if evidence.get("balancer") == eccentric.BALANCER else SECTIONS
+    balancer = evidence.get("balancer", "liquid_ring")
+    return _BY_BALANCER.get(balancer, plain.SECTIONS)
 
 
 def section_view(name: str, text: str) -> Record | None:

@@ -40,7 +40,7 @@ COMMANDS = {
     ),
     "simulate": ("ringbalance.reports.simulate_cli:simulate", "One closed-loop balancing run."),
     "tune": (
-        "ringbalance.controller.tuning.cli:tune",
+        "ringbalance.controller.cli:tune",
         "Recommended gain, its margins, and the settling times under it.",
     ),
     "fit": (
@@ -51,7 +51,7 @@ COMMANDS = {
         "ringbalance.verification.cli:verify",
         "The verification cases and the paper's claims, judged.",
     ),
-    "compare": ("ringbalance.controller.compare_cli:compare", "Two balancers on one rotor, side by side."),
+    "compare": ("ringbalance.controller.cli:compare", "Two balancers on one rotor, side by side."),
     "trade": (
         "ringbalance.verification.trade:trade",
         "Speed against accuracy: designs a second and error of every model.",

@@ -16,7 +16,7 @@ import pytest
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
-from ringbalance.controller.eccentric_mass.tuning import eccentric_tuning_document, tune_eccentric
+from ringbalance.controller.eccentric_mass.tuning import tune_eccentric
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
@@ -139,7 +139,7 @@ def test_keys_of_tune(folder: Path, printed: Any) -> None:
 
 def test_keys_of_tune_of_eccentric_masses() -> None:
     tuning = tune_eccentric(eccentric_scene(rb.load_scene(DRIVEN)), runs=1)
-    compare("`tune --json` of eccentric masses", [eccentric_tuning_document(tuning)])
+    compare("`tune --json` of eccentric masses", [tuning.to_dict()])
 
 
 def test_keys_of_fit(printed: Any) -> None:

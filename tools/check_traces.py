@@ -10,7 +10,7 @@ from html import unescape
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.reports.prose import evidence_at
+from ringbalance.reports.traced import evidence_at
 from ringbalance.results.numbers import MINUS, SCALES
 
 _TRACED: Final = re.compile(r'<span data-from="([^"]+)">(.*?)</span>')

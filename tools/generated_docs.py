@@ -23,7 +23,7 @@ from typesetting import typeset
 
 from ringbalance.identification.kinds.kind import Kind
 from ringbalance.identification.kinds.registry import KINDS
-from ringbalance.reports.equations import equations as report_equations
+from ringbalance.reports.prose import equations as report_equations
 from ringbalance.reports.saved import saved_cases
 from ringbalance.results.rows import sentences
 from ringbalance.scene import write_whole

@@ -14,7 +14,7 @@ from html import unescape
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.reports.render import render
+from ringbalance.reports.page import render
 
 FOLDER: Final = Path(__file__).resolve().parents[1] / "tests" / "reports" / "golden"
 NAMES: Final = ("ring", "masses")

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from ringbalance.reports.evidence import FORMAT
-from ringbalance.reports.provenance import versions
-from ringbalance.reports.saved import PACKAGED, Record, heavy_cases
+from ringbalance.reports.saved import PACKAGED, heavy_cases, versions
+from ringbalance.reports.section import Record
 from ringbalance.scene import write_whole
 
 TARGET = Path(__file__).resolve().parents[1] / "reports" / "data" / PACKAGED

@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.imbalance_filter import (
-    MassInput,
-    ProcessNoise,
-    encoder_covariance,
-    predicted_deviation,
-    start_estimate,
-)
 from ringbalance.controller.eccentric_mass.integration import longest_run
 from ringbalance.controller.eccentric_mass.plan import HELD, STAGE_NAMES, Cause, Findings, Stage
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, Remedy
+from ringbalance.controller.eccentric_mass.resolution import (
+    expected_deviation,
+    friction_allowed,
+    friction_floor,
+    friction_sight,
+)
+from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.settings import (
-    FRICTION_ERROR,
-    DriveLaw,
-    believed_whirl,
-    track_model,
-)
 from ringbalance.controller.eccentric_mass.supervisor import STALLED_SHARE
 from ringbalance.results.rows import Finding, Value, sentences
 from ringbalance.scene.arrays import FloatArray
@@ -197,8 +190,8 @@ def _numbers(facts: RunFacts) -> dict[str, Value]:
     }
 
 
-_LONGEST_STEPS: Final = 2_000
-"""Steps in which a covariance is worked out; with fewer than the filter takes, each carries less noise."""
+_Changes = dict[str, float | str]
+"""New values by key, such as "lqr.state_weight", SI, that are made together."""
 _ATTAINED: Final = 0.3
 """Share of what a gate allows that a filter should come down to when its walks are lowered."""
 _ROUNDED: Final = 1.01
@@ -213,183 +206,6 @@ _NOTABLY: Final = 1.05
 """Times the run's length, below which a longer run is no remedy."""
 _NO_GATE: Final = 0.5
 """Relative standard deviation beyond which a gate lets anything pass."""
-
-
-def expected_deviation(scene: EccentricScene, *, speed: float, duration: float | None = None) -> float:
-    """Standard deviation of the imbalance that an estimation at constant speed comes to, kg m.
-
-    Divide by the imbalance, or by the balancing capacity 2 m_b r_b, to see whether it can be resolved at all.
-     At zero speed it is the earlier estimate, since a resting rotor shows nothing.
-    Args: `duration`: of the estimation, s; default the longest that the scene allows.
-    """
-    told, masses = scene.imbalance_filter, scene.masses
-    if speed == 0:
-        return told.initial_unbalance
-    longest = scene.supervisor.imbalance_time if duration is None else duration
-    step = max(told.step, longest / _LONGEST_STEPS)
-    fewer = told.step / step
-    moment = masses.mass * masses.guide_radius
-    encoders = encoder_covariance(moment, masses.initial_angle, scene.sensor.encoder_noise)
-    found = predicted_deviation(
-        start_estimate(told.initial_position, told.initial_velocity, told.initial_unbalance),
-        model=believed_whirl(scene),
-        noise=ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2),
-        variance=np.repeat([told.position_noise**2, told.velocity_noise**2], 2) * fewer,
-        masses=MassInput(0.0j, 0.0j, encoders * fewer, 0.0),
-        angular_velocity=speed,
-        step=step,
-        duration=longest,
-        laboratory=scene.sensor.frame == "laboratory",
-    )
-    return float(found[-1])
-
-
-def _friction_floor(scene: EccentricScene, *, speed: float) -> float:
-    """Standard deviation, m, that a friction arm's estimate keeps for ever.
-
-    P = s_mu sqrt(s_w^2 + 2 c s_mu r)/c with c = b W^2/(J + J_add), the walks of arm and rate and the density
-    r of the encoder's noise: Riccati's equation of both.
-    """
-    told = scene.friction_filter
-    if speed == 0:
-        return math.inf
-    c, r = _friction_sight(scene, speed=speed)
-    return math.sqrt(
-        told.friction_walk * math.hypot(told.rate_walk, math.sqrt(2 * c * told.friction_walk * r)) / c
-    )
-
-
-def _friction_sight(scene: EccentricScene, *, speed: float) -> tuple[float, float]:
-    """Rate of a mass per second and metre of friction arm, and density of the noise on it, rad/s^0.5."""
-    told, track = scene.friction_filter, track_model(scene)
-    return track.moment * speed**2 / track.inertia, told.rate_noise * math.sqrt(told.step)
-
-
-def _friction_allowed(scene: EccentricScene, *, arm: float, speed: float) -> float:
-    """Standard deviation of a friction arm, m, that lets the strategy proceed."""
-    torque = FRICTION_ERROR * DriveLaw.of(scene).position_gain * scene.supervisor.arrival_angle
-    share = scene.friction_filter.gate * max(arm, 0.0)
-    return max(share, torque / (track_model(scene).moment * speed**2)) if speed != 0 else math.inf
-
-
-def found_beforehand(scene: EccentricScene, *, friction_known: bool = False) -> tuple[str, ...]:
-    """Loops that are unstable, drives too weak and gates that cannot be reached, each with what would do.
-
-    Args: `friction_known`: a run has shown that the drives are strong enough for the friction stage.
-    """
-    if scene.supervisor.strategy == "locked":
-        return ()
-    gains = RecommendedGains.of(scene)
-    found = [
-        f"the sampled loop of the {loop.name} is unstable (largest pole {loop.radius:.3g} per step): "
-        f"{_remedy(scene, (loop.key, loop.recommended)).text}, "
-        f"or hold the voltage for {loop.recommended_step:.2g} s"
-        for loop in gains.loops
-        if not loop.stable and not (loop is gains.pair and not gains.speed.stable)
-    ]
-    speed = scene.rotor.speed_profile[0].speed
-    if speed != 0:
-        found += ([] if friction_known else _weak_drive(scene)) + _gates(scene, speed)
-    return tuple(found)
-
-
-def _weak_drive(scene: EccentricScene) -> list[str]:
-    missing = _stall_remedy(scene, margin=1.0)
-    return (
-        [f"the drives cannot overcome the friction in the friction stage: {missing.text}"] if missing else []
-    )
-
-
-def _gates(scene: EccentricScene, speed: float) -> list[str]:
-    found, plant = [], PlantParameters.of(scene)
-    deviation = expected_deviation(scene, speed=speed)
-    reach = abs(plant.influence(speed)) if plant.damping > 0 else math.inf
-    needed = 2 * deviation * reach > 0.1 * scene.supervisor.limit
-    if needed and deviation > scene.imbalance_filter.gate * plant.unbalance:
-        remedy = _imbalance_remedy(scene, deviation=deviation, imbalance=plant.unbalance, reach=reach)
-        found.append(f"the imbalance filter cannot reach its gate at this speed: {remedy.text}")
-    for arm in scene.masses.friction_arm:
-        allowed = _friction_allowed(scene, arm=arm, speed=speed)
-        if _friction_floor(scene, speed=speed) > allowed:
-            text = _friction_remedy(scene, arm=arm, speed=speed).text
-            found.append(f"the friction filter cannot reach its gate: {text}")
-            break
-    return found
-
-
-def _imbalance_remedy(scene: EccentricScene, *, deviation: float, imbalance: float, reach: float) -> Remedy:
-    """A gate that is reached, or an amplitude that makes no more precision necessary."""
-    share = _MARGIN * deviation / imbalance if imbalance > 0 else math.inf
-    if share < _NO_GATE:
-        return _remedy(scene, ("imbalance_filter.gate", share))
-    return _remedy(scene, ("supervisor.limit", _MARGIN * 20 * deviation * reach))
-
-
-def _friction_remedy(scene: EccentricScene, *, arm: float, speed: float) -> Remedy:
-    """A slower walk of the rate if the filter's own floor is above the gate; else more time, and a wider
-    gate.
-    """
-    target = _ATTAINED * _friction_allowed(scene, arm=arm, speed=speed)
-    if _friction_floor(scene, speed=speed) > _ROUNDED * target:
-        return _remedy(scene, *_slower_walks(scene, target, speed=speed))
-    longer = 4 * scene.supervisor.friction_time
-    total = scene.run.time_limit + longer
-    return _remedy(scene, ("supervisor.friction_time", longer), (_TIME, total))
-
-
-def _slower_walks(scene: EccentricScene, target: float, *, speed: float) -> list[tuple[str, float]]:
-    """Walks with which the floor is the target, m; that of the arm only where noise alone is above it."""
-    told, (c, r) = scene.friction_filter, _friction_sight(scene, speed=speed)
-    # Without a walk of the rate P = s_mu^1.5 sqrt(2 r/c); half of that walk leaves room for the other one.
-    most = (target**2 / math.sqrt(2 * r / c)) ** (2 / 3) / 2 if r > 0 else math.inf
-    arm = min(told.friction_walk, most)
-    rate = math.sqrt((target**2 * c / arm) ** 2 - 2 * c * arm * r)
-    changes = [("friction_filter.rate_walk", rate)] if rate < told.rate_walk else []
-    return changes if arm == told.friction_walk else [*changes, ("friction_filter.friction_walk", arm)]
-
-
-def _gain_remedy(scene: EccentricScene) -> Remedy | None:
-    """Stable values of all gains whose loops are not; None when all are stable."""
-    gains = RecommendedGains.of(scene)
-    changes = [(loop.key, loop.recommended) for loop in gains.loops if not loop.stable]
-    if not gains.speed.stable and gains.pair.recommended >= gains.pair.value:
-        changes = [change for change in changes if change[0] != gains.pair.key]
-    if not gains.speed.stable and gains.drive_speed > scene.friction_filter.drive_speed:
-        changes.append(("friction_filter.drive_speed", gains.drive_speed))
-    return _remedy(scene, *changes) if changes else None
-
-
-def _stall_remedy(scene: EccentricScene, *, margin: float = _MARGIN) -> Remedy | None:
-    """Gain, drive speed and voltage whose torque is friction's with a margin; None when the scene's have
-    it.
-    """
-    plant, told, gains = PlantParameters.of(scene), scene.friction_filter, RecommendedGains.of(scene)
-    speed = abs(scene.rotor.speed_profile[0].speed) + told.drive_speed
-    volts = max(scene.masses.friction_arm) * plant.moment * speed**2 / plant.drive_gain
-    changes: list[tuple[str, float]] = []
-    if told.speed_gain * told.drive_speed < margin * volts:
-        gain = min(max(_MARGIN * volts / told.drive_speed, told.speed_gain), gains.speed.recommended)
-        changes.append(("friction_filter.speed_gain", gain))
-        if gain * told.drive_speed < _MARGIN * volts * (1 - 1e-9):
-            changes.append(("friction_filter.drive_speed", 2 * _MARGIN * volts / gain))
-    # What the whirl asks for comes on top of friction.
-    if plant.maximum_voltage < 2 * margin * volts:
-        changes.append(("motor.maximum_voltage", 4 * _MARGIN * volts))
-    return _remedy(scene, *changes) if changes else None
-
-
-def remedies_of(facts: RunFacts) -> tuple[Remedy, ...]:
-    """What would mend the run, the likeliest first.  An unstable loop comes before all else."""
-    outcome = facts.outcome
-    if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
-        return ()
-    own = _REMEDIES[outcome](facts) if outcome in _REMEDIES else ()
-    if facts.by_euler:
-        own = (_remedy(facts.scene, ("imbalance_filter.discretisation", "exact")), *own)
-    gains = None if outcome is EccentricOutcome.TIME_LIMIT else _gain_remedy(facts.scene)
-    return (gains, *own) if gains else own
-
-
 _UNITS: Final = {
     "friction_filter.speed_gain": ("V*s/rad", 1.0),
     "friction_filter.pair_gain": ("V/rad", 1.0),
@@ -401,32 +217,85 @@ _UNITS: Final = {
     "supervisor.limit": ("mm", 1e-3),
     "supervisor.arrival_angle": ("deg", math.pi / 180),
     "supervisor.arrival_rate": ("deg/s", math.pi / 180),
-    "supervisor.positioning_time": ("s", 1.0),
-    "supervisor.fine_tuning_time": ("s", 1.0),
-    "supervisor.friction_time": ("s", 1.0),
-    "supervisor.lowest_speed": ("rpm", 2 * math.pi / 60),
-    "fine_tuning.stop": ("deg", math.pi / 180),
     "masses.mass": ("kg", 1.0),
     "motor.maximum_voltage": ("V", 1.0),
-    "run.time_limit": ("s", 1.0),
     "lqr.state_weight": ("", 1.0),
 }
+"""In which a changed value is rounded and written; others are in seconds."""
 
 
-def _remedy(scene: EccentricScene, *changes: tuple[str, float | str]) -> Remedy:
-    """Changes that are made together, to three digits each, with their text; no run longer than allowed."""
-    longest = _NEARLY * longest_run(scene)
-    changes = tuple(
-        (key, min(value, longest) if key == _TIME and not isinstance(value, str) else value)
-        for key, value in changes
+def found_beforehand(scene: EccentricScene, *, friction_known: bool = False) -> tuple[Finding, ...]:
+    """Loops that are unstable, drives too weak and gates that cannot be reached, each with what would do.
+
+    Args: `friction_known`: a run has shown that the drives are strong enough for the friction stage.
+    """
+    if scene.supervisor.strategy == "locked":
+        return ()
+    gains = RecommendedGains.of(scene)
+    unstable = (
+        _advised(
+            scene,
+            {loop.key: loop.recommended},
+            "loop_unstable",
+            loop=loop.name,
+            radius=loop.radius,
+            hold=loop.recommended_step,
+        )
+        for loop in gains.loops
+        if not loop.stable and not (loop is gains.pair and not gains.speed.stable)
     )
-    rounded = [(key, value if isinstance(value, str) else _rounded(key, value)) for key, value in changes]
-    return Remedy(changes=tuple(rounded), text=" and ".join(_change_text(scene, *each) for each in rounded))
+    speed = scene.rotor.speed_profile[0].speed
+    if speed == 0:
+        return tuple(unstable)
+    missing = None if friction_known else _stall_changes(scene, margin=1.0)
+    weak = (_advised(scene, missing, "drives_too_weak"),) if missing else ()
+    return (*unstable, *weak, *_gates(scene, speed))
 
 
-def _rounded(key: str, value: float) -> float:
-    factor = _UNITS[key][1]
-    return float(f"{value / factor:.3g}") * factor
+def _gates(scene: EccentricScene, speed: float) -> Iterator[Finding]:
+    plant, deviation = PlantParameters.of(scene), expected_deviation(scene, speed=speed)
+    reach = abs(plant.influence(speed)) if plant.damping > 0 else math.inf
+    needed = 2 * deviation * reach > 0.1 * scene.supervisor.limit
+    if needed and deviation > scene.imbalance_filter.gate * plant.unbalance:
+        changes = _imbalance_changes(deviation=deviation, imbalance=plant.unbalance, reach=reach)
+        yield _advised(scene, changes, "imbalance_gate_out_of_reach")
+    floor = friction_floor(scene, speed=speed)
+    for arm in scene.masses.friction_arm:
+        if floor > friction_allowed(scene, arm=arm, speed=speed):
+            changes = _friction_changes(scene, arm=arm, speed=speed)
+            yield _advised(scene, changes, "friction_gate_out_of_reach")
+            break
+
+
+def remedies_of(facts: RunFacts) -> tuple[Finding, ...]:
+    """What would mend the run, the likeliest first.  An unstable loop comes before all else."""
+    outcome, scene = facts.outcome, facts.scene
+    if outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}:
+        return ()
+    every = list(_REMEDIES[outcome](facts)) if outcome in _REMEDIES else []
+    if facts.by_euler:
+        every.insert(0, {"imbalance_filter.discretisation": "exact"})
+    if outcome is not EccentricOutcome.TIME_LIMIT and (gains := _gain_changes(scene)):
+        every.insert(0, gains)
+    return tuple(_advised(scene, changes, "masses_remedy") for changes in every)
+
+
+def _advised(scene: EccentricScene, changes: _Changes, code: str, **values: Value) -> Finding:
+    """A finding with changes to three digits each, which its sentence names."""
+    rounded = _rounded(scene, changes)
+    text = " and ".join(_change_text(scene, key, value) for key, value in rounded.items())
+    return Finding(code=code, values={"text": text, **values}, change=rounded)
+
+
+def _rounded(scene: EccentricScene, changes: _Changes) -> _Changes:
+    """No run longer than allowed."""
+    longest, rounded = _NEARLY * longest_run(scene), changes.copy()
+    for key, value in changes.items():
+        if not isinstance(value, str):
+            factor = _UNITS.get(key, ("s", 1.0))[1]
+            most = longest if key == _TIME else math.inf
+            rounded[key] = float(f"{min(value, most) / factor:.3g}") * factor
+    return rounded
 
 
 def _change_text(scene: EccentricScene, key: str, value: float | str) -> str:
@@ -434,104 +303,152 @@ def _change_text(scene: EccentricScene, key: str, value: float | str) -> str:
     old = getattr(getattr(scene, table), name)
     if isinstance(value, str):
         return f'set {key} = "{value}"'
-    unit, factor = _UNITS[key]
+    unit, factor = _UNITS.get(key, ("s", 1.0))
     new = f"{value / factor:.3g} {unit}".rstrip()
     if old is None:
         return f"set {key} = {new}"
     return f"{'raise' if value > old else 'lower'} {key} from {old / factor:.3g} to {new}"
 
 
-def _more_time(facts: RunFacts) -> tuple[Remedy, ...]:
+def _imbalance_changes(*, deviation: float, imbalance: float, reach: float) -> _Changes:
+    """A gate that is reached, or an amplitude that makes no more precision necessary."""
+    share = _MARGIN * deviation / imbalance if imbalance > 0 else math.inf
+    if share < _NO_GATE:
+        return {"imbalance_filter.gate": share}
+    return {"supervisor.limit": _MARGIN * 20 * deviation * reach}
+
+
+def _friction_changes(scene: EccentricScene, *, arm: float, speed: float) -> _Changes:
+    """Slower walks if the filter's own floor is above the gate; else more time."""
+    target = _ATTAINED * friction_allowed(scene, arm=arm, speed=speed)
+    if friction_floor(scene, speed=speed) > _ROUNDED * target:
+        return _slower_walks(scene, target, speed=speed)
+    longer = 4 * scene.supervisor.friction_time
+    return {"supervisor.friction_time": longer, _TIME: scene.run.time_limit + longer}
+
+
+def _slower_walks(scene: EccentricScene, target: float, *, speed: float) -> _Changes:
+    """Walks with which the floor is the target, m; that of the arm only where noise alone is above it."""
+    told, (c, r) = scene.friction_filter, friction_sight(scene, speed=speed)
+    # Without a walk of the rate P = s_mu^1.5 sqrt(2 r/c); half of that walk leaves room for the other one.
+    most = (target**2 / math.sqrt(2 * r / c)) ** (2 / 3) / 2 if r > 0 else math.inf
+    arm = min(told.friction_walk, most)
+    rate = math.sqrt((target**2 * c / arm) ** 2 - 2 * c * arm * r)
+    changes: _Changes = {"friction_filter.rate_walk": rate} if rate < told.rate_walk else {}
+    return changes if arm == told.friction_walk else changes | {"friction_filter.friction_walk": arm}
+
+
+def _gain_changes(scene: EccentricScene) -> _Changes:
+    """Stable values of all gains whose loops are not; empty when all are stable."""
+    gains = RecommendedGains.of(scene)
+    changes: _Changes = {loop.key: loop.recommended for loop in gains.loops if not loop.stable}
+    if not gains.speed.stable and gains.pair.recommended >= gains.pair.value:
+        changes.pop(gains.pair.key, None)
+    if not gains.speed.stable and gains.drive_speed > scene.friction_filter.drive_speed:
+        changes["friction_filter.drive_speed"] = gains.drive_speed
+    return changes
+
+
+def _stall_changes(scene: EccentricScene, *, margin: float = _MARGIN) -> _Changes:
+    """Gain, drive speed and voltage whose torque is friction's with a margin; empty: the scene's have it."""
+    plant, told, gains = PlantParameters.of(scene), scene.friction_filter, RecommendedGains.of(scene)
+    speed = abs(scene.rotor.speed_profile[0].speed) + told.drive_speed
+    volts = max(scene.masses.friction_arm) * plant.moment * speed**2 / plant.drive_gain
+    changes: _Changes = {}
+    if told.speed_gain * told.drive_speed < margin * volts:
+        gain = min(max(_MARGIN * volts / told.drive_speed, told.speed_gain), gains.speed.recommended)
+        changes["friction_filter.speed_gain"] = gain
+        if gain * told.drive_speed < _MARGIN * volts * (1 - 1e-9):
+            changes["friction_filter.drive_speed"] = 2 * _MARGIN * volts / gain
+    # What the whirl asks for comes on top of friction.
+    if plant.maximum_voltage < 2 * margin * volts:
+        changes["motor.maximum_voltage"] = 4 * _MARGIN * volts
+    return changes
+
+
+def _of_time(facts: RunFacts) -> list[_Changes]:
     """For all that the stages may take, so that the next run does not end within one."""
     told, tuning = facts.scene.supervisor, facts.scene.fine_tuning
     stages = told.start + told.imbalance_time + told.friction_time + told.positioning_time
     tuned = told.fine_tuning_time if facts.stage >= Stage.CHECK else 0.0
-    found = _remedy(facts.scene, (_TIME, stages + tuning.wait + tuning.average + tuned + facts.time))
-    longer = _NOTABLY * facts.scene.run.time_limit
-    return tuple(found for _, value in found.changes if not isinstance(value, str) and value > longer)
+    total = _rounded(facts.scene, {_TIME: stages + tuning.wait + tuning.average + tuned + facts.time})
+    return [total] if float(total[_TIME]) > _NOTABLY * facts.scene.run.time_limit else []
 
 
-def _more_volts(facts: RunFacts) -> list[Remedy]:
+def _of_voltage(facts: RunFacts) -> list[_Changes]:
     volts = facts.scene.motor.maximum_voltage
-    if volts is None or facts.saturation == 0:
-        return []
-    return [_remedy(facts.scene, ("motor.maximum_voltage", 4 * volts))]
+    return [] if volts is None or facts.saturation == 0 else [{"motor.maximum_voltage": 4 * volts}]
 
 
-def _stalled_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
-    found = _stall_remedy(facts.scene)
-    faster = _remedy(
-        facts.scene, ("friction_filter.drive_speed", 4 * facts.scene.friction_filter.drive_speed)
-    )
-    # More volts alone do nothing for a gain that is too low.
-    return (found,) if found else (*_more_volts(facts), faster)
+def _of_stall(facts: RunFacts) -> list[_Changes]:
+    if changes := _stall_changes(facts.scene):
+        # More volts alone do nothing for a gain that is too low.
+        return [changes]
+    faster = 4 * facts.scene.friction_filter.drive_speed
+    return [*_of_voltage(facts), {"friction_filter.drive_speed": faster}]
 
 
-def _arrival_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+def _of_arrival(facts: RunFacts) -> list[_Changes]:
     scene = facts.scene
     if scene.lqr.friction_compensation != "break_away":
-        return (_remedy(scene, ("lqr.friction_compensation", "break_away")),)
-    found = _more_volts(facts)
+        return [{"lqr.friction_compensation": "break_away"}]
     most, weight = RecommendedGains.of(scene).regulator.recommended, scene.lqr.state_weight
-    if most > 2 * weight:
-        found.append(_remedy(scene, ("lqr.state_weight", min(30 * weight, most))))
+    stronger: list[_Changes] = [{"lqr.state_weight": min(30 * weight, most)}] if most > 2 * weight else []
     angle, rate = 4 * scene.supervisor.arrival_angle, 10 * scene.supervisor.arrival_rate
-    found.append(_remedy(scene, ("supervisor.arrival_angle", angle), ("supervisor.arrival_rate", rate)))
-    return tuple(found)
+    wider: _Changes = {"supervisor.arrival_angle": angle, "supervisor.arrival_rate": rate}
+    return [*_of_voltage(facts), *stronger, wider]
 
 
-def _limit_remedy(facts: RunFacts) -> tuple[Remedy, ...]:
+def _of_limit(facts: RunFacts) -> list[_Changes]:
     last = float(np.max(facts.amplitude[-(facts.amplitude.size // 20 + 1) :]))
     worst = last if facts.left is None else max(last, float(facts.amplitude[facts.left]))
-    return (_remedy(facts.scene, ("supervisor.limit", 1.2 * max(worst, facts.scene.supervisor.limit))),)
+    return [{"supervisor.limit": 1.2 * max(worst, facts.scene.supervisor.limit)}]
 
 
-def _tuning_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+def _of_tuning(facts: RunFacts) -> list[_Changes]:
     told = facts.scene.fine_tuning
     longer = max(3 * facts.scene.supervisor.fine_tuning_time, _TRIALS * (told.wait + told.average))
-    total = facts.scene.run.time_limit + longer
-    more = _remedy(facts.scene, ("supervisor.fine_tuning_time", longer), (_TIME, total))
-    return (more, *_limit_remedy(facts))
+    more: _Changes = {"supervisor.fine_tuning_time": longer, _TIME: facts.scene.run.time_limit + longer}
+    return [more, *_of_limit(facts)]
 
 
-def _imbalance_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+def _of_imbalance(facts: RunFacts) -> list[_Changes]:
     reach = abs(PlantParameters.of(facts.scene).influence(float(facts.speed[-1])))
-    told = (facts.deviation, facts.imbalance, reach)
-    return (_imbalance_remedy(facts.scene, deviation=told[0], imbalance=told[1], reach=told[2]),)
+    return [_imbalance_changes(deviation=facts.deviation, imbalance=facts.imbalance, reach=reach)]
 
 
-def _friction_remedies(facts: RunFacts) -> tuple[Remedy, ...]:
+def _of_friction(facts: RunFacts) -> list[_Changes]:
     scene, speed = facts.scene, float(facts.speed[-1])
-    arm = min(scene.masses.friction_arm)
-    found, gate = [_friction_remedy(scene, arm=arm, speed=speed)], 2 * _friction_floor(scene, speed=speed)
-    if scene.friction_filter.gate * arm < gate < 0.5 * arm:
-        found.append(_remedy(scene, ("friction_filter.gate", gate / arm)))
-    return tuple(found)
+    arm, gate = min(scene.masses.friction_arm), 2 * friction_floor(scene, speed=speed)
+    first = _friction_changes(scene, arm=arm, speed=speed)
+    wider = scene.friction_filter.gate * arm < gate < 0.5 * arm
+    return [first, {"friction_filter.gate": gate / arm}] if wider else [first]
 
 
-def _heavier(facts: RunFacts) -> tuple[Remedy, ...]:
+def _of_mass(facts: RunFacts) -> list[_Changes]:
     masses = facts.scene.masses
     reach = 2 * masses.guide_radius * math.cos(0.5 * masses.arc_length / masses.guide_radius)
-    return (_remedy(facts.scene, ("masses.mass", 1.2 * facts.imbalance / reach)),) if reach > 0 else ()
+    return [{"masses.mass": 1.2 * facts.imbalance / reach}] if reach > 0 else []
 
 
-def _weaker(facts: RunFacts) -> tuple[Remedy, ...]:
-    if _gain_remedy(facts.scene):
-        return ()
+def _of_gains(facts: RunFacts) -> list[_Changes]:
+    """Weaker ones, though every loop is stable by its poles."""
+    if _gain_changes(facts.scene):
+        return []
     weight, gain = facts.scene.lqr.state_weight / 30, facts.scene.friction_filter.speed_gain / 4
-    return (_remedy(facts.scene, ("lqr.state_weight", weight), ("friction_filter.speed_gain", gain)),)
+    return [{"lqr.state_weight": weight, "friction_filter.speed_gain": gain}]
 
 
-_REMEDIES: Final[dict[EccentricOutcome, Callable[[RunFacts], tuple[Remedy, ...]]]] = {
-    EccentricOutcome.RISES_AGAIN: _limit_remedy,
-    EccentricOutcome.SATURATED: _heavier,
-    EccentricOutcome.RESIDUAL: _limit_remedy,
-    EccentricOutcome.TUNING_TIME: _tuning_remedies,
-    EccentricOutcome.MASSES_MOVE: lambda facts: tuple(_more_volts(facts)) or _arrival_remedies(facts),
-    EccentricOutcome.IMBALANCE_UNCERTAIN: _imbalance_remedies,
-    EccentricOutcome.FRICTION_UNCERTAIN: _friction_remedies,
-    EccentricOutcome.STALLED: _stalled_remedies,
-    EccentricOutcome.NOT_ARRIVED: _arrival_remedies,
-    EccentricOutcome.TIME_LIMIT: _more_time,
-    EccentricOutcome.DIVERGED: _weaker,
+_REMEDIES: Final[Mapping[EccentricOutcome, Callable[[RunFacts], list[_Changes]]]] = {
+    EccentricOutcome.RISES_AGAIN: _of_limit,
+    EccentricOutcome.SATURATED: _of_mass,
+    EccentricOutcome.RESIDUAL: _of_limit,
+    EccentricOutcome.TUNING_TIME: _of_tuning,
+    EccentricOutcome.MASSES_MOVE: lambda facts: _of_voltage(facts) or _of_arrival(facts),
+    EccentricOutcome.IMBALANCE_UNCERTAIN: _of_imbalance,
+    EccentricOutcome.FRICTION_UNCERTAIN: _of_friction,
+    EccentricOutcome.STALLED: _of_stall,
+    EccentricOutcome.NOT_ARRIVED: _of_arrival,
+    EccentricOutcome.TIME_LIMIT: _of_time,
+    EccentricOutcome.DIVERGED: _of_gains,
 }

@@ -27,12 +27,8 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
-from ringbalance.controller.eccentric_mass.study import eccentric_study, reach_of
-from ringbalance.controller.eccentric_mass.tuning import (
-    EccentricTuning,
-    drawn_run,
-    tune_eccentric,
-)
+from ringbalance.controller.eccentric_mass.study import eccentric_requirements, reach_of
+from ringbalance.controller.eccentric_mass.tuning import EccentricTuning, drawn_run, tune_eccentric
 from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -178,7 +174,7 @@ class EccentricMassBalancer:
 
     def requirements(self) -> tuple[Requirement, ...]:
         """See `Balancer`."""
-        return eccentric_study(self.scene).requirements
+        return eccentric_requirements(self.scene, simulate_eccentric(self.scene))
 
     def rows(self, run: EccentricRun) -> Rows:
         """See `Balancer`."""

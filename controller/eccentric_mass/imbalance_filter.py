@@ -150,7 +150,7 @@ def _process_covariance(
     found = np.zeros((6, 6))
     for i in range(_GAUSS_POINTS.size):
         part = whirl_transition(model, angular_velocity, 0.5 * step * (1.0 + _GAUSS_POINTS[i]))
-        grown, weight = sandwich(part, power), 0.5 * step * _GAUSS_WEIGHTS[i]
+        grown, weight = _sandwich(part, power), 0.5 * step * _GAUSS_WEIGHTS[i]
         # An element at a time: numba compiles expressions of arrays ten times as long.
         for j in range(6):
             for k in range(6):
@@ -159,7 +159,7 @@ def _process_covariance(
 
 
 @compiled
-def sandwich(a: FloatArray, p: FloatArray) -> FloatArray:
+def _sandwich(a: FloatArray, p: FloatArray) -> FloatArray:
     """A P A^T, symmetric to the last bit, by plain sums: too small for a library call to pay."""
     half, full = np.zeros((6, 6)), np.zeros((6, 6))
     for i in range(6):
@@ -286,7 +286,7 @@ def predict(estimate: ImbalanceEstimate, matrices: FilterMatrices, masses: MassI
     state[0] -= 0.5 * masses.drift.real
     state[1] -= 0.5 * masses.drift.imag
     state[4], state[5] = x[4], x[5]
-    covariance = sandwich(a, estimate.covariance)
+    covariance = _sandwich(a, estimate.covariance)
     # An element at a time, here and below: numba compiles expressions of arrays ten times as long.
     for i in range(6):
         for k in range(6):

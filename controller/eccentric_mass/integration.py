@@ -12,11 +12,12 @@ from __future__ import annotations
 import cmath
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from ringbalance.controller.balancer import Progress
 from ringbalance.controller.eccentric_mass.plant import (
     HELD,
     LOCKED,
@@ -185,7 +186,7 @@ def _advance(
 
 
 @compiled
-def fastest_rate(parameters: PlantParameters, speed: float) -> float:
+def _fastest_rate(parameters: PlantParameters, speed: float) -> float:
     """Bound on any rate, rad/s: |W| + sqrt(K_B/M) + C_B/M + C_add/(J + J_add - 2 b^2/M)."""
     least = parameters.inertia + parameters.drive_inertia - 2 * parameters.moment**2 / parameters.mass
     rotor = math.sqrt(parameters.stiffness / parameters.mass) + parameters.damping / parameters.mass
@@ -195,7 +196,7 @@ def fastest_rate(parameters: PlantParameters, speed: float) -> float:
 @compiled
 def substeps(parameters: PlantParameters, speed: float, rate: float, step: float) -> int:
     """Number of substeps that keeps each short against every rate of the plant. Returns: At least 1."""
-    fastest = fastest_rate(parameters, max(abs(speed), abs(speed + rate * step)))
+    fastest = _fastest_rate(parameters, max(abs(speed), abs(speed + rate * step)))
     return max(1, math.ceil(fastest * step / LONGEST))
 
 
@@ -347,7 +348,7 @@ def _substeps(scene: EccentricScene) -> float:
     samples = scene.samples
     # Not at every sample: close enough for a limit, and cheap.
     at = np.linspace(0.0, scene.run.time_limit, min(samples, 10_000))
-    rates = np.abs(np.interp(at, times, speeds)) + fastest_rate(parameters, 0.0)
+    rates = np.abs(np.interp(at, times, speeds)) + _fastest_rate(parameters, 0.0)
     return samples * float(np.mean(np.maximum(np.ceil(rates * step / LONGEST), 1.0)))
 
 
@@ -382,9 +383,6 @@ _SHORT: Final = 0.05
 """A piece that took less is followed by one of twice the samples, s."""
 _LONG: Final = 0.2
 """A piece that took more is followed by one of half the samples, s."""
-
-Progress = Callable[[float, float], None]
-"""Called with the simulated time and the time limit, s."""
 
 
 class _PlantRun(NamedTuple):

@@ -9,19 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.advice import (
-    RunFacts,
-    expected_deviation,
-    found_beforehand,
-    remedies_of,
-)
-from ringbalance.controller.eccentric_mass.integration import (
-    Progress,
-    check_substeps,
-    plant_step,
-    run_plant,
-    stretches,
-)
+from ringbalance.controller.balancer import Progress
+from ringbalance.controller.eccentric_mass.advice import RunFacts, found_beforehand, remedies_of
+from ringbalance.controller.eccentric_mass.integration import check_substeps, plant_step, run_plant, stretches
 from ringbalance.controller.eccentric_mass.plan import (
     RELEASED,
     STAGE_NAMES,
@@ -40,20 +30,12 @@ from ringbalance.controller.eccentric_mass.plant import (
     stuck_flags,
     turned,
 )
-from ringbalance.controller.eccentric_mass.resolution import rotor_covariance
-from ringbalance.controller.eccentric_mass.run_record import (
-    EccentricRun,
-    Record,
-    StageSpan,
-    eccentric_document,
-    eccentric_rows,
-)
+from ringbalance.controller.eccentric_mass.resolution import expected_deviation, rotor_covariance
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun, Record, StageSpan
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings, believed_whirl
 from ringbalance.controller.eccentric_mass.step import strategy_start, strategy_step
 from ringbalance.controller.eccentric_mass.targets import Targets, target_angles
-from ringbalance.results.result import Presentation
-from ringbalance.results.rows import Finding
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.platform.compiled import compiled
 
@@ -304,10 +286,8 @@ def simulate_eccentric(
     whirl = record.state[:, 0] + 1j * record.state[:, 1]
     facts = _facts(scene, record, cause, findings, innovation, speed, np.abs(whirl))
     outcome = facts.outcome
-    remedies = remedies_of(facts)
     settled = facts.settling_time is not None and outcome.value in {"settled", "locked"}
     return EccentricRun(
-        presentation=Presentation(document=eccentric_document, rows=eccentric_rows),
         balancer="eccentric_mass",
         scene=scene.name,
         source=scene.source,
@@ -316,14 +296,8 @@ def simulate_eccentric(
         settled=settled,
         settling_time=facts.settling_time if settled else None,
         ended=facts.ended,
-        warned=(
-            *(
-                Finding(code="masses_beforehand", values={"text": text})
-                for text in found_beforehand(scene, friction_known=facts.friction_known)
-            ),
-            *facts.warnings,
-        ),
-        remedies=remedies,
+        warned=(*found_beforehand(scene, friction_known=facts.friction_known), *facts.warnings),
+        remedies=remedies_of(facts),
         innovation=innovation,
         limit=scene.supervisor.limit,
         time=time,

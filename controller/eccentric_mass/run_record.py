@@ -13,7 +13,7 @@ import numpy as np
 from ringbalance.controller.document import amplitude_line
 from ringbalance.controller.eccentric_mass.targets import Targets
 from ringbalance.results.numbers import given
-from ringbalance.results.result import PresentedResult, Rows, Table
+from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, around
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ringbalance.scene.uncertain import NORMAL_95
@@ -73,15 +73,6 @@ class EccentricOutcome(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Remedy:
-    """Values of the scene that are changed together."""
-
-    changes: tuple[tuple[str, float | str], ...]
-    """Key, such as "lqr.state_weight", and new value in SI."""
-    text: str
-
-
-@dataclass(frozen=True, kw_only=True)
 class StageSpan:
     """One stage of the strategy."""
 
@@ -93,7 +84,7 @@ class StageSpan:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class EccentricRun(PresentedResult):
+class EccentricRun(Result):
     """One run of the whole strategy on the plant."""
 
     balancer: str
@@ -113,7 +104,7 @@ class EccentricRun(PresentedResult):
     """How the run ended."""
     warned: tuple[Finding, ...]
     """What the user should know although the run continued."""
-    remedies: tuple[Remedy, ...]
+    remedies: tuple[Finding, ...]
     """Each by itself, the likeliest first; empty for a settled run, and where no single value will do."""
     innovation: float | None
     """Mean square of the imbalance filter's normalised innovations: 1 for a true model; None without any."""
@@ -147,19 +138,24 @@ class EccentricRun(PresentedResult):
     unbalanced_amplitude: float
     """Steady amplitude that the masses' first places would give at the last speed, m."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """See `_document`."""
+        return _document(self)
+
+    def rows(self) -> Rows:
+        """Quantities, findings and stages of the run."""
+        return _rows(self)
+
     @property
     def status(self) -> str:
         """How the run ended and what to do next."""
-        return ": ".join([self.ended.text, *self._advice])
+        advice = [", or ".join(str(each.values["text"]) for each in self.remedies)] if self.remedies else []
+        return ": ".join([self.ended.text, *advice])
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know, as sentences."""
         return tuple(each.text for each in self.warned)
-
-    @property
-    def _advice(self) -> list[str]:
-        return [", or ".join(remedy.text for remedy in self.remedies)] if self.remedies else []
 
     @property
     def amplitude(self) -> FloatArray:
@@ -204,7 +200,7 @@ _MOST_ROWS: Final = 2500
 """Instants in the document; a run has a hundred times as many."""
 
 
-def eccentric_document(run: EccentricRun) -> dict[str, Any]:
+def _document(run: EccentricRun) -> dict[str, Any]:
     """Turn a run into plain numbers, lists and text, all in SI.
 
     Lists run along `time_s`: instants at equal distances, with the beginning and the end of each stage and
@@ -220,7 +216,7 @@ def eccentric_document(run: EccentricRun) -> dict[str, Any]:
         "outcome": run.outcome.value,
         "status": run.status,
         "warnings": list(run.warnings),
-        "remedies": [dict(remedy.changes) for remedy in run.remedies],
+        "remedies": [dict(each.change) for each in run.remedies],
         "innovation": run.innovation,
         "limit_m": run.limit,
         "residual_ratio": run.residual_ratio,
@@ -304,12 +300,7 @@ def _targets(run: EccentricRun) -> dict[str, Any]:
     }
 
 
-def eccentric_rows(run: EccentricRun) -> Rows:
-    """Quantities, findings and stages of a run."""
-    remedies = (
-        Finding(code="masses_remedy", values={"text": each.text}, change=dict(each.changes))
-        for each in run.remedies
-    )
+def _rows(run: EccentricRun) -> Rows:
     at = np.searchsorted(run.time, [stage.end for stage in run.stages])
     stages = [
         (stage.name, f"{stage.start:.3f}", f"{stage.end:.3f}", given(float(amplitude), "m", digits=4))
@@ -318,7 +309,7 @@ def eccentric_rows(run: EccentricRun) -> Rows:
     return Rows(
         title=f"Run of {run.scene} ({run.source}), eccentric masses",
         quantities=tuple(_quantities(run)),
-        findings=(run.ended, *remedies, *run.warned),
+        findings=(run.ended, *run.remedies, *run.warned),
         facts=(("amplitude (log)", amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))),),
         tables=(Table(caption="Stages", heads=("stage", "from, s", "to, s", "amplitude"), rows=stages),),
     )

@@ -87,13 +87,15 @@ class RecommendedGains:
     @classmethod
     def of(cls, scene: EccentricScene) -> RecommendedGains:
         """Judge the loops of a scene before it is run."""
-        regulator, speed, pair = _regulator(scene), _speed(scene), _pair(scene)
+        regulator, speed = _regulator(scene), _speed(scene)
+        slower = min(speed.value, speed.recommended)
+        pair = _pair(scene, slower)
         return cls(
             regulator=regulator,
             speed=speed,
             pair=pair,
             step=min(loop.recommended_step for loop in (regulator, speed, pair)),
-            drive_speed=_drive_speed(scene, min(speed.value, speed.recommended)),
+            drive_speed=_drive_speed(scene, slower),
         )
 
 
@@ -112,68 +114,83 @@ def advised(
 
 
 def _regulator(scene: EccentricScene) -> _SampledLoop:
-    weight, inputs = scene.lqr.state_weight, scene.lqr.input_weight
+    inputs, track = scene.lqr.input_weight, track_model(scene)
 
-    def poles(state_weight: float, step: float, margin: float) -> ComplexArray:
-        position, rate = lqr_gain(track_model(scene), state_weight=state_weight, input_weight=inputs)
+    def poles(weight: float, step: float, margin: float) -> ComplexArray:
+        position, rate = lqr_gain(track, state_weight=weight, input_weight=inputs)
         return _poles(scene, step, margin * position, margin * rate)
 
-    return _SampledLoop(
-        name="regulator",
-        key="lqr.state_weight",
-        value=weight,
-        unit="",
-        poles=poles(weight, scene.lqr.step, 1.0),
-        gain_margin=_largest(lambda factor: _inside(poles(weight, scene.lqr.step, factor)), 1.0),
-        recommended=_largest(lambda q: _inside(poles(q, scene.lqr.step, GAIN_MARGIN)), weight),
-        recommended_step=_step(scene, lambda step: _inside(poles(weight, step, GAIN_MARGIN))),
+    return _loop(
+        scene, name="regulator", key="lqr.state_weight", value=scene.lqr.state_weight, unit="", poles=poles
     )
 
 
 def _speed(scene: EccentricScene) -> _SampledLoop:
     """One pole, that of the rate."""
-    gain, per_volt = scene.friction_filter.speed_gain, PlantParameters.of(scene).drive_gain
+    per_volt = PlantParameters.of(scene).drive_gain
 
-    def poles(value: float, step: float) -> ComplexArray:
-        return _poles(scene, step, 0.0, per_volt * value, eased=True)
+    def poles(gain: float, step: float, margin: float) -> ComplexArray:
+        return _poles(scene, step, 0.0, per_volt * (margin * gain), eased=True)
 
-    return _SampledLoop(
+    gain = scene.friction_filter.speed_gain
+    return _loop(
+        scene,
         name="speed control",
         key="friction_filter.speed_gain",
         value=gain,
         unit="V*s/rad",
-        poles=poles(gain, scene.lqr.step),
-        gain_margin=_largest(lambda factor: _inside(poles(factor * gain, scene.lqr.step)), 1.0),
-        recommended=_largest(lambda value: _inside(poles(GAIN_MARGIN * value, scene.lqr.step)), gain),
-        recommended_step=_step(scene, lambda step: _inside(poles(GAIN_MARGIN * gain, step))),
+        poles=poles,
     )
 
 
-def _pair(scene: EccentricScene) -> _SampledLoop:
-    """The angle between the masses gets each drive's error; recommended beside the lower speed gain."""
+def _pair(scene: EccentricScene, slower: float) -> _SampledLoop:
+    """The angle between the masses gets each drive's error. Args: `slower`: speed gain beside which a gain
+    is recommended."""
     told, per_volt = scene.friction_filter, PlantParameters.of(scene).drive_gain
 
     def poles(pair: float, speed: float, step: float) -> ComplexArray:
         return _poles(scene, step, 2 * per_volt * pair, per_volt * speed, eased=True)
 
-    slower = min(told.speed_gain, _speed(scene).recommended)
-    return _SampledLoop(
+    return _loop(
+        scene,
         name="pair control",
         key="friction_filter.pair_gain",
         value=told.pair_gain,
         unit="V/rad",
-        poles=poles(told.pair_gain, told.speed_gain, scene.lqr.step),
-        gain_margin=_largest(
-            lambda factor: _inside(poles(factor * told.pair_gain, told.speed_gain, scene.lqr.step)), 1.0
-        ),
-        recommended=_largest(
-            lambda pair: _inside(poles(GAIN_MARGIN * pair, slower, scene.lqr.step)),
-            told.pair_gain or slower,
-        ),
-        recommended_step=_step(
-            scene,
-            lambda step: _inside(poles(GAIN_MARGIN * told.pair_gain, GAIN_MARGIN * told.speed_gain, step)),
-        ),
+        poles=lambda pair, step, margin: poles(margin * pair, told.speed_gain, step),
+        beside=lambda pair, step, margin: poles(margin * pair, slower, step),
+        whole=lambda pair, step, margin: poles(margin * pair, margin * told.speed_gain, step),
+        start=told.pair_gain or slower,
+    )
+
+
+_Poles = Callable[[float, float, float], ComplexArray]
+"""Of the key's value, the hold, s, and a factor on the loop's gain."""
+
+
+def _loop(
+    scene: EccentricScene,
+    *,
+    name: str,
+    key: str,
+    value: float,
+    unit: str,
+    poles: _Poles,
+    beside: _Poles | None = None,
+    whole: _Poles | None = None,
+    start: float | None = None,
+) -> _SampledLoop:
+    """Args: `beside`, `whole`: poles by which a value, and a hold, are recommended; default `poles`."""
+    step, at, held = scene.lqr.step, beside or poles, whole or poles
+    return _SampledLoop(
+        name=name,
+        key=key,
+        value=value,
+        unit=unit,
+        poles=poles(value, step, 1.0),
+        gain_margin=_largest(lambda factor: _inside(poles(value, step, factor)), 1.0),
+        recommended=_largest(lambda other: _inside(at(other, step, GAIN_MARGIN)), start or value),
+        recommended_step=_step(scene, lambda hold: _inside(held(value, hold, GAIN_MARGIN))),
     )
 
 

@@ -137,7 +137,7 @@ def regulator_torque(law: DriveLaw, angle: float, rate: float, goal: float) -> f
 
 
 @compiled
-def motor_torques(
+def _motor_torques(
     settings: StrategySettings, plan: Plan, beliefs: Beliefs, motion: Motion, smoothed: Smoothed
 ) -> Pair:
     """What the motors should give at standstill."""
@@ -195,7 +195,7 @@ def _friction_of(
 
 
 @compiled
-def known_torques(law: DriveLaw, old: Pair, motion: Motion, imbalance: complex, voltage: Pair) -> Pair:
+def _known_torques(law: DriveLaw, old: Pair, motion: Motion, imbalance: complex, voltage: Pair) -> Pair:
     """The torques that the friction filter knows of, one sample more; accelerations are its own matter."""
     load = _rotor_load(law, motion, imbalance, (0.0, 0.0))
     return (
@@ -205,7 +205,7 @@ def known_torques(law: DriveLaw, old: Pair, motion: Motion, imbalance: complex, 
 
 
 @compiled
-def share_of_friction(
+def _share_of_friction(
     law: DriveLaw, motion: Motion, smoothed: Smoothed, imbalance: complex, arm: Pair
 ) -> float:
     """Largest share of what these friction arms hold at most that holding the masses takes."""
@@ -259,11 +259,11 @@ def strategy_step(
         torque, rate = (0.0, 0.0), motion.rate
     facts = _facts(settings.law, old, beliefs, motion, smoothed, visible and whirl.running, measurement.time)
     plan = supervise(settings.gates, old, facts)
-    asked = motor_torques(settings, plan, beliefs, motion, smoothed)
+    asked = _motor_torques(settings, plan, beliefs, motion, smoothed)
     if count % settings.voltage_every == 0:
         voltage = (_voltage_for(settings.law, asked[0]), _voltage_for(settings.law, asked[1]))
     if plan.stage == FRICTION:
-        torque = known_torques(settings.law, torque, motion, beliefs.imbalance, voltage)
+        torque = _known_torques(settings.law, torque, motion, beliefs.imbalance, voltage)
     return StrategyState(count + 1, plan, smoothed, whirl, beliefs, torque, rate, voltage), voltage
 
 
@@ -429,7 +429,7 @@ def _facts(
     load = 0.0
     if plan.stage == CHECK or plan.stage == REST or plan.stage == FAILED:
         sure = (max(one.arm - 2 * deviation[0], 0.0), max(two.arm - 2 * deviation[1], 0.0))
-        load = share_of_friction(law, motion, smoothed, beliefs.imbalance, sure)
+        load = _share_of_friction(law, motion, smoothed, beliefs.imbalance, sure)
     return Facts(
         time,
         w,

@@ -15,19 +15,12 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
-from ringbalance.controller.eccentric_mass.scene_records import (
-    EccentricScene,
-    eccentric_drawn,
-)
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.targets import target_angles
-from ringbalance.controller.eccentric_mass.tuning import (
-    EccentricTuning,
-    eccentric_tuning_document,
-    tune_eccentric,
-)
+from ringbalance.controller.eccentric_mass.tuning import EccentricTuning, tune_eccentric
 from ringbalance.results.requirements import AT_LEAST, AT_MOST, Interval, Requirement
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.paths import moved_at
@@ -35,8 +28,8 @@ from ringbalance.scene.paths import moved_at
 _LIMIT: Final = "supervisor.limit"
 _ROUNDING: Final = 1e-12
 _FEWEST: Final = 3
-Judged = Mapping[str, float | None]
-"""Numbers that a run comes to, by name; None: it does not come to it."""
+_Judged = Mapping[str, Requirement]
+"""What a run comes to, by quantity."""
 NOISE: Final = "sensor.noise"
 _SEEDS: Final = 2
 DRAWS: Final = 39
@@ -59,9 +52,9 @@ class _EccentricStudy:
     def document(self) -> dict[str, Any]:
         """Plain numbers in SI: both runs as `simulate --json` gives them, the loops as `tune --json` does."""
         return {
-            "run": eccentric_document(self.run),
-            "locked": eccentric_document(self.locked),
-            "tuning": eccentric_tuning_document(self.tuning),
+            "run": self.run.to_dict(),
+            "locked": self.locked.to_dict(),
+            "tuning": self.tuning.to_dict(),
             "requirements": [row.document() for row in self.requirements],
         }
 
@@ -72,12 +65,21 @@ def eccentric_study(scene: EccentricScene) -> _EccentricStudy:
     A scene that states uncertainties is run again with all inputs drawn, which gives the intervals, and with
     each input at both ends of its own, which tells what they come from.
     """
-    tuning = tune_eccentric(scene, runs=0)
-    run, locked = simulate_eccentric(scene), locked_run(scene)
+    run = simulate_eccentric(scene)
+    return _EccentricStudy(
+        scene=scene,
+        run=run,
+        locked=locked_run(scene),
+        tuning=tune_eccentric(scene, runs=0),
+        requirements=eccentric_requirements(scene, run),
+    )
+
+
+def eccentric_requirements(scene: EccentricScene, run: EccentricRun) -> tuple[Requirement, ...]:
+    """Of its run as the scene says, with intervals, and of its loops."""
     moved, drawn = _moved_runs(scene), _drawn_runs(scene)
     rows = (_with_intervals(row, moved, drawn) for row in _of_run(scene, run))
-    requirements = (*rows, *_of_loops(tuning.gains))
-    return _EccentricStudy(scene=scene, run=run, locked=locked, tuning=tuning, requirements=requirements)
+    return (*rows, *_of_loops(RecommendedGains.of(scene)))
 
 
 def _of_run(scene: EccentricScene, run: EccentricRun) -> Sequence[Requirement]:
@@ -129,44 +131,45 @@ def _of_loops(gains: RecommendedGains) -> Sequence[Requirement]:
     ]
 
 
-def _judged(scene: EccentricScene, run: EccentricRun) -> Judged:
-    """Both sides of each row, and its excess, by the row's name and the side's."""
-    return {
-        f"{row.quantity}.{side}": value if row.achieved is not None or side == "required" else None
-        for row in _of_run(scene, run)
-        for side, value in (
-            ("achieved", row.achieved),
-            ("required", row.required),
-            ("excess", row.excess),
-        )
-    }
+def _judged(scene: EccentricScene, run: EccentricRun) -> _Judged:
+    return {row.quantity: row for row in _of_run(scene, run)}
 
 
 def _with_intervals(
-    row: Requirement, moved: Mapping[str, list[Judged]], drawn: Sequence[Judged]
+    row: Requirement, moved: Mapping[str, Sequence[_Judged]], drawn: Sequence[_Judged]
 ) -> Requirement:
     if not drawn or row.achieved is None:
         return row
-    excess = [run[f"{row.quantity}.excess"] for run in drawn]
+    every = [run[row.quantity] for run in drawn]
+    known = [each for each in every if each.achieved is not None]
+    both = {path: [run[row.quantity] for run in runs] for path, runs in moved.items()}
     return replace(
         row,
-        required_interval=_interval(row.required, drawn, f"{row.quantity}.required"),
-        achieved_interval=_interval(row.achieved, drawn, f"{row.quantity}.achieved"),
-        excess_interval=_interval(row.excess, drawn, f"{row.quantity}.excess"),
-        effects=_effects(row.excess, moved, f"{row.quantity}.excess"),
-        lost=_lost(moved, f"{row.quantity}.achieved"),
-        reached=sum(run[f"{row.quantity}.achieved"] is not None for run in drawn) / len(drawn),
-        held=sum(more is not None and more >= 0.0 for more in excess) / len(drawn),
+        required_interval=_interval(row.required, [each.required for each in every]),
+        achieved_interval=_interval(row.achieved, [float(each.achieved or 0.0) for each in known]),
+        excess_interval=_interval(row.excess, [each.excess for each in known]),
+        effects=_effects(row.excess, both),
+        lost=tuple(path for path, ends in both.items() if any(end.achieved is None for end in ends)),
+        reached=len(known) / len(every),
+        held=sum(each.met for each in known) / len(every),
     )
 
 
-def _interval(value: float, drawn: Sequence[Judged], name: str) -> Interval | None:
+def _interval(value: float, drawn: Sequence[float]) -> Interval | None:
     """None where nothing moves it, or too few runs come to it."""
-    known = [number for run in drawn if (number := run[name]) is not None]
-    if len(known) < _FEWEST:
+    if len(drawn) < _FEWEST:
         return None
-    low, high = interval(value, known)
+    low, high = interval(value, drawn)
     return (low, high) if high - low > _ROUNDING * abs(value) else None
+
+
+def _effects(excess: float, moved: Mapping[str, Sequence[Requirement]]) -> dict[str, Interval]:
+    """By how much each cause alone lowers and raises what is in excess, both at least zero."""
+    found = {}
+    for path, ends in moved.items():
+        if changes := [end.excess - excess for end in ends if end.achieved is not None]:
+            found[path] = (max(0.0, -min(changes)), max(0.0, *changes))
+    return found
 
 
 def _largest_balanced(run: EccentricRun) -> float | None:
@@ -177,7 +180,7 @@ def _largest_balanced(run: EccentricRun) -> float | None:
     return float(np.max(run.amplitude[run.time >= last.start]))
 
 
-def _moved_runs(scene: EccentricScene) -> dict[str, list[Judged]]:
+def _moved_runs(scene: EccentricScene) -> dict[str, list[_Judged]]:
     """What a run comes to with one input at either end of its stated interval, by the input's path.
 
     With any uncertainty stated, `NOISE` has the runs with further seeds. Empty: none is stated.
@@ -186,7 +189,7 @@ def _moved_runs(scene: EccentricScene) -> dict[str, list[Judged]]:
         return {}
     settings, seed = StrategySettings.of(scene), scene.run.seed
 
-    def came_to(plant: EccentricScene, number: int) -> Judged:
+    def came_to(plant: EccentricScene, number: int) -> _Judged:
         return _judged(plant, simulate_eccentric(plant, seed=number, settings=settings))
 
     moved = {
@@ -196,7 +199,7 @@ def _moved_runs(scene: EccentricScene) -> dict[str, list[Judged]]:
     return moved | {NOISE: [came_to(scene, seed + more) for more in range(1, _SEEDS + 1)]}
 
 
-def _drawn_runs(scene: EccentricScene) -> list[Judged]:
+def _drawn_runs(scene: EccentricScene) -> list[_Judged]:
     """What runs come to with all stated inputs, and the noise, drawn at once; empty: none is stated."""
     if not scene.uncertainty and not scene.fitted.quantities:
         return []
@@ -231,17 +234,3 @@ def _both_ends(scene: EccentricScene, uncertain: InputUncertainty) -> Iterator[E
 
     for sign in (-1, 1):
         yield moved_at(scene, uncertain.quantity, at(sign))
-
-
-def _effects(value: float, moved: Mapping[str, list[Judged]], name: str) -> dict[str, tuple[float, float]]:
-    """By how much each cause alone lowers and raises a number, both at least zero."""
-    found = {}
-    for path, runs in moved.items():
-        if changes := [number - value for run in runs if (number := run[name]) is not None]:
-            found[path] = (max(0.0, -min(changes)), max(0.0, *changes))
-    return found
-
-
-def _lost(moved: Mapping[str, list[Judged]], name: str) -> tuple[str, ...]:
-    """Causes with which at least one run does not come to a number at all."""
-    return tuple(path for path, runs in moved.items() if any(run[name] is None for run in runs))

@@ -18,7 +18,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
-from ringbalance.results.result import Presentation, PresentedResult, Rows, Table
+from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity
 
 RUNS: Final = 40
@@ -42,7 +42,7 @@ class _EccentricSettling:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class EccentricTuning(PresentedResult):
+class EccentricTuning(Result):
     """What is recommended for the drives of eccentric masses."""
 
     scene: EccentricScene
@@ -52,6 +52,14 @@ class EccentricTuning(PresentedResult):
     """Keys that the runs had lowered or raised to the recommended value, SI."""
     settling: _EccentricSettling | None
     """None: not asked for, or the masses are locked."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The loops of the drives and the settling times in SI; null: not reached."""
+        return _document(self)
+
+    def rows(self) -> Rows:
+        """The loops of the drives, and the settling times."""
+        return _rows(self)
 
     @property
     def recommended_scene(self) -> EccentricScene:
@@ -84,7 +92,6 @@ def tune_eccentric(
     if runs and scene.supervisor.strategy != "locked":
         settling = _eccentric_settling(ready, runs=runs, told=told or (lambda _: None))
     return EccentricTuning(
-        presentation=Presentation(document=eccentric_tuning_document, rows=eccentric_tuning_rows),
         scene=scene,
         gains=gains,
         tuned=changes,
@@ -174,8 +181,7 @@ def _of_runs(settling: _EccentricSettling | None) -> str:
     )
 
 
-def eccentric_tuning_document(tuning: EccentricTuning) -> dict[str, Any]:
-    """The loops of a scene's drives and the settling times as a JSON document in SI; null: not reached."""
+def _document(tuning: EccentricTuning) -> dict[str, Any]:
     scene, gains = tuning.scene, tuning.gains
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
@@ -220,8 +226,7 @@ def _settling_document(settling: _EccentricSettling | None) -> dict[str, Any]:
     }
 
 
-def eccentric_tuning_rows(tuning: EccentricTuning) -> Rows:
-    """The loops of a scene's drives, and the settling times."""
+def _rows(tuning: EccentricTuning) -> Rows:
     scene, loops, settling = tuning.scene, tuning.gains.loops, tuning.settling
     recommended = (
         Quantity(key=loop.key, name=f"{loop.key}, at most", value=loop.recommended, unit=loop.unit or "1")

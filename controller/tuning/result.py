@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ringbalance.controller.tuning.loop_factor import (
-    LoopFactor,
-    Margins,
-)
+from ringbalance.controller.tuning.loop_factor import LoopFactor, Margins
 from ringbalance.controller.tuning.recommendation import Contribution
-from ringbalance.controller.tuning.search import (
-    Search,
-)
+from ringbalance.controller.tuning.search import Search
 from ringbalance.controller.tuning.settling import SettlingTimes
 from ringbalance.reduced_model.gas_line import LineAnswer
 from ringbalance.reduced_model.terms import ModelUsed

@@ -17,7 +17,7 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_gas
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.reduced_model.residual_liquid import Drawing, Holding, stalled_fill_ratio
+from ringbalance.reduced_model.residual_liquid import Holding, stalled_fill_ratio
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Rotor
@@ -179,7 +179,7 @@ def _beyond_capacity(
     )
 
     def fraction(asked: Scene, at_least: float) -> float:
-        residual = drawn.first(runs).residual_fill(Drawing.of(asked, law=model.flow))
+        residual = drawn.at(slice(runs)).residual_fill(asked, law=model.flow)
         left = (
             ring.unreachable_vibration(
                 rotor=_rotor(scene, drawn, number), least_fill=max(float(fill), at_least)
@@ -209,7 +209,7 @@ def drawn_run(scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, 
     faster = rotor.influence_coefficient * float(drawn.velocity_factor[number])
     run = replace(scene.run, seed=scene.run.seed + number)
     gas, rotor = drawn.gas_of(scene.gas, number), replace(rotor, influence_coefficient=faster)
-    residual = drawn.first(number + 1).residual_fill(Drawing.of(scene, law=model.flow))[number]
+    (residual,) = drawn.at([number]).residual_fill(scene, law=model.flow)
     asked = replace(scene, rotor=rotor, gas=gas, run=run)
     return simulate(asked, model, residual_fill=float(residual))
 

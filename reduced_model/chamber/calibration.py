@@ -12,7 +12,11 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, head_square, surface_radius
 from ringbalance.physics.results import Estimate, Statistics, Status
-from ringbalance.reduced_model.chamber.contributions import chamber_status, mean_gravity, unmodelled_fractions
+from ringbalance.reduced_model.chamber.contributions import (
+    chamber_status,
+    gravity_shares,
+    unmodelled_fractions,
+)
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
 from ringbalance.reduced_model.chamber.values import RingValues, chamber_pressure, measured_closed_forms
 from ringbalance.reduced_model.tables import HermiteTable, level_table, table_from_samples
@@ -152,7 +156,7 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     nodes, reported = fill_nodes(largest=scene.disc.max_fill_ratio)
     fills = np.append(nodes, [x for x in reported if np.min(np.abs(nodes - x)) > 1e-12])
     ring = RingValues.of(scene, fill_ratio=fills, gravity=scene.environment.gravity > 0)
-    held = mean_gravity(scene) > scene.tolerance
+    held = gravity_shares(scene).mean > scene.tolerance
     compared = ring if held else RingValues.of(scene, fill_ratio=fills, gravity=False)
     check = ElementCheck.of(scene, values=compared, gravity=held)
     unmodelled = unmodelled_fractions(scene, fills)

@@ -20,15 +20,10 @@ from ringbalance.mesh.geometry import (
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.results import Status, StatusCode
-from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY, HIGHEST_TRUE, LOWEST_TRUE, SMALL
-from ringbalance.reduced_model.chamber.tilted_ring import closed_ring
-from ringbalance.reduced_model.chamber.values import (
-    by_closed_form,
-    by_quadrature,
-    drawing_shares,
-    share_across,
-)
-from ringbalance.scene.arrays import FloatArray, distinct
+from ringbalance.physics.sloshing import HIGHEST_TRUE, LOWEST_TRUE, SMALL
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, closed_ring
+from ringbalance.reduced_model.chamber.values import chamber_closed_forms, drawing_shares, share_across
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.rules.working import LARGEST_COMPRESSION, METAL_DENSITY, bulk_modulus
 
@@ -73,13 +68,6 @@ def percent(fraction: float) -> str:
     value = 100 * fraction
     return f"{value:.0f} %" if 99.5 <= abs(value) < 1e6 else f"{value:.2g} %"
 
-
-Terms = Mapping[str, Contribution]
-
-PLATES: Final = "plates between the chambers"
-RIPPLE: Final = "gravity, ripple at 1x"
-MEAN: Final = "gravity, mean over a turn"
-SLOSHING: Final = "sloshing at 1x"
 
 SURFACE_TENSION: Final = 0.073
 """Of water at 20 degC against air, N/m: taken for every ordinary liquid, as an upper bound."""
@@ -230,61 +218,6 @@ def _wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
     return np.minimum(wave_height(scene, fills) ** 2 / 4, 1.0)
 
 
-def chamber_contributions(scene: Scene, fills: FloatArray) -> Mapping[str, Terms]:
-    """Contributions to wall pressure and to moment with lambda, the largest over fills."""
-    rows = [_at(scene, float(x)) for x in fills]
-    return {part: _terms(scene, [row[part] for row in rows], part) for part in ("pressures", "moments")}
-
-
-def _at(scene: Scene, fill: float) -> Mapping[str, Mapping[str, float]]:
-    base = by_closed_form(scene, fill)
-    tilted = by_quadrature(scene, fill) if scene.environment.gravity else base
-    lowest, largest = (float(end) for end in amplification(scene, np.array(fill)))
-
-    def gravity(ripple: float, mean: float, swing: float) -> dict[str, float]:
-        return {RIPPLE: ripple, SLOSHING: ripple * swing, MEAN: mean}
-
-    return {
-        "pressures": gravity(
-            tilted.wall_pressure_ripple / base.wall_pressure,
-            abs(tilted.wall_pressure / base.wall_pressure - 1),
-            _CORIOLIS * max(1.0, largest),
-        ),
-        "moments": gravity(
-            tilted.moment_ripple / base.moment,
-            max(
-                abs(tilted.moment / base.moment - 1),
-                abs(tilted.moment_per_mass / base.moment_per_mass - 1),
-            ),
-            max(abs(lowest - 1), abs(largest - 1)) + _SWING_FLOOR,
-        ),
-    }
-
-
-def _terms(scene: Scene, rows: list[Mapping[str, float]], part: str) -> Terms:
-    largest = {name: max((row[name] for row in rows), default=0.0) for name in (RIPPLE, SLOSHING, MEAN)}
-    disc = scene.disc
-    # Eqs. 1 and 2: S_c = theta (R2^2 - R1^2)/2, without plates.
-    sector = disc.central_angle / 2 * (disc.outer_radius**2 - disc.inner_radius**2)
-    bare = sector * disc.axial_width
-    strips = 1 - chamber_volume(disc=disc) / bare
-    pressures = part == "pressures"
-    first = "rho omega^2 G |R2 s_2 - a s|/P" if pressures else "rho B a^2 G |shape|/U"
-    swing = "2 max(1, |1/(1 - 1/s^2)|)" if pressures else "||1/(1 - 1/s^2)| - 1|"
-    known = percent(FREQUENCY_UNCERTAINTY)
-    found = (
-        (PLATES, strips, "1 - V/(B theta (R2^2 - R1^2)/2)"),
-        (RIPPLE, largest[RIPPLE], f"{first}, G = g/omega^2"),
-        (
-            SLOSHING,
-            largest[SLOSHING],
-            f"ripple times {swing}, s^2 = k tanh(k ln(R2/a)), k = pi/theta, s known to {known}",
-        ),
-        (MEAN, largest[MEAN], "order (G/a)^2, by quadrature"),
-    )
-    return {term: Contribution(value=float(value), formula=formula) for term, value, formula in found}
-
-
 FILLS: Final = (0.2, 0.5, 1.0)
 """Shares of max_fill_ratio."""
 
@@ -304,23 +237,43 @@ def range_fills(scene: Scene) -> FloatArray:
     fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), _resonant_fill(scene)
     if resonant is None or not fills[0] < resonant < fills[-1]:
         return fills
-    return distinct(np.append(fills, resonant))
+    return np.unique(np.append(fills, resonant))
+
+
+class GravityShares(NamedTuple):
+    """Estimated contributions of gravity, relative, of wall pressure or moment, at the worst fill."""
+
+    mean: float
+    """To the means over a turn, of second order in g/(omega^2 a)."""
+    swing: float
+    """Ripple at 1x, of first order, with what the liquid's swing makes of it."""
 
 
 @lru_cache(maxsize=8)
-def range_contributions(scene: Scene) -> Mapping[str, Mapping[str, Contribution]]:
-    """Contributions to wall pressure and moment at the worst fill of the range, as `chamber_contributions`.
-
-    Returns: By "pressures" and "moments", over `chamber_fills`; over the whole range where no ring is closed.
-    """
+def gravity_shares(scene: Scene) -> GravityShares:
+    """Over `chamber_fills`, or over the whole range where no ring is closed."""
+    if scene.environment.gravity == 0:
+        return GravityShares(mean=0.0, swing=0.0)
     closed = chamber_fills(scene)
-    return chamber_contributions(scene, closed if closed.size else range_fills(scene))
-
-
-def mean_gravity(scene: Scene) -> float:
-    """Estimated contribution of gravity to the means over a turn, wall pressure or moment."""
-    found = range_contributions(scene)
-    return max(found[part][MEAN].value or 0.0 for part in ("pressures", "moments"))
+    fills = closed if closed.size else range_fills(scene)
+    wall, moment, ratio = chamber_closed_forms(scene=scene, fill_ratio=fills)
+    ring, (lowest, largest) = TiltedRing.of(scene, fills), amplification(scene, fills)
+    changes = (
+        ring.wall_pressure / wall,
+        ring.moment / moment,
+        2 * ring.moment_per_volume / scene.liquid.density / ratio,
+    )
+    parts = (
+        (ring.wall_pressure_ripple / wall, _CORIOLIS * np.maximum(1.0, largest)),
+        (
+            ring.moment_ripple / moment,
+            np.maximum(np.abs(lowest - 1), np.abs(largest - 1)) + _SWING_FLOOR,
+        ),
+    )
+    return GravityShares(
+        mean=float(np.max(np.abs(np.array(changes) - 1))),
+        swing=max(float(np.max(ripple) + np.max(ripple * swing)) for ripple, swing in parts),
+    )
 
 
 def compression(scene: Scene, fills: FloatArray) -> FloatArray:

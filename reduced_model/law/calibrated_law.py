@@ -6,7 +6,6 @@ Beside it the moment of a pair of chambers, from the same chamber.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -17,7 +16,7 @@ import numpy.typing as npt
 from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_table
-from ringbalance.reduced_model.chamber.contributions import mean_gravity
+from ringbalance.reduced_model.chamber.contributions import gravity_shares
 from ringbalance.reduced_model.chamber.values import RingValues, share_across
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, Conditions, Flow, Regime, law_text, save_record
 from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
@@ -64,11 +63,6 @@ class CalibratedLaw:
 
     The velocity is continuous in fills and pressure, except where the physics jumps: when a column separates
     at rest, and when a chamber's liquid leaves the port open.
-
-    `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
-    (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `hydrostatic_pressure` (Pa), and, of shape
-    (1,), `density`, `port_pressure`, `hump_pressure` (only with a crest), `vapour_pressure` (gauge, Pa), and
-    `released` and `froude_velocity` (m/s) of `SiphonCrest`.
     """
 
     name: str
@@ -179,34 +173,6 @@ class CalibratedLaw:
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)
-
-    def table(self) -> Mapping[str, FloatArray]:
-        """Plain arrays for compiled code, named in the class's docstring.
-
-        Returns: Copies, so that nothing can change the law.
-        """
-        heads = {
-            "log_head": self.heads.head,
-            "log_hump_head": self.heads.hump_head,
-            "log_return_hump_head": self.heads.return_hump_head,
-        }
-        scalars = {
-            "density": self.path.density,
-            "port_pressure": self.path.port_pressure,
-            "hump_pressure": self.path.hump_pressure,
-            "vapour_pressure": self.path.vapour_pressure,
-            "released": self.path.released,
-            "froude_velocity": self.path.froude_velocity,
-        }
-        return (
-            {"log_velocity": self.heads.head.nodes}
-            | {name: table.value.copy() for name, table in heads.items() if table is not None}
-            | {
-                "fill_ratio": self.hydrostatic_pressure.nodes,
-                "hydrostatic_pressure": self.hydrostatic_pressure.value.copy(),
-            }
-            | {name: np.array([value]) for name, value in scalars.items() if value is not None}
-        )
 
 
 def _joined(forward: DirectedFlow, backward: DirectedFlow, reverse: BoolArray) -> Flow:
@@ -323,7 +289,7 @@ def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
 
     The directions are turned to the singular vectors of the velocity's changes over fills and pressures.
     """
-    gravity = mean_gravity(scene) > scene.tolerance
+    gravity = gravity_shares(scene).mean > scene.tolerance
 
     def laws(turned: FloatArray | None = None) -> tuple[CalibratedLaw, ...]:
         sides = direction_sides(scene, turned=turned).values()

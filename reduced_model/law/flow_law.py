@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -87,10 +86,6 @@ class FlowLaw(Protocol):
         Returns: Flow, of the broadcast shape of the arguments.
         Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
         """
-        ...
-
-    def table(self) -> Mapping[str, FloatArray]:
-        """Plain arrays for compiled code, named in the implementing law's docstring."""
         ...
 
 
@@ -273,9 +268,6 @@ class _Velocities:
     def evaluate(self, **conditions: Any) -> Flow:
         flow: Flow = self.law.evaluate(**conditions)
         return flow
-
-    def table(self) -> Mapping[str, FloatArray]:
-        return {}
 
 
 def lacking(law: object) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,9 +56,6 @@ class PaperLaw:
     has the column part with the gas off.  That takes a crest which holds the liquid: from a chamber whose
     level is beyond `return_pressure` the same equation, reversed, lets it run back.  The paper states no
     uncertainty, so none is returned.  Between events du/dt = -2 omega^2 S/((k+1) B theta).
-
-    `table()` holds `velocity_squared_per_pressure` 2/(rho (k+1)), m^3/kg, and `pressure_per_fill_difference`
-    rho omega^2 V/(B theta), Pa: u^2 = the first times (p0 + the second times (x_A - x_C)).
     """
 
     density: float
@@ -148,13 +144,6 @@ class PaperLaw:
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)
-
-    def table(self) -> Mapping[str, FloatArray]:
-        """The two coefficients of u^2, named in the class's docstring. Returns: Arrays of shape (1,)."""
-        return {
-            "velocity_squared_per_pressure": np.array([self.velocity_squared_per_pressure]),
-            "pressure_per_fill_difference": np.array([self.pressure_per_fill_difference]),
-        }
 
 
 def paper_law(scene: AnyScene) -> PaperLaw:

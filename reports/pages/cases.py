@@ -8,7 +8,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.reports.equations import equation_svg
 from ringbalance.reports.figure import (
     AS_PAPER,
     FOUND,
@@ -21,8 +20,9 @@ from ringbalance.reports.figure import (
     line,
     logarithmic,
 )
-from ringbalance.reports.prose import input_name, traced, typeset
+from ringbalance.reports.prose import equation_svg, input_name, typeset
 from ringbalance.reports.section import Record
+from ringbalance.reports.traced import traced
 from ringbalance.results.numbers import (
     MISSING,
     PLUS_MINUS,

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePath
@@ -21,9 +19,8 @@ from ringbalance.reports import summary
 from ringbalance.reports.figure import INK, Drawing, curve, draw, line
 from ringbalance.reports.pages import measured
 from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.requirements import requirement_bars
+from ringbalance.reports.pages.plain import requirements_view
 from ringbalance.reports.pages.standing import CREDIBILITY, DOCUMENT
-from ringbalance.reports.prose import input_name
 from ringbalance.reports.run_figures import (
     DEVIATIONS,
     friction_estimates,
@@ -33,60 +30,14 @@ from ringbalance.reports.run_figures import (
     over_time,
 )
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.results.requirements import OPEN
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
-_KEY: Final = re.compile(r"\b[a-z_]+\.[a-z_]+\b")
-"""A key of the scene file, such as supervisor.limit."""
 _POLE_ROOM, _NEAR = 0.75, 0.02
 """Half of the poles' picture over their extent, and the least extent."""
-_CAUSES: Final = 2
-"""Inputs that a row names as those it hangs on most."""
 
 
 def _summary(_own: Record, evidence: Record) -> Record:
-    rows = evidence["requirements"]
-    return {
-        "decision": summary.decided([(row["quantity"], row["verdict"]) for row in rows]),
-        "causes": [_causes(row) for row in rows],
-        "set_by": [_KEY.sub(lambda match: input_name(match[0]), row["set_by"]) for row in rows],
-        "open": _open(rows),
-        "bars": requirement_bars(map(_bar, rows)),
-        "stated": any(row["achieved_interval"] for row in rows),
-        "draws": DRAWS,
-        "origins": Counter(row["origin"] for row in evidence["scene"]["table"]).most_common(),
-    }
-
-
-def _open(rows: list[Record]) -> list[tuple[str, list[str]]]:
-    """Inputs to find out first, with the requirements that the stated uncertainties leave open."""
-    found: dict[str, list[str]] = {}
-    for row in rows:
-        if row["verdict"] == OPEN and (paths := _causes(row)):
-            found.setdefault(", ".join(sorted(map(input_name, paths))), []).append(row["quantity"])
-    return list(found.items())
-
-
-def _causes(row: Record) -> list[str]:
-    """Paths of the inputs that a requirement hangs on most: those that lose it, then the largest effects."""
-    effects = {path: max(both) for path, both in row["effects"].items()}
-    largest = max(effects.values(), default=0.0)
-    ranked = sorted(effects, key=lambda path: -effects[path])
-    telling = [path for path in ranked if effects[path] > 0.1 * largest]
-    return list(dict.fromkeys([*row["lost"], *telling]))[: max(_CAUSES, len(row["lost"]))]
-
-
-def _bar(row: Record) -> Record:
-    low, high = row["achieved_interval"] or (row["achieved"], row["achieved"])
-    return {
-        "label": row["quantity"],
-        "required": row["required"],
-        "reached": row["achieved"],
-        "low": low,
-        "high": high,
-        "at_least": row["sense"] == "at least",
-        "verdict": row["verdict"],
-    }
+    return {**requirements_view(evidence), "draws": DRAWS}
 
 
 def _run(_own: Record, evidence: Record) -> Record:

@@ -22,9 +22,10 @@ from ringbalance.reports.pages.requirements import (
     requirement_table,
     requirements,
 )
-from ringbalance.reports.prose import found_at, key_words, named_with_origin, read, states_uncertainty, traced
+from ringbalance.reports.prose import key_words, named_with_origin
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import LIKELY, tuning_of
+from ringbalance.reports.traced import found_at, read, states_uncertainty, traced
 from ringbalance.results.numbers import MISSING, THIN_SPACE, given, number, percent, shown
 from ringbalance.results.requirements import MISSED, OPEN
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figure import FIFTH, INK, PAPER, THIRD, Drawing, draw
-from ringbalance.reports.prose import evidence_at, read, resting, traced, untraced
+from ringbalance.reports.prose import resting
 from ringbalance.reports.section import Record
 from ringbalance.reports.summary import (
     LIKELY,
@@ -26,6 +26,7 @@ from ringbalance.reports.summary import (
     what_enlarges,
     worst,
 )
+from ringbalance.reports.traced import evidence_at, read, traced, untraced
 from ringbalance.results.numbers import given, number, percent, shown
 from ringbalance.results.requirements import MET, MISSED, OPEN, UNASKED
 from ringbalance.results.result import Table

@@ -154,7 +154,7 @@ def evidence_text(evidence: Record) -> str:
 
 def _document(_own: Record, evidence: Record) -> Record:
     listed = symbols_and_sources()
-    balancer = listed[evidence.get("balancer", "liquid_ring")]
+    balancer = listed.get(evidence.get("balancer", "liquid_ring"), {"symbols": [], "sources": []})
     return {
         "evidence_sha256": hashlib.sha256(evidence_text(evidence).encode()).hexdigest(),
         "kept": [case for case in evidence["verification"] if case.get("date")],

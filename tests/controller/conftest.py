@@ -59,9 +59,6 @@ class FunctionLaw:
             primed=on & ((velocity != 0) | (wet & self.holds)),
         )
 
-    def table(self) -> Mapping[str, FloatArray]:
-        return {}
-
 
 def constant(x: FloatArray, *_: Any) -> tuple[Any, Any]:
     """u = 5 m/s."""

@@ -16,7 +16,6 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.residual_liquid import reach_share, residual_fill_ratio
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 
@@ -47,9 +46,6 @@ class _Steady:
             uncertainty=zero,
             primed=zero.astype(np.bool_),
         )
-
-    def table(self) -> dict[str, FloatArray]:
-        return {}
 
 
 def _fill(scene: Scene, velocity: float) -> float:

@@ -13,7 +13,7 @@ from ringbalance.physics.sloshing import sloshing_response
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.contributions import _wave_mean, wave_height
-from ringbalance.reduced_model.chamber.values import by_quadrature
+from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -106,7 +106,8 @@ def test_models_are_chosen_by_what_frequencies_may_be(table_1_calibration: Calib
         gravity=scene.environment.gravity,
     )
     # Gravity's ripple of the pressure that a surface following at once makes is 0.017 %.
-    ripple = by_quadrature(scene, 0.5).wall_pressure_ripple / by_quadrature(scene, 0.5).wall_pressure
+    ring = TiltedRing.of(scene, np.array([0.5]))
+    ripple = ring.wall_pressure_ripple[0] / ring.wall_pressure[0]
     assert share is not None
     assert 1 < share / (ripple * found.pressure_amplification_interval[0, 1]) < 4
 

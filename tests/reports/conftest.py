@@ -13,8 +13,7 @@ import pytest
 from golden_pages import page_text
 from matplotlib.figure import Figure
 
-from ringbalance.reports.page import page_content
-from ringbalance.reports.render import render, render_pages
+from ringbalance.reports.page import page_content, render, render_pages
 from ringbalance.reports.sections import sections_of
 
 R1, R2, B, THETA, T = 0.0205, 0.0445, 0.062, math.pi / 2, 2.777e-3

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from ringbalance.reports import summary
+from ringbalance.reports.page import render
 from ringbalance.reports.pages.loop import CONSEQUENCES
-from ringbalance.reports.render import render
 
 Record = dict[str, Any]
 Said = Callable[[Record, str], str]

@@ -12,11 +12,11 @@ from typing import Any
 
 import pytest
 
+from ringbalance.reports.page import render
 from ringbalance.reports.pages.cases import LONG, is_long, table_file
 from ringbalance.reports.pages.standing import evidence_text, symbols_and_sources
-from ringbalance.reports.provenance import provenance
-from ringbalance.reports.render import render
 from ringbalance.reports.report import csv_tables
+from ringbalance.reports.saved import provenance
 
 Record = dict[str, Any]
 GLOSSARY = Path(__file__).resolve().parents[2] / "docs" / "glossary.md"

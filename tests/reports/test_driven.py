@@ -1,13 +1,25 @@
-"""The section on the second balancer."""
+"""Reports of balancers without liquid: the second one's section in a ring's, and a third's plain one."""
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
+import pytest
+from ball_balancer.scene_keys import EXAMPLE
+from check_traces import traces, untrue
+from golden_pages import page_text
+
 from ringbalance.reports import summary
+from ringbalance.reports.cli import report
 from ringbalance.reports.pages import eccentric as driven
+from ringbalance.reports.report import write_report
+from ringbalance.scene.loader import scene_from
+from ringbalance.scene.registry import register
 
 Record = dict[str, Any]
+register("ball", scene="ball_balancer.scene_keys:KIND", balancer="ball_balancer.balancer:BallBalancer")
 
 
 def case(paper: str, verdict: str, number: int) -> Record:
@@ -23,25 +35,43 @@ def case(paper: str, verdict: str, number: int) -> Record:
     }
 
 
-def evidence() -> Record:
-    cases = [
-        case("liquid_ring", "confirmed", 1),
-        case("eccentric_mass", "refuted", 2),
-        case("eccentric_mass", "confirmed", 1),
-    ]
-    return {"verification": cases}
-
-
-def test_each_paper_has_its_own_claims() -> None:
-    assert [c["number"] for c in summary.claims(evidence())] == [1]
-    assert [c["number"] for c in summary.claims(evidence(), paper="eccentric_mass")] == [1, 2]
-
-
-def test_verdicts_are_counted() -> None:
-    view = driven.SECOND_BALANCER.view(evidence())
+def test_each_paper_has_its_own_claims_and_counts() -> None:
+    told = (
+        ("liquid_ring", "confirmed", 1),
+        ("eccentric_mass", "refuted", 2),
+        ("eccentric_mass", "confirmed", 1),
+    )
+    evidence = {"verification": [case(*each) for each in told]}
+    assert [c["number"] for c in summary.claims(evidence)] == [1]
+    assert [c["number"] for c in summary.claims(evidence, paper="eccentric_mass")] == [1, 2]
+    view = driven.SECOND_BALANCER.view(evidence)
     assert view is not None
     assert view["counts"] == ["1 is confirmed", "1 is refuted"]
-
-
-def test_no_claims_no_section() -> None:
     assert driven.SECOND_BALANCER.view({"verification": []}) is None
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report of two balls in oil that are too light: 120 g mm against 100."""
+    heavy = EXAMPLE.replace(b"80 g*mm", b"120 g*mm")
+    assert heavy != EXAMPLE
+    return write_report(
+        scene_from(content=heavy, file="b.toml"), tmp_path_factory.mktemp("balls")
+    ).page.parent
+
+
+def test_a_third_balancer_is_reported(balls: Path) -> None:
+    pages = [(balls / name).read_text() for name in ("report.html", "annex.html")]
+    evidence = json.loads((balls / "evidence.json").read_text())
+    assert untrue(pages, evidence) == []
+    assert len(traces(pages)) > 5
+    text = page_text(pages[0])
+    assert "0 of 3 requirements are met" in text
+    assert "| Balancing moment | at least 120 g mm |" in text.replace("\u202f", " ")
+    assert (balls / "figures" / "run-amplitude.svg").is_file()
+    assert (balls / "tables" / "loop_balanced.csv").read_text().startswith("time [s],amplitude [m]")
+
+
+def test_its_exit_code_says_whether_it_settles(tmp_path: Path) -> None:
+    (tmp_path / "balls.toml").write_bytes(EXAMPLE)
+    assert report(tmp_path / "balls.toml", out=tmp_path / "out") == 0

@@ -13,10 +13,10 @@ from check_traces import traces, untrue
 
 from ringbalance.controller.eccentric_mass import study
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
-from ringbalance.reports import eccentric_evidence
-from ringbalance.reports.eccentric_evidence import parameters
+from ringbalance.reports import evidence as evidence_module
+from ringbalance.reports.evidence import parameters
+from ringbalance.reports.page import render
 from ringbalance.reports.pages.eccentric import SECTIONS
-from ringbalance.reports.render import render
 from ringbalance.reports.report import write_report
 from ringbalance.scene import bundled_scene, load_scene
 
@@ -43,7 +43,7 @@ def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> P
     out = tmp_path_factory.mktemp("report")
     with pytest.MonkeyPatch.context() as patch:
         # The claims of its paper have tests of their own, and so have the intervals of the study.
-        patch.setattr(eccentric_evidence, "load_cases", tuple)
+        patch.setattr(evidence_module, "load_cases", tuple)
         patch.setattr(study, "DRAWS", 5)
         write_report(scene, out, scene_text='name = "small"\n')
     return out

@@ -11,7 +11,7 @@ import generated_docs
 import pytest
 import typesetting
 
-from ringbalance.reports.equations import GLYPHS, equation_svg, equations, share_glyphs
+from ringbalance.reports.prose import GLYPHS, equation_svg, equations, share_glyphs
 
 
 @pytest.mark.parametrize("name", sorted(equations()))

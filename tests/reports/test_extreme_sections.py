@@ -8,7 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from ringbalance.reports.pages import chamber, extremes
+from ringbalance.reports.pages import chamber
+from ringbalance.reports.pages.studies import EXTREMES
 from ringbalance.reports.section import Work
 from ringbalance.scene import Scene
 
@@ -73,7 +74,7 @@ def evidence() -> Record:
 
 
 def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
-    view = extremes.SECTION.view(evidence())
+    view = EXTREMES.view(evidence())
     assert view is not None
     slow, fast, fill = view["table"].rows
     assert slow[:3] == ("speed", "1.00 to 160 rpm", "refused")
@@ -84,4 +85,4 @@ def test_the_extremes_say_how_far_and_what_is_beyond() -> None:
 
 
 def test_extremes_that_were_not_run_say_so() -> None:
-    assert extremes.SECTION.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}
+    assert EXTREMES.view({"verification": [{"id": "extremes", "tables": []}]}) == {"ran": False}

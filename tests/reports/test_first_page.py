@@ -17,7 +17,7 @@ from ringbalance.reports.pages.requirements import (
     requirement_record,
     requirements,
 )
-from ringbalance.reports.prose import untraced
+from ringbalance.reports.traced import untraced
 from ringbalance.results.requirements import OPEN
 from ringbalance.scene import Scene
 from ringbalance.verification.loops import calibration_of

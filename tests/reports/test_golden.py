@@ -11,8 +11,8 @@ import pytest
 from check_traces import apart, traces, untrue
 from golden_pages import FOLDER, NAMES, kept_evidence, report_text
 
-from ringbalance.reports.prose import evidence_at
-from ringbalance.reports.render import render
+from ringbalance.reports.page import render
+from ringbalance.reports.traced import evidence_at
 
 FEWEST_TRACES = {"ring": 490, "masses": 60}
 

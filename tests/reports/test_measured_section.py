@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from ringbalance.reports.evidence import scene_record
+from ringbalance.reports.page import render
 from ringbalance.reports.pages import eccentric
 from ringbalance.reports.pages.measured import SECTION
-from ringbalance.reports.render import render
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import Measured, MeasuredFile, MeasuredFinding, MeasuredQuantity
 

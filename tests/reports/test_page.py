@@ -14,8 +14,8 @@ import pytest
 from PIL import Image
 
 from ringbalance.reports.figure import DARK, LIGHT
+from ringbalance.reports.page import render
 from ringbalance.reports.pictures.style import THEMES
-from ringbalance.reports.render import render
 
 Record = dict[str, Any]
 VOID = {"meta", "link", "img", "br", "source", "col", "input", "hr"}

@@ -13,8 +13,8 @@ from typing import Final
 import pytest
 from check_traces import agrees, apart, traces, untrue
 
-from ringbalance.reports.prose import evidence_at
 from ringbalance.reports.report import write_report
+from ringbalance.reports.traced import evidence_at
 from ringbalance.scene import load_scene
 
 MOST_PAGES: Final = 12

@@ -18,12 +18,11 @@ from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports import saved as saved_module
-from ringbalance.reports.page import case_views
+from ringbalance.reports.page import case_views, render
 from ringbalance.reports.pages import loop as consequences_module
 from ringbalance.reports.pages.consequences import find_consequences
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
-from ringbalance.reports.render import render
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.saved import heavy_cases, saved_cases
 from ringbalance.reports.sections import section_views

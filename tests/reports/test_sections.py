@@ -16,14 +16,14 @@ from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.figure import Drawing
+from ringbalance.reports.page import render
 from ringbalance.reports.pages import drag_coefficient as fifty
 from ringbalance.reports.pages import eccentric, tube
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import tube_flow as inside
-from ringbalance.reports.prose import untraced
-from ringbalance.reports.render import render
 from ringbalance.reports.section import Section, Work
 from ringbalance.reports.sections import SECTIONS, collected, completed, drawings_in, section_views, viewed
+from ringbalance.reports.traced import untraced
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.loops import calibration_of, loop_scene

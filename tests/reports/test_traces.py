@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from check_traces import SAME, agrees, apart, printed, traces, untrue
 
-from ringbalance.reports.prose import evidence_at, marked_up, read, traced, untraced
-from ringbalance.reports.render import render
+from ringbalance.reports.page import render
+from ringbalance.reports.traced import evidence_at, marked_up, read, traced, untraced
 
 Record = dict[str, Any]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ringbalance.reports.pages.trade import SECTION
+from ringbalance.reports.pages.studies import TRADE
 
 
 def test_models_are_listed_with_error_and_speed() -> None:
@@ -26,7 +26,7 @@ def test_models_are_listed_with_error_and_speed() -> None:
             "trade": {"wall_pressure": [{"model": n, "designs_per_second": rate} for n, _, rate in models]}
         },
     }
-    view = SECTION.view(evidence)
+    view = TRADE.view(evidence)
     assert view is not None
     (shown,) = view["quantities"]
     assert [row[0] for row in shown["models"].rows] == ["formula", "closed form", "fine mesh"]
@@ -38,4 +38,4 @@ def test_models_are_listed_with_error_and_speed() -> None:
 
 
 def test_without_a_trade_there_is_no_section() -> None:
-    assert SECTION.view({"times": {}}) is None
+    assert TRADE.view({"times": {}}) is None

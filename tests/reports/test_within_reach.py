@@ -6,8 +6,8 @@ import pytest
 
 from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pages.requirements import requirements, smallest_row
-from ringbalance.reports.prose import untraced
 from ringbalance.reports.summary import line_verdict, what_enlarges
+from ringbalance.reports.traced import untraced
 
 
 @pytest.mark.parametrize(

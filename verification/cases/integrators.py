@@ -223,10 +223,6 @@ class _SlowedLaw:
         """Of the paper's law."""
         return self.base.max_fill_ratio
 
-    def table(self) -> Mapping[str, FloatArray]:
-        """Of the paper's law."""
-        return self.base.table()
-
     def evaluate(self, **asked: Any) -> Flow:
         """As the paper's law, slowed."""
         flow = self.base.evaluate(**asked)

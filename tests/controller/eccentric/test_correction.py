@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import pytest
+from eccentric_runs import bundled, stage_names
 
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_document
-from ringbalance.controller.eccentric_mass.scene_records import (
-    EccentricScene,
-    eccentric_drawn,
-    eccentric_scene,
-)
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
-from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.verification.eccentric_scenes import at_constant_speed, changed
 
 BUNDLED = ("washing_machine", "eccentric_mass_paper", "driven_masses_small")
-
-
-def bundled(name: str) -> EccentricScene:
-    return eccentric_scene(load_scene(bundled_scene(name)))
 
 
 def built(scene: EccentricScene, number: int) -> EccentricRun:
@@ -34,17 +25,13 @@ def built(scene: EccentricScene, number: int) -> EccentricRun:
     return simulate_eccentric(plant, seed=number, settings=StrategySettings.of(scene))
 
 
-def names(run: EccentricRun) -> list[str]:
-    return [stage["name"] for stage in json.loads(json.dumps(eccentric_document(run)))["stages"]]
-
-
 @pytest.mark.parametrize("name", BUNDLED)
 def test_built_machines_settle(name: str) -> None:
     """Without the correction two leave the limit on the run-up, and the third never left positioning."""
     for number in (900, 914):
         run = built(bundled(name), number)
         assert run.settled
-        assert "correction" in names(run)
+        assert "correction" in stage_names(run)
 
 
 @pytest.mark.heavy
@@ -80,7 +67,7 @@ def test_a_run_that_ends_while_it_corrects_what_is_within_the_limit_is_settled()
     told = StrategySettings.of(changed(paper, "supervisor", limit=1e-3))
     plant = changed(changed(paper, "supervisor", limit=1e-3), "rotor", stiffness=1.01 * paper.rotor.stiffness)
     run = simulate_eccentric(plant, settings=told)
-    assert names(run)[-2:] == ["correction", "check"]
+    assert stage_names(run)[-2:] == ["correction", "check"]
     assert run.settled
 
 
@@ -101,10 +88,10 @@ def test_trials_alone_are_asked_for_by_a_key() -> None:
     beside = changed(paper, "supervisor", target_error=(math.radians(10), math.radians(10)))
     measured = simulate_eccentric(beside)
     trials = simulate_eccentric(changed(beside, "supervisor", correction="trials"))
-    assert "correction" in names(measured)
-    assert "fine tuning" not in names(measured)
-    assert "fine tuning" in names(trials)
-    assert "correction" not in names(trials)
+    assert "correction" in stage_names(measured)
+    assert "fine tuning" not in stage_names(measured)
+    assert "fine tuning" in stage_names(trials)
+    assert "correction" not in stage_names(trials)
     assert measured.settled
     assert trials.settled
     assert measured.settling_time is not None

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import eccentric_document
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene import SceneError, bundled_scene, load_scene
@@ -36,13 +35,13 @@ def test_a_diverging_run_is_a_status_with_finite_numbers(unlimited: EccentricSce
     assert not run.settled
     assert run.time[-1] < 4.0
     assert "lower lqr.state_weight from 3.5 to " in run.status
-    json.dumps(eccentric_document(run), allow_nan=False)
+    json.dumps(run.to_dict(), allow_nan=False)
     assert np.all(np.isfinite(run.amplitude))
 
 
 def test_the_remedy_of_a_diverging_run_is_true(unlimited: EccentricScene) -> None:
     mended = replace(unlimited, run=replace(unlimited.run, time_limit=8.0))
-    for key, value in simulate_eccentric(unlimited).remedies[0].changes:
+    for key, value in simulate_eccentric(unlimited).remedies[0].change.items():
         table, name = key.split(".")
         mended = changed(mended, table, **{name: value})
     assert all(loop.stable for loop in RecommendedGains.of(mended).loops)

@@ -12,11 +12,10 @@ from scipy.integrate import quad, solve_ivp
 
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import DriveLaw
 from ringbalance.controller.eccentric_mass.step import friction_torque
 from ringbalance.controller.eccentric_mass.targets import target_angles
-from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.verification.cases.driven_balancing import BalancingFigure, motion_bound, run_up
 from ringbalance.verification.cases.driven_estimation import (
     estimate_imbalance,
@@ -29,13 +28,8 @@ from ringbalance.verification.cases.driven_positioning import efforts, growth, p
 from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
 
 
-@pytest.fixture(scope="module")
-def scene() -> EccentricScene:
-    return eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
-
-
-def test_figure_four_honest_filters_need_no_seconds(scene: EccentricScene) -> None:
-    found = figure_four(scene, duration=6.0)
+def test_figure_four_honest_filters_need_no_seconds(paper: EccentricScene) -> None:
+    found = figure_four(paper, duration=6.0)
     np.testing.assert_allclose(found.estimate[:, -1], found.true, atol=1e-4)
     assert max(found.honest_time) < 0.3
     assert np.all(found.covariance_norm[:, -1] < 1e-6 * found.covariance_norm[:, 0])
@@ -45,14 +39,14 @@ def test_figure_four_honest_filters_need_no_seconds(scene: EccentricScene) -> No
     assert np.min(within) > 1000
 
 
-def test_figure_five_finds_both_friction_arms(scene: EccentricScene) -> None:
-    for arm, run in friction_runs(scene, time_limit=8.0).items():
+def test_figure_five_finds_both_friction_arms(paper: EccentricScene) -> None:
+    for arm, run in friction_runs(paper, time_limit=8.0).items():
         assert run.estimates.friction_arm[-1] == pytest.approx((arm, arm), rel=0.02)
         assert friction_time(run, arm) < 1.0
 
 
-def test_figure_six_grows_only_with_what_compensation_leaves(scene: EccentricScene) -> None:
-    found = efforts(scene, step=5e-4)
+def test_figure_six_grows_only_with_what_compensation_leaves(paper: EccentricScene) -> None:
+    found = efforts(paper, step=5e-4)
     np.testing.assert_allclose(growth(found["exact"]), 1.0, rtol=1e-3)
     assert np.all(growth(found["short"]) > 1.5)
     assert np.all(growth(found["without"]) > 3)
@@ -61,9 +55,9 @@ def test_figure_six_grows_only_with_what_compensation_leaves(scene: EccentricSce
     assert np.all(found["short"][0, :, -1] > found["short"][1, :, -1])
 
 
-def test_figure_seven_balances_both_imbalances(scene: EccentricScene) -> None:
-    found = BalancingFigure.seven(scene, time_limit=20.0)
-    plant = PlantParameters.of(scene)
+def test_figure_seven_balances_both_imbalances(paper: EccentricScene) -> None:
+    found = BalancingFigure.seven(paper, time_limit=20.0)
+    plant = PlantParameters.of(paper)
     expected = abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.before == pytest.approx((expected, expected))
     assert max(found.after) < 2e-3 * expected
@@ -71,29 +65,29 @@ def test_figure_seven_balances_both_imbalances(scene: EccentricScene) -> None:
         assert run.settled
 
 
-def test_figure_eight_is_mended_by_fine_tuning(scene: EccentricScene) -> None:
-    found = BalancingFigure.eight(scene, time_limit=200.0)
-    plant = PlantParameters.of(scene)
+def test_figure_eight_is_mended_by_fine_tuning(paper: EccentricScene) -> None:
+    found = BalancingFigure.eight(paper, time_limit=200.0)
+    plant = PlantParameters.of(paper)
     # Both masses 10 degrees on turn the correction by 10 degrees: 2 sin 5 deg of the imbalance is left.
     expected = 2 * math.sin(math.radians(5)) * abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.positioned == pytest.approx((expected, expected), rel=0.02)
-    assert max(found.after) < scene.supervisor.limit
+    assert max(found.after) < paper.supervisor.limit
     for run in found.runs:
         assert run.settled
         assert "fine tuning" in [stage.name for stage in run.stages]
 
 
-def test_figure_nine_passes_the_models_own_critical_speed(scene: EccentricScene) -> None:
-    evidence = run_up(scene, "light")
+def test_figure_nine_passes_the_models_own_critical_speed(paper: EccentricScene) -> None:
+    evidence = run_up(paper, "light")
     critical, numbers = evidence.found["critical"].value, evidence.numbers
     assert critical == pytest.approx(130.43, abs=0.01)
     assert numbers["without"] == pytest.approx(135.05, abs=0.01)
     # A ramp of 1 rpm/s peaks behind the steady peak.
-    expected, at = fixed_frame_peak(PlantParameters.of(scene))
+    expected, at = fixed_frame_peak(PlantParameters.of(paper))
     amplitude, speed = numbers["locked"], numbers["peak_speed"] * RPM
     assert amplitude == pytest.approx(expected, rel=1e-6)
     assert speed == pytest.approx(at, abs=1e-3)
-    plant = PlantParameters.of(scene)
+    plant = PlantParameters.of(paper)
     ratio = plant.damping / (2 * math.sqrt(plant.stiffness * plant.mass))
     steady = critical * RPM / math.sqrt(1 - 2 * ratio**2)
     assert steady < speed < steady + 4 * RPM
@@ -117,8 +111,8 @@ def fixed_frame_peak(plant: PlantParameters) -> tuple[float, float]:
     return float(np.max(size)), float(first + RPM * grid[np.argmax(size)])
 
 
-def test_the_bound_holds_is_sharp_at_resonance_and_is_not_the_printed_one(scene: EccentricScene) -> None:
-    plant = PlantParameters.of(scene)
+def test_the_bound_holds_is_sharp_at_resonance_and_is_not_the_printed_one(paper: EccentricScene) -> None:
+    plant = PlantParameters.of(paper)
     natural = math.sqrt(plant.stiffness / plant.mass)
     still = motion_bound(plant._replace(moment=0.0), speed=natural, rate=0.0)
     whirl = plant.unbalance * natural**2 / (plant.damping * natural)
@@ -136,23 +130,23 @@ def test_the_bound_holds_is_sharp_at_resonance_and_is_not_the_printed_one(scene:
 
 
 @pytest.mark.parametrize("damping", [0.0, 1e4])
-def test_the_bound_wants_a_rotor_that_swings(scene: EccentricScene, damping: float) -> None:
+def test_the_bound_wants_a_rotor_that_swings(paper: EccentricScene, damping: float) -> None:
     with pytest.raises(ValueError, match="damping"):
-        motion_bound(PlantParameters.of(scene)._replace(damping=damping), speed=1.0, rate=0.0)
+        motion_bound(PlantParameters.of(paper)._replace(damping=damping), speed=1.0, rate=0.0)
 
 
 @pytest.mark.parametrize("key", ["assumed_mass", "assumed_stiffness", "assumed_damping"])
 @pytest.mark.parametrize("change", [-0.1, 0.05])
 def test_a_wrong_assumption_shifts_the_estimate_by_the_ratio_of_stiffnesses(
-    scene: EccentricScene, key: str, change: float
+    paper: EccentricScene, key: str, change: float
 ) -> None:
     """In a steady whirl z = W^2 theta/D, so that a filter which assumes another D finds theta D_assumed/D."""
-    record = imbalance_record(scene, duration=16.0)
+    record = imbalance_record(paper, duration=16.0)
     # A filter that assumes wrong also misreads the transient of the start.
     late = record.time > 12.0
     record = replace(record, time=record.time[late], samples=record.samples[late])
-    wrong = changed(scene, "imbalance_filter", **{key: getattr(scene.imbalance_filter, key) * (1 + change)})
-    ratio = stiffness(wrong, record.speed) / stiffness(scene, record.speed)
+    wrong = changed(paper, "imbalance_filter", **{key: getattr(paper.imbalance_filter, key) * (1 + change)})
+    ratio = stiffness(wrong, record.speed) / stiffness(paper, record.speed)
     x = estimate_imbalance(wrong, record)[0][-1]
     assert abs(complex(x[4], x[5]) / record.imbalance - ratio) < 2e-3
     assert abs(ratio - 1) > 5e-3
@@ -165,8 +159,8 @@ def stiffness(scene: EccentricScene, speed: float) -> complex:
 
 
 @pytest.mark.parametrize("share", [0.5, 0.999, 1.001, 1.5])
-def test_saturation_leaves_what_is_beyond_both_masses(scene: EccentricScene, share: float) -> None:
-    plant, gap = PlantParameters.of(scene), 0.05 / 0.23
+def test_saturation_leaves_what_is_beyond_both_masses(paper: EccentricScene, share: float) -> None:
+    plant, gap = PlantParameters.of(paper), 0.05 / 0.23
     reach = 2 * plant.moment * math.cos(gap / 2)
     found = target_angles(share * reach, 0.0, plant.moment, gap).residual
     assert found == pytest.approx(max(share - 1, 0) * reach, abs=1e-12)
@@ -175,16 +169,16 @@ def test_saturation_leaves_what_is_beyond_both_masses(scene: EccentricScene, sha
 @pytest.mark.parametrize(
     ("noise", "outcome"), [(1e-6, "settled"), (1e-3, "settled"), (5e-3, "imbalance_uncertain")]
 )
-def test_noise_takes_time_and_then_the_gate(scene: EccentricScene, noise: float, outcome: str) -> None:
-    velocity = noise * scene.sensor.velocity_noise / scene.sensor.position_noise
-    level = at_constant_speed(scene, time_limit=61.0)
+def test_noise_takes_time_and_then_the_gate(paper: EccentricScene, noise: float, outcome: str) -> None:
+    velocity = noise * paper.sensor.velocity_noise / paper.sensor.position_noise
+    level = at_constant_speed(paper, time_limit=61.0)
     loud = changed(level, "sensor", position_noise=noise, velocity_noise=velocity)
     loud = changed(loud, "imbalance_filter", position_noise=noise, velocity_noise=velocity)
     assert simulate_eccentric(loud).outcome.value == outcome
 
 
-def test_the_printed_compensation_takes_the_angle_for_the_rate(scene: EccentricScene) -> None:
-    law = DriveLaw.of(scene)
+def test_the_printed_compensation_takes_the_angle_for_the_rate(paper: EccentricScene) -> None:
+    law = DriveLaw.of(paper)
     arm, speed, angle, rate = 0.01, 10.47, 2.0, -1.0
     friction = -arm * law.track.moment * (speed + rate) ** 2
     assert friction_torque(law, arm, 0.0, speed, rate, 0.0) == pytest.approx(friction)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import block_diag, expm
+from scipy.linalg import expm
 
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
     FilterMatrices,
@@ -124,11 +124,6 @@ def test_eulers_step_limit_is_where_its_eigenvalues_leave_the_unit_circle(
     for share, grows in ((0.999, False), (1.001, True)):
         radius = max(abs(np.linalg.eigvals(euler_transition(model, speed, share * limit)[:4, :4])))
         assert (radius > 1) == grows
-
-
-def test_euler_has_no_step_without_damping() -> None:
-    free = MODEL._replace(damping=0.0)
-    assert np.all(free.euler_step_limit(angular_velocity=[1.0, 10.0]) == 0)
 
 
 def test_covariance_history_is_the_information_filters() -> None:
@@ -314,40 +309,3 @@ def test_the_printed_process_noise_is_no_covariance() -> None:
         if not np.all(np.isfinite(estimate.covariance)):
             break
     assert lowest < -1e-8
-
-
-def test_the_printed_damping_matrix_is_no_whirl() -> None:
-    """Eq. 12 adds 2 W M on the diagonal: a damping that the speed makes, and no gyroscopic coupling."""
-    generator = whirl_generator(model=MODEL, angular_velocity=SPEED)
-    printed = generator.copy()
-    printed[2, 2:4] = [-(MODEL.damping / MODEL.mass + 2 * SPEED), 0.0]
-    printed[3, 2:4] = [0.0, -(MODEL.damping / MODEL.mass + 2 * SPEED)]
-    right = np.max(np.linalg.eigvals(generator[:4, :4]).real)
-    wrong = np.max(np.linalg.eigvals(printed[:4, :4]).real)
-    assert right == pytest.approx(-MODEL.damping / (2 * MODEL.mass))
-    assert abs(wrong - right) > 1.0
-
-
-def test_the_printed_magnitude_and_phase_fail() -> None:
-    """Eq. 23 adds the components, and takes tan^-1 of their ratio: wrong size, and half a turn lost."""
-    for phase in np.radians([30.0, 100.0, 210.0, 300.0]):
-        x, y = 0.0414 * math.cos(phase), 0.0414 * math.sin(phase)
-        assert abs(x + y - 0.0414) > 0.006
-        assert math.hypot(x, y) == pytest.approx(0.0414)
-        assert math.atan2(y, x) % (2 * math.pi) == pytest.approx(phase)
-    x, y = math.cos(math.radians(210)), math.sin(math.radians(210))
-    assert math.atan(y / x) == pytest.approx(math.radians(30))
-
-
-def test_block_structure_of_sensor_noise_is_kept() -> None:
-    """Taking the sensors in one after the other is the same as all at once."""
-    told, estimate = (
-        matrices(laboratory=True),
-        predict(start(), matrices(laboratory=True), locked_masses(0.0j)),
-    )
-    sample = np.array([1e-3, -2e-3, 0.01, 0.02])
-    found, _ = correct(estimate, told, sample, VARIANCE)
-    h, p = told.observation, estimate.covariance
-    gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + block_diag(*VARIANCE))
-    np.testing.assert_allclose(found.state, estimate.state + gain @ (sample - h @ estimate.state), atol=1e-12)
-    np.testing.assert_allclose(found.covariance, p - gain @ h @ p, atol=1e-13)

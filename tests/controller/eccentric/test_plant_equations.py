@@ -5,17 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import pytest
 import sympy as sp
-
-from ringbalance.controller.eccentric_mass.plant import (
-    BACKWARDS,
-    FORWARDS,
-    Drive,
-    PlantParameters,
-    write_derivative,
-)
 
 T = sp.Symbol("t")
 M_R, M_IM, R_IM, PHASE = sp.symbols("m_r m_im r_im phi_m", positive=True)
@@ -88,71 +79,6 @@ def lagrange() -> list[sp.Expr]:
         )
         for coordinate, rate, drive in zip(COORDINATES, rates, drives, strict=True)
     ]
-
-
-def written() -> list[sp.Expr]:
-    """The equations as `plant` states them."""
-    x, y, phi_1, phi_2, xd, yd, phid_1, phid_2 = VALUES
-    xdd, ydd, *phidd = ACCELERATIONS
-    mass, moment, inertia, unbalance = M_R + 2 * M_B, M_B * R_B, M_B * R_B**2, M_IM * R_IM
-    a_x = xdd - 2 * SPEED * yd - RATE * y - SPEED**2 * x
-    a_y = ydd + 2 * SPEED * xd + RATE * x - SPEED**2 * y
-    right_x = unbalance * (SPEED**2 * sp.cos(PHASE) + RATE * sp.sin(PHASE))
-    right_y = unbalance * (SPEED**2 * sp.sin(PHASE) - RATE * sp.cos(PHASE))
-    for phi, phid, acceleration in ((phi_1, phid_1, phidd[0]), (phi_2, phid_2, phidd[1])):
-        right_x += moment * ((SPEED + phid) ** 2 * sp.cos(phi) + (RATE + acceleration) * sp.sin(phi))
-        right_y += moment * ((SPEED + phid) ** 2 * sp.sin(phi) - (RATE + acceleration) * sp.cos(phi))
-    masses = [
-        inertia * (acceleration + RATE)
-        + moment * (-sp.sin(phi) * a_x + sp.cos(phi) * a_y)
-        - drive
-        + ADDED * acceleration
-        for phi, acceleration, drive in ((phi_1, phidd[0], U_1), (phi_2, phidd[1], U_2))
-    ]
-    return [
-        mass * a_x + C * (xd - SPEED * y) + K * x - right_x,
-        mass * a_y + C * (yd + SPEED * x) + K * y - right_y,
-        *masses,
-    ]
-
-
-def test_the_written_equations_follow_from_the_lagrangian(lagrange: list[sp.Expr]) -> None:
-    """The imbalance being a part of m_r, the mass in front of the accelerations is m_r + 2 m_b."""
-    for derived, stated in zip(lagrange, written(), strict=True):
-        assert reduced(derived - stated) == 0
-
-
-def test_the_program_solves_the_written_equations() -> None:
-    """`write_derivative` makes the written equations vanish, friction and motor included."""
-    random = np.random.default_rng(5)
-    numbers = {M_R: 5.0, M_IM: 0.2, R_IM: 0.3, PHASE: 0.8, M_B: 0.18, R_B: 0.23, K: 900.0, C: 12.0}
-    mass, moment = 5.36, 0.18 * 0.23
-    parameters = PlantParameters(
-        mass=mass, damping=12.0, stiffness=900.0, unbalance=0.06, phase=0.8, moment=moment,
-        inertia=moment * 0.23, drive_inertia=2e-3, drive_damping=0.16, drive_gain=0.4,
-        friction_arm_1=0.01, friction_arm_2=0.004, gear_ratio=40.0, back_emf_constant=0.01,
-        resistance=1.0, maximum_voltage=np.inf,
-    )  # fmt: skip
-    for _ in range(5):
-        state = random.normal(size=8)
-        state[6:] = [0.7, -0.4]
-        speed, rate, torque_1, torque_2 = random.normal(size=4) * (10, 2, 1, 1)
-        drive = Drive(0.06 * np.cos(0.8), 0.06 * np.sin(0.8), torque_1, torque_2, rate)
-        out = np.empty(8)
-        write_derivative(parameters, state, speed, drive, (FORWARDS, BACKWARDS), out)
-        friction = [
-            arm * moment * (speed + own) ** 2 for arm, own in zip((0.01, 0.004), state[6:], strict=True)
-        ]
-        known = numbers | {SPEED: speed, RATE: rate, ADDED: 2e-3}
-        known |= {
-            U_1: torque_1 - 0.16 * state[6] - friction[0],
-            U_2: torque_2 - 0.16 * state[7] + friction[1],
-        }
-        order = [0, 1, 4, 5, 2, 3, 6, 7]
-        known |= dict(zip(VALUES, state[order], strict=True))
-        known |= dict(zip(ACCELERATIONS, out[[2, 3, 6, 7]], strict=True))
-        for equation in written():
-            assert abs(float(equation.subs(known))) < 1e-11
 
 
 def entry(equations: list[sp.Expr], row: int, symbol: sp.Symbol) -> sp.Expr:

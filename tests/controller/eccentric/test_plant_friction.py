@@ -31,17 +31,10 @@ from ringbalance.controller.eccentric_mass.plant import (
     stuck_flags,
     write_derivative,
 )
-from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
-from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
 
 RPM = math.pi / 30
 OFF = np.zeros(2)
-
-
-@pytest.fixture(scope="module")
-def parameters() -> PlantParameters:
-    return PlantParameters.of(eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper"))))
 
 
 @pytest.fixture(scope="module")

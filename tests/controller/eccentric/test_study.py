@@ -8,25 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from eccentric_runs import bundled
 
 from ringbalance.controller.eccentric_mass import study as study_module
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
-from ringbalance.controller.eccentric_mass.study import (
-    DRAWS,
-    _EccentricStudy,
-    eccentric_study,
-    interval,
-)
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.study import DRAWS, _EccentricStudy, eccentric_study, interval
 from ringbalance.results.requirements import Requirement
-from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.eccentric_scenes import changed
 
 
 @pytest.fixture(scope="module")
 def study() -> _EccentricStudy:
-    scene = eccentric_scene(load_scene(bundled_scene("eccentric_mass_paper")))
-    return eccentric_study(replace(scene, uncertainty=()))
+    return eccentric_study(replace(bundled("eccentric_mass_paper"), uncertainty=()))
 
 
 def test_the_locked_run_is_what_balancing_is_judged_by(study: _EccentricStudy) -> None:

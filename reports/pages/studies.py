@@ -1,4 +1,4 @@
-"""Speed against accuracy: designs a second and error of every model, beside what the finest is known to."""
+"""Studies of the scene: where answers end and what is said beyond, and speed against accuracy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,35 @@ from ringbalance.reports.figure import FOUND, PAPER, Drawing, curve, draw, level
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.result import Table
 from ringbalance.scene.models import Scene
+from ringbalance.verification.extremes.study import axis_rows
 from ringbalance.verification.trade import TradeStudy, error_text, models_table, trade_study
+
+_CASE: Final = "extremes"
+
+
+def _extremes(_own: Record, evidence: Record) -> Record:
+    """Sentences and the table of axes."""
+    case = next((c for c in evidence.get("verification", []) if c["id"] == _CASE), None)
+    if case is None or not case.get("tables"):
+        return {"ran": False}
+    tables = {table["name"]: table["columns"] for table in case["tables"]}
+    return {
+        "ran": True,
+        "text": case.get("explanation", ""),
+        "date": case.get("date", ""),
+        "table": Table(
+            caption="Each input alone, from end to end, all else as in the paper’s scene: where points begin "
+            "to end in another way, and what is said there.",
+            heads=("Input", "Stretch", "Answer", "Loop", "Said"),
+            rows=axis_rows(tables["axes"]),
+            style="",
+        ),
+    }
+
+
+EXTREMES: Final = Section(name="extremes", title="At the extremes", show=_extremes)
+"""Shown also where it was not run, to say how it is."""
+
 
 _LEAST: Final = 1e-12
 """Error at which a model that equals the finest is drawn."""
@@ -26,7 +54,7 @@ def _study(scene: Scene) -> TradeStudy:
     return trade_study(scene, level="light")
 
 
-def _view(trade: Record, evidence: Record) -> Record:
+def _trade(trade: Record, evidence: Record) -> Record:
     times = evidence["times"].get("trade") or {}
     terms = [(row["term"], row["group"], error_text(row["estimated_contribution"])) for row in trade["terms"]]
     quantities = [quantity for quantity in trade["quantities"] if quantity["models"]]
@@ -70,4 +98,4 @@ def _figure(quantity: Record, speed: Record) -> Drawing:
     )
 
 
-SECTION: Final = Section(name="trade", title="Speed against accuracy", collect=_collect, show=_view)
+TRADE: Final = Section(name="trade", title="Speed against accuracy", collect=_collect, show=_trade)

@@ -156,7 +156,7 @@ def _quantities(definition: CaseDefinition, evidence: Evidence) -> tuple[Quantit
 def _judge_one(
     definition: CaseDefinition, quantity: Quantity, found: Found, reference: Reference | None
 ) -> QuantityResult:
-    judgement = judge_quantity(
+    verdict, comparison = judge_quantity(
         kind=definition.kind,
         metric=quantity.metric,
         limit=quantity.limit,
@@ -165,10 +165,10 @@ def _judge_one(
     )
     return QuantityResult(
         quantity=quantity,
-        verdict=judgement.verdict,
+        verdict=verdict,
         found=found,
         reference=reference,
-        comparison=judgement.comparison,
+        comparison=comparison,
     )
 
 

@@ -291,7 +291,6 @@ class _FlowPath:
 
     solutions: tuple[FlowSolution, ...]
     status: Status
-    solves: int
     failures: int
     """Steps that had to be repeated with half their length."""
 
@@ -305,7 +304,6 @@ class _Walk:
     step: float
     before: float | None = None
     flow_before: FlowSolution | None = None
-    solves: int = 0
     failures: int = 0
 
 
@@ -327,7 +325,6 @@ def _advance(walk: _Walk, solve: Solve, target: float, rule: StepRule) -> bool:
     full = abs(remaining) if abs(remaining) - full < 0.1 * full else full
     parameter = target if full == abs(remaining) else walk.at + full * (1 if remaining > 0 else -1)
     flow = solve(parameter, _predicted(walk, parameter))
-    walk.solves += 1
     if not flow.status.ok:
         walk.failures += 1
         walk.step = full / 2
@@ -366,7 +363,7 @@ def follow(
             status = Status(code=StatusCode.NOT_CONVERGED, text=f"{text}; {remedy}")
             break
         reached.append(walk.flow)
-    return _FlowPath(solutions=tuple(reached), status=status, solves=walk.solves, failures=walk.failures)
+    return _FlowPath(solutions=tuple(reached), status=status, failures=walk.failures)
 
 
 def flow_at(*, solve: FirstSolve, parameter: float, first: float) -> FlowSolution:

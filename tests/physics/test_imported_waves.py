@@ -12,16 +12,10 @@ from ringbalance.mesh.geometry import liquid_area, surface_radius
 from ringbalance.mesh.section import NoPlaneWavesError, middle_section
 from ringbalance.physics.sloshing import resonant_fills, sloshing_modes, sloshing_response
 from ringbalance.scene.chamber_file.record import CellKind
-from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.models import Disc
 from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
 
 _FILL = 0.3
-
-
-@pytest.fixture(scope="module")
-def disc(paper_scene: Scene) -> Disc:
-    """With plates."""
-    return paper_scene.disc
 
 
 def imported(disc: Disc, kind: CellKind = "hexahedron27") -> Disc:

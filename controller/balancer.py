@@ -187,7 +187,7 @@ class Balancer(Protocol):
         ...
 
     def rotor(self) -> CommonRotor:
-        """The rotor alone, for another balancer. Raises: SceneError: it stands still or does not vibrate."""
+        """The rotor alone. Raises: SceneError: it stands still, or never vibrates steadily."""
         ...
 
     def on_rotor(self, rotor: CommonRotor | None) -> Self:

@@ -23,7 +23,6 @@ from ringbalance.controller.balancer import (
     inputs_of,
     outcomes_of,
     requirements_of,
-    vibrating,
 )
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
 from ringbalance.controller.ensemble import member_noise, simulate_members
@@ -187,17 +186,14 @@ class LiquidRingBalancer:
     def rotor(self) -> CommonRotor:
         """See `Balancer`."""
         rotor = self.scene.rotor
-        return vibrating(
-            self.scene,
-            CommonRotor(
-                source=self.scene.source,
-                speed=rotor.speed,
-                influence=rotor.influence,
-                unbalance=rotor.initial_unbalance,
-                mass=None,
-                noise=self.scene.sensor.amplitude_noise,
-                limit=self.scene.controller.limit,
-            ),
+        return CommonRotor(
+            source=self.scene.source,
+            speed=rotor.speed,
+            influence=rotor.influence,
+            unbalance=rotor.initial_unbalance,
+            mass=None,
+            noise=self.scene.sensor.amplitude_noise,
+            limit=self.scene.controller.limit,
         )
 
     def on_rotor(self, rotor: CommonRotor | None) -> LiquidRingBalancer:

@@ -21,7 +21,6 @@ from ringbalance.controller.balancer import (
     inputs_of,
     outcomes_of,
     rotor_fault,
-    vibrating,
 )
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
@@ -106,17 +105,14 @@ class EccentricMassBalancer:
             problem = "without damping the vibration before balancing never becomes steady"
             raise rotor_fault(scene, "rotor.damping", problem, "a damping coefficient above 0 N*s/m")
         imbalance = scene.imbalance
-        return vibrating(
-            scene,
-            CommonRotor(
-                source=scene.source,
-                speed=speed,
-                influence=parameters.influence(speed),
-                unbalance=cmath.rect(imbalance.mass * imbalance.radius, imbalance.phase),
-                mass=parameters.mass,
-                noise=scene.sensor.position_noise,
-                limit=scene.supervisor.limit,
-            ),
+        return CommonRotor(
+            source=scene.source,
+            speed=speed,
+            influence=parameters.influence(speed),
+            unbalance=cmath.rect(imbalance.mass * imbalance.radius, imbalance.phase),
+            mass=parameters.mass,
+            noise=scene.sensor.position_noise,
+            limit=scene.supervisor.limit,
         )
 
     def on_rotor(self, rotor: CommonRotor | None) -> EccentricMassBalancer:

@@ -23,7 +23,7 @@ from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing import HIGHEST_TRUE, LOWEST_TRUE, SMALL
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, closed_ring
 from ringbalance.reduced_model.chamber.values import chamber_closed_forms, drawing_shares, share_across
-from ringbalance.scene.arrays import FloatArray, distinct
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.rules.working import LARGEST_COMPRESSION, METAL_DENSITY, bulk_modulus
 
@@ -237,7 +237,7 @@ def range_fills(scene: Scene) -> FloatArray:
     fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), _resonant_fill(scene)
     if resonant is None or not fills[0] < resonant < fills[-1]:
         return fills
-    return distinct(np.append(fills, resonant))
+    return np.unique(np.append(fills, resonant))
 
 
 class GravityShares(NamedTuple):

@@ -16,8 +16,8 @@ import numpy as np
 from ringbalance.scene.arrays import FloatArray, IntArray, clipped
 from ringbalance.scene.chamber_file.contents import Body
 from ringbalance.scene.chamber_file.elements import corners_of, edges_of
-from ringbalance.scene.chamber_file.names import PORT
 from ringbalance.scene.chamber_file.record import OUTER_WALL, Axis, MeshUnit
+from ringbalance.scene.chamber_file.soundness import PORT
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.kinds import Finding, failed_checks, written

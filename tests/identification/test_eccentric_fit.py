@@ -18,7 +18,7 @@ from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricScene,
     eccentric_scene,
 )
-from ringbalance.identification.criticism.review import Review
+from ringbalance.identification.criticism import Review
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations

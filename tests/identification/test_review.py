@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ringbalance.identification.criticism.review import LAMINAR, UNBROKEN, Review, _power_of
+from ringbalance.identification.criticism import LAMINAR, UNBROKEN, Review, _power_of
 from ringbalance.identification.device import Device, Models
-from ringbalance.identification.fitting import fit
+from ringbalance.identification.fitting import FitResult, fit
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import (
@@ -20,7 +20,6 @@ from ringbalance.identification.next_measurement import (
     _words_of,
     next_measurement,
 )
-from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray

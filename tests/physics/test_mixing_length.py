@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,12 +13,7 @@ from scipy.optimize import brentq
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
 from ringbalance.verification.cases.friction import mixing_length, mixing_length_flow
 
-DATA = Path(__file__).parent / "data"
-
-
-def rows(name: str) -> list[dict[str, float]]:
-    lines = [line for line in (DATA / name).read_text().splitlines() if not line.startswith("#")]
-    return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(lines)]
+Rows = Callable[[str], list[dict[str, float]]]
 
 
 def by_roots(radius: float, grain: float) -> float:
@@ -49,7 +43,7 @@ def test_a_flow_too_slow_for_turbulence_is_the_laminar_one() -> None:
     assert mixing_length_flow(reynolds=1.0).friction_factor == pytest.approx(64.0, rel=1e-5)
 
 
-def test_literature_smooth_measurements_and_the_formula() -> None:
+def test_literature_smooth_measurements_and_the_formula(rows: Rows) -> None:
     """A few per cent above Re = 1e5, worse below, and 10 to 30 % near the transition: as is."""
     high = [row for row in rows("mckeon2004_oregon_smooth.csv") if row["Re"] > 6500][::4]
     for row in high:
@@ -62,7 +56,7 @@ def test_literature_smooth_measurements_and_the_formula() -> None:
     assert 1.1 < low / float(friction_factor(reynolds=3000.0, relative_roughness=0)) < 1.3
 
 
-def test_literature_the_dip_of_nikuradses_sand_is_the_wall_and_not_the_formulas_constants() -> None:
+def test_literature_the_dip_of_nikuradses_sand_is_the_wall_and_not_the_formulas_constants(rows: Rows) -> None:
     """Between smooth and fully rough the formula reads up to 40 % high; walls of sand explain it."""
     formula, sand = [], []
     for row in rows("nikuradse1933_rough.csv"):

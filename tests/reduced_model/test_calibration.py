@@ -15,7 +15,6 @@ from scipy.optimize import brentq
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.values import RingValues
-from ringbalance.scene import SceneError
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.origins import InputUncertainty
 
@@ -178,13 +177,6 @@ def test_inputs_are_propagated_apart(table_1_scene: Scene) -> None:
     )
     assert some.moment_per_mass_inputs == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_array_equal(some.moment.uncertainty, none.moment.uncertainty)
-
-
-def test_too_slow_a_rotor_is_a_fault_of_the_scene(table_1_scene: Scene) -> None:
-    with pytest.raises(SceneError, match="rotor"):
-        calibrate(
-            dataclasses.replace(table_1_scene, rotor=dataclasses.replace(table_1_scene.rotor, speed=5.0))
-        )
 
 
 def test_calibration_reproduces_to_the_last_bit(

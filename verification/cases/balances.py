@@ -9,8 +9,8 @@ import numpy as np
 
 from ringbalance.mesh.chamber import FREE_SURFACE, default_cells
 from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.pressure.loads import liquid_integrals
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
-from ringbalance.physics.pressure.ring_samples import liquid_integrals
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray

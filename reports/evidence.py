@@ -17,8 +17,10 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import AS_GIVEN, balancer_of
+from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements
+from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
-from ringbalance.controller.eccentric_mass.study import eccentric_study
+from ringbalance.controller.eccentric_mass.tuning import tune_eccentric
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
@@ -304,13 +306,19 @@ def _plain_study(scene: SceneFile) -> Record:
 
 def _eccentric_study(scene: EccentricScene) -> Record:
     """The run, balanced and with its masses locked, its loops and requirements, and the true values."""
-    study = eccentric_study(scene).document()
+    run = simulate_eccentric(scene)
     truth = {
         "unbalance_kg_m": scene.imbalance.mass * scene.imbalance.radius,
         "phase_rad": scene.imbalance.phase,
         "friction_arm_m": list(scene.masses.friction_arm),
     }
-    return {"truth": truth, "closed_loop": {"balanced": study.pop("run")}, **study}
+    return {
+        "truth": truth,
+        "closed_loop": {"balanced": run.to_dict()},
+        "locked": locked_run(scene).to_dict(),
+        "tuning": tune_eccentric(scene, runs=0).to_dict(),
+        "requirements": [each.document() for each in eccentric_requirements(scene, run)],
+    }
 
 
 _STUDIES: Final[Mapping[str, Callable[..., Record]]] = MappingProxyType({"eccentric_mass": _eccentric_study})

@@ -12,7 +12,6 @@ from scipy.linalg import eig
 from scipy.optimize import root
 from scipy.special import jv, roots_jacobi
 
-from ringbalance.mesh.bent_tube import Segment, swept_tube
 from ringbalance.physics.tube.local_losses import ROTATING_PROFILE_UNCERTAINTY, kinetic_factor
 from ringbalance.physics.tube.loss import (
     DEVELOPMENT_SHARE,
@@ -29,6 +28,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
 )
 from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 from ringbalance.verification.reference import bent_tube
+from ringbalance.verification.reference.bent_tube import Segment, swept_tube
 
 Array = np.ndarray
 

@@ -132,7 +132,7 @@ class ChamberTable:
 
 _NEWTON_STEPS: Final = 60
 _SETTLED: Final = 1e-15
-"""Of the largest level: a few times the round-off, below which the steps go to and fro."""
+"""Of the largest level: a few times the round-off, below which a step changes nothing."""
 
 
 def _hermite(nodes: FloatArray, columns: FloatArray) -> CubicHermiteSpline:

@@ -40,7 +40,7 @@ from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import InputUncertainty, SceneFile
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.scene.units import DIMENSIONS
-from ringbalance.verification import paper_numbers
+from ringbalance.verification import papers
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
@@ -131,13 +131,13 @@ def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
 
 def _paper() -> Record:
     """What the paper says, for comparison."""
-    low, high = paper_numbers.LOWEST_PRESSURE, paper_numbers.HIGHEST_PRESSURE
+    low, high = papers.LOWEST_PRESSURE, papers.HIGHEST_PRESSURE
     return {
         "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
         "lambda_m": paper.PAPER_LAMBDA,
-        "lambda_spread": paper_numbers.LAMBDA_TOLERANCE,
+        "lambda_spread": papers.LAMBDA_TOLERANCE,
         "working_range_Pa": [low.value, high.value],
-        "figure_4_pressures_Pa": [paper_numbers.LOW_PRESSURE, paper_numbers.HIGH_PRESSURE],
+        "figure_4_pressures_Pa": [papers.LOW_PRESSURE, papers.HIGH_PRESSURE],
     }
 
 
@@ -234,7 +234,7 @@ def _total(calibration: Calibration, quantity: str) -> float | None:
 
 def _flow_law(scene: Scene, calibration: Calibration) -> Record:
     """Both laws over the fill, at the pressures of Fig. 4, or at the scene's own and at twice that."""
-    drawn = [paper_numbers.LOW_PRESSURE, paper_numbers.HIGH_PRESSURE]
+    drawn = [papers.LOW_PRESSURE, papers.HIGH_PRESSURE]
     pressures = drawn if scene.gas.pressure in drawn else [scene.gas.pressure, 2 * scene.gas.pressure]
     fill = np.linspace(0.0, scene.disc.max_fill_ratio, LAW_POINTS)
 

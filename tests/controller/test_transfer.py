@@ -13,13 +13,13 @@ from ringbalance import bundled_scene, load_scene
 from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.marched import marched
 from ringbalance.verification.reference.transfers import (
     Drive,
     Integrator,
     adaptive_ode,
     closed_form,
     explicit_segments,
+    marched,
 )
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
@@ -164,25 +164,6 @@ def test_nothing_moves_without_gas_or_liquid(drive: Drive, integrator: Integrato
         assert transfer.event is event
         assert np.all(transfer.fill == fill)
         assert not transfer.primed
-
-
-def test_only_the_papers_law_has_a_closed_form(drive_by: DriveBy) -> None:
-    with pytest.raises(ValueError, match="no closed form"):
-        closed_form(drive_by("constant"), TIMES)
-
-
-@pytest.mark.parametrize("times", [[], [-1.0], [1.0, 0.5], [math.nan]])
-def test_instants_must_ascend_from_zero(drive: Drive, times: list[float]) -> None:
-    for integrator in (closed_form, MARCH, adaptive_ode(), explicit_segments(10)):
-        with pytest.raises(ValueError, match="instants"):
-            integrator(drive, np.array(times))
-
-
-def test_bad_settings_of_integrators_are_refused() -> None:
-    with pytest.raises(ValueError, match="segments"):
-        explicit_segments(0)
-    with pytest.raises(ValueError, match="tolerance"):
-        adaptive_ode(tolerance=0.0)
 
 
 def test_explicit_segments_near_a_stall_lose_their_order(drive_by: DriveBy) -> None:

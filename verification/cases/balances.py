@@ -15,10 +15,10 @@ from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference, as_found
-from ringbalance.verification.paper_numbers import with_plate
+from ringbalance.verification.finite_elements import found_of, mesh_table, mutated_force, ring_of
+from ringbalance.verification.papers import with_plate
 from ringbalance.verification.reference.exact_chamber import exact_totals
-from ringbalance.verification.reference.gravity import tilted_liquid
-from ringbalance.verification.rings import found_of, mesh_table, mutated_force, ring_of
+from ringbalance.verification.reference.pressure import tilted_liquid
 
 _FILL_SHARE: Final = 0.8
 

@@ -14,7 +14,6 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.eccentric_scenes import at_constant_speed, changed, envelope, thinned
 from ringbalance.verification.evidence import (
     Curve,
     Evidence,
@@ -26,6 +25,7 @@ from ringbalance.verification.evidence import (
     figure,
     from_rounding,
 )
+from ringbalance.verification.papers import at_constant_speed, changed, envelope, thinned
 
 _RPM: Final = 30 / np.pi
 _CRITICAL: Final = Reference(value=135.0, uncertainty=from_rounding(1.0))

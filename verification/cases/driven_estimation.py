@@ -23,8 +23,8 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import believed_whirl
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.eccentric_scenes import at_constant_speed, changed, convergence_time, thinned
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
+from ringbalance.verification.papers import at_constant_speed, changed, convergence_time, thinned
 
 _PRINTED: Final = 3.5
 """Middle of the printed 3 to 4 s."""

@@ -15,8 +15,8 @@ from ringbalance.controller.eccentric_mass.settings import DriveLaw
 from ringbalance.controller.eccentric_mass.step import friction_torque, regulator_torque
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import compiled
-from ringbalance.verification.eccentric_scenes import changed
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, as_found, figure
+from ringbalance.verification.papers import changed
 
 _STEP: Final = {"light": 4e-4, "heavy": 1e-4}
 """s, of the integration, which is of first order; the effort hangs on it by a thousandth."""

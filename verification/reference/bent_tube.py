@@ -36,11 +36,15 @@ from ringbalance.physics.results import Statistics, Status
 from ringbalance.physics.tube.local_losses import MOMENTUM_FACTOR
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.continuation import StepRule, follow
-from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.newton import (
+    FlowSolution,
+    NewtonSettings,
+    StepRule,
+    follow,
+    solve_flow,
+)
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, developed_section
-from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 # Corner of the section (0 to 3) and end of the slab for each vertex, in scikit-fem's order.
 _HEXAHEDRON = ((2, 1), (2, 0), (1, 1), (3, 1), (1, 0), (3, 0), (0, 1), (0, 0))
@@ -65,8 +69,6 @@ class SweptTube:
 
     mesh: Any
     """`skfem.MeshHex2` with boundaries inlet, outlet and those of the section."""
-    slab: IntArray
-    """Number of the slab along the path, by element."""
     section_node: IntArray
     """Node of the section that each node stands on."""
     half_station: IntArray
@@ -173,7 +175,6 @@ def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
     mesh = MeshHex2(np.ascontiguousarray(points), prism.t)
     return SweptTube(
         mesh=mesh.with_boundaries(_boundaries(section, prism, slabs)),
-        slab=np.repeat(np.arange(slabs), section.t.shape[1]).astype(np.int64),
         section_node=np.asarray(node, dtype=np.int64),
         half_station=half,
         arc_length=at,
@@ -243,7 +244,7 @@ class BentTubeFlow:
         developed = developed_section(system=section, kl=kl, s=s)
         tube = swept_tube(section=cells.mesh(), segments=segments)
         system = _system(tube, section, developed, reynolds)
-        say(f"{system.free.size} unknowns in {int(tube.slab.max()) + 1} slabs")
+        say(f"{system.free.size} unknowns in {tube.arc_length.size // 2} slabs")
         rotation = 2 * rotation_reynolds * coriolis_factor
 
         def solve(share: float, start: FlowSolution) -> FlowSolution:
@@ -318,7 +319,7 @@ def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reyno
     conditions = [Dirichlet(boundary="symmetry", component=2)]
     conditions += [Dirichlet(boundary=name, component=c) for name in ("inlet", "wall") for c in range(3)]
     space = FlowSpace.taylor_hood(mesh=tube.mesh)
-    system = FlowSystem.of(space=space, conditions=conditions, coriolis=CORIOLIS, slab=tube.slab)
+    system = FlowSystem.of(space=space, conditions=conditions, coriolis=CORIOLIS)
     velocity = _swept_velocity(tube, developed, reynolds)
     velocity[:, space.boundary_nodes("wall")] = 0.0
     fixed = np.concatenate([velocity.ravel(), np.zeros(space.pressure_nodes)])

@@ -30,7 +30,7 @@ from ringbalance.verification.cases.driven_estimation import (
     imbalance_record,
 )
 from ringbalance.verification.cases.driven_positioning import efforts, growth, printed_compensation
-from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 
 def test_figure_four_honest_filters_need_no_seconds(paper: EccentricScene) -> None:

@@ -17,7 +17,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.results.requirements import Requirement
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.verification.eccentric_scenes import changed
+from ringbalance.verification.papers import changed
 
 
 @pytest.fixture(scope="module")

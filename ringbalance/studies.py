@@ -25,8 +25,7 @@ from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.changes import checked_scene, document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
-from ringbalance.verification.extremes.cli import base_of
-from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
+from ringbalance.verification.extremes.study import SIZES, Extremes, base_of, find_extremes
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases as run_scene_cases
 from ringbalance.verification.trade import TradeStudy, trade_study

@@ -23,11 +23,11 @@ from ringbalance.controller.balancer import (
     rotor_fault,
 )
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
+from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements, reach_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
-from ringbalance.controller.eccentric_mass.study import eccentric_requirements, reach_of
 from ringbalance.controller.eccentric_mass.tuning import EccentricTuning, drawn_run, tune_eccentric
 from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows

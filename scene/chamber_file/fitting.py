@@ -21,10 +21,9 @@ from ringbalance.scene.chamber_file.soundness import PORT
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.kinds import Finding, failed_checks, written
-from ringbalance.scene.rules.shape import SIZE_CHECKS
+from ringbalance.scene.rules.shape import DRAWING_ROUNDING, SIZE_CHECKS
 from ringbalance.scene.units import DIMENSIONS
 
-DRAWING_ROUNDING: Final = 1e-5
 _DIGITS: Final = 7
 """Of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
 _LEAST_FACING: Final = 0.01

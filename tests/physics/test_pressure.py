@@ -25,8 +25,8 @@ from ringbalance.physics.pressure.solve import (
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
-from ringbalance.verification.orders import field_error
-from ringbalance.verification.reference.manufactured import Manufactured
+from ringbalance.verification.finite_elements import field_error
+from ringbalance.verification.reference.pressure import Manufactured
 
 WATER = RotatingLiquid(density=1000.0, angular_velocity=1047.2)
 

@@ -13,7 +13,7 @@ from ringbalance.physics.pressure.surface import find_surface, refined_surface, 
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
-from ringbalance.verification.rings import mutated_force
+from ringbalance.verification.finite_elements import mutated_force
 
 G = 9.80665
 

@@ -19,7 +19,7 @@ from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc
-from ringbalance.verification.rings import mutated_force
+from ringbalance.verification.finite_elements import mutated_force
 
 RHO, OMEGA = 1000.0, 10_000 * np.pi / 30
 FILLS = np.linspace(0.0, 0.5, 11)

@@ -23,8 +23,8 @@ from ringbalance.physics.tube.rotation_table import (
     rotation_table_covers,
     slow_first,
 )
-from ringbalance.verification.navier_stokes.continuation import StepRule, follow
-from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings
+from ringbalance.verification.navier_stokes.flow import FlowSystem
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, StepRule, follow
 from ringbalance.verification.navier_stokes.rotating_section import (
     POISEUILLE_GRADIENT,
     DuctMesh,
@@ -35,7 +35,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.system import FlowSystem
 
 
 @cache

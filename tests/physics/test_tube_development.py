@@ -12,7 +12,6 @@ from scipy.linalg import eig
 from scipy.optimize import root
 from scipy.special import jv, roots_jacobi
 
-from ringbalance.mesh.bent_tube import Segment, swept_tube
 from ringbalance.physics.tube.local_losses import ROTATING_PROFILE_UNCERTAINTY, kinetic_factor
 from ringbalance.physics.tube.loss import (
     DEVELOPMENT_SHARE,
@@ -21,14 +20,15 @@ from ringbalance.physics.tube.loss import (
 )
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.verification.cases.sections import decay_length, slowest_decay
+from ringbalance.verification.navier_stokes.flow import Coefficients, FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     developed_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.system import Coefficients, FlowSystem
 from ringbalance.verification.reference import bent_tube
+from ringbalance.verification.reference.bent_tube import Segment, swept_tube
 
 Array = np.ndarray
 

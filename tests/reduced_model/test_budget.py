@@ -15,10 +15,11 @@ from scipy.optimize import brentq
 from scipy.stats import binom
 
 from ringbalance.physics.gas import pressure_factor
+from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import UNITS
 from ringbalance.reduced_model.core import Answers
-from ringbalance.reduced_model.tube.heads import log_heads
+from ringbalance.reduced_model.tube.heads import crest_head, log_heads
 from ringbalance.reduced_model.tube.regime import CLEARING, RELEASED
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs
@@ -73,7 +74,11 @@ class _Exact:
         self.scene, self.disc = scene, scene.disc
         self.rho, self.square = scene.liquid.density, scene.rotor.speed**2
         velocities = np.linspace(math.log(1e-2), math.log(1e2), 801)
-        tables = [head(velocities) for head in log_heads(scene)]
+        u = np.exp(velocities)
+        end = crest_head(
+            scene=scene, tube=scene.tube, state=corrected_state(scene, u), velocity=u, lowest=False
+        )
+        tables = [*log_heads(scene, velocities), np.log(end)]
         self.heads = [PchipInterpolator(velocities, table) for table in tables]
         self.inverse = [PchipInterpolator(table, velocities) for table in tables[:2]]
         self.gas = pressure_factor(scene) * scene.gas.pressure

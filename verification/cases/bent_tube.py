@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.mesh.bent_tube import Segment
 from ringbalance.physics.convergence import gci
 from ringbalance.physics.tube.friction import rotation_reynolds_number
 from ringbalance.physics.tube.loss import tube_loss
@@ -27,7 +26,7 @@ from ringbalance.verification.evidence import (
     figure,
 )
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
-from ringbalance.verification.reference.bent_tube import BentTubeFlow, bend_shift
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, Segment, bend_shift
 
 REYNOLDS: Final = 200.0
 VISCOSITY: Final = 20e-6

@@ -44,8 +44,9 @@ from ringbalance.verification.evidence import (
     as_found,
     figure,
 )
-from ringbalance.verification.navier_stokes.linear import Factors
-from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
+from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.newton import Factors, FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import (
     CORIOLIS,
     SectionMesh,
@@ -54,9 +55,6 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
-from ringbalance.verification.orders import OrderStudy, order_figure, orders_found
 
 _SLOW_SERIES: Final = 9216.0
 _INERTIA_SERIES: Final = 16515072.0
@@ -378,7 +376,7 @@ def _modes(matrices: tuple[Any, Any, Any], shift: float, count: int) -> tuple[Co
     """Eigenvalues mu next to a shift, and the relative residuals of their modes."""
     zero, one, two = matrices
     size = zero.shape[0]
-    factors = Factors.of(matrix=(zero + shift * one + shift**2 * two).tocsc(), along_diagonal=True)
+    factors = Factors.of((zero + shift * one + shift**2 * two).tocsc())
 
     def inverse(y: FloatArray) -> FloatArray:
         # (q, mu q) linearises the square; one factored matrix of the section's size serves.

@@ -30,7 +30,7 @@ from ringbalance.physics.sloshing_system import (
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
-from ringbalance.verification.orders import OrderStudy
+from ringbalance.verification.finite_elements import OrderStudy
 from ringbalance.verification.reference.block_chambers import disc_chamber
 from ringbalance.verification.reference.sloshing_exact import CosineWaves
 

@@ -24,7 +24,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.results.rows import Finding
 from ringbalance.scene import SceneError
-from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 SEEDS = range(3)
 

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from exact_chamber import ExactChamber
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 from scipy.stats import binom
@@ -82,25 +82,7 @@ class _Exact:
         self.heads = [PchipInterpolator(velocities, table) for table in tables]
         self.inverse = [PchipInterpolator(table, velocities) for table in tables[:2]]
         self.gas = pressure_factor(scene) * scene.gas.pressure
-        self.area = self._area(self.disc.inner_radius)
-
-    def _angle(self, r: float) -> float:
-        return self.disc.central_angle / 2 - math.asin(self.disc.plate_thickness / r)
-
-    def _area(self, inner: float) -> float:
-        return float(quad(lambda r: 2 * r * self._angle(r), inner, self.disc.outer_radius, epsabs=0)[0])
-
-    def _level(self, x: float) -> float:
-        return _solution(
-            lambda a: self._area(a) - x * self.area, self.disc.inner_radius, self.disc.outer_radius
-        )
-
-    def _moment(self, x: float) -> float:
-        def slice_of(r: float) -> float:
-            return 2 * r**2 * math.sin(self._angle(r))
-
-        inner, outer = self._level(x), self.disc.outer_radius
-        return float(self.rho * self.disc.axial_width * quad(slice_of, inner, outer, epsabs=0)[0])
+        self.chamber = ExactChamber(self.disc)
 
     def _pressure(self, radius: float) -> float:
         return self.rho * self.square * (self.disc.outer_radius**2 - radius**2) / 2
@@ -113,7 +95,7 @@ class _Exact:
     def _flow(self, x: float, y: float, *, primed: bool) -> tuple[float, float, float]:
         """Velocity, that of a full siphon, and the crest's pressure at rest."""
         tube = self.scene.tube
-        here, there = (self._pressure(self._level(fill)) for fill in (x, y))
+        here, there = (self._pressure(self.chamber.surface(fill)) for fill in (x, y))
         port = self._pressure(tube.port_radius)
         driving = self.gas + here - max(there, port)
         full = self._velocity(0, driving)
@@ -142,7 +124,7 @@ class _Exact:
             way = math.log(feed / max(near, tube.bore / 2)) - 0.75
             below = max(disc.outer_radius - tube.port_radius, 0.0)
             depth = ((near + below) ** 4 + 6 * nu * rate / (math.pi * pull) * way) ** 0.25 - below
-            return float(tube.draw_down_factor * depth - (tube.port_radius - self._level(x)))
+            return float(tube.draw_down_factor * depth - (tube.port_radius - self.chamber.surface(x)))
 
         return _solution(excess, 0.0, top / 2)
 
@@ -155,22 +137,22 @@ class _Exact:
         top, tube, factor = self.disc.max_fill_ratio, self.scene.tube, pressure_factor(self.scene)
         assert tube.hump_radius is not None
         u, full, rest = self._flow(top / 2, top / 2, primed=False)
-        level, x = self._level(top / 2), self._residual()
+        x = self._residual()
         head, siphon = (self.rho * math.exp(self.heads[i](np.log(v))) for i, v in ((3, u), (1, full)))
         vapour = self.scene.liquid.vapour_pressure - self.scene.gas.ambient_pressure
         return {
-            "chamber_volume": self.disc.axial_width * self.area,
-            "wall_pressure": self._pressure(self._level(top)),
-            "moment": self._moment(top),
-            "lambda": 2 * level * math.sin(self._angle(level)) / self._angle(level),
+            "chamber_volume": self.disc.axial_width * self.chamber.whole,
+            "wall_pressure": self._pressure(self.chamber.surface(top)),
+            "moment": self.chamber.moment(top, self.rho),
+            "lambda": self.chamber.central_lambda(),
             "least_fill_ratio": x,
-            "usable_moment": self._moment(top - x) - self._moment(x),
+            "usable_moment": self.chamber.moment(top - x, self.rho) - self.chamber.moment(x, self.rho),
             "velocity": u,
             "drag_coefficient": 2 * math.exp(self.heads[0](np.log(u))) / u**2 - 1,
             "crest_pressure": rest - head,
             "priming_pressure_vented": self._pressure(tube.hump_radius) / factor,
             "priming_pressure_trapped": self._trapped() / factor,
-            "stall_pressure": self._pressure(self._level(top)) / factor,
+            "stall_pressure": self._pressure(self.chamber.surface(top)) / factor,
             "cavitation_margin": rest - siphon - vapour * (1 - RELEASED),
         }
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.loss import tube_loss
+from ringbalance.reduced_model.calibration import chamber_and_law
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
 from ringbalance.reduced_model.estimates import range_flow
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law, nominal_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, nominal_law
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.operating_point import priming_pressure
 from ringbalance.reduced_model.pressure_profile import HumpProfile
@@ -35,7 +35,7 @@ def variant(scene: Scene, *, speed: float | None = None, **tube: object) -> Cali
     """Law of the paper's disc with another tube or speed."""
     rotor = dataclasses.replace(scene.rotor, speed=speed or scene.rotor.speed)
     changed = dataclasses.replace(scene, tube=dataclasses.replace(scene.tube, **tube), rotor=rotor)  # type: ignore[arg-type]
-    return calibrated_law(scene=changed, chamber=calibrate_chamber(changed), heads=TubeHeads.of(changed))
+    return chamber_and_law(changed)[1]
 
 
 @pytest.fixture(scope="module")

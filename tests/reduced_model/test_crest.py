@@ -13,12 +13,10 @@ from hypothesis import strategies as st
 from scipy.optimize import fsolve, minimize_scalar
 
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law
+from ringbalance.reduced_model.calibration import calibrated_model, chamber_and_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.pressure_profile import HumpProfile
-from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.path import crest_span, path_radius, share_at_radius
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import with_tolerance
@@ -43,7 +41,7 @@ def changed(scene: Scene, *, viscosity: float | None = None, **tube: Any) -> Sce
 
 
 def law_of(scene: Scene) -> CalibratedLaw:
-    return calibrated_law(scene=scene, chamber=calibrate_chamber(scene), heads=TubeHeads.of(scene))
+    return chamber_and_law(scene)[1]
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,6 @@ bench: env ## timed comparisons, each a ratio within one run
 	$(PYTHON_IN_VENV) benchmarks/designs.py
 	$(PYTHON_IN_VENV) benchmarks/closed_loop.py
 	$(PYTHON_IN_VENV) benchmarks/moving_injection.py
-	$(PYTHON_IN_VENV) benchmarks/closed_loop_moving.py
 	$(PYTHON_IN_VENV) benchmarks/eccentric_mass.py
 
 bench-cfd: env ## the tube and the waves beside OpenFOAM, an hour or so; keeps the results

@@ -1,154 +1,277 @@
-"""The closed loop beside scipy's solve_ivp: one operation, a whole run, and ensembles of noisy runs.
+"""Noisy closed-loop runs with all terms of an injection, beside scipy's solve_ivp; ensembles as they grow.
 
-    python benchmarks/closed_loop.py [--json] [--repeats 7] [--members 100000] [--largest 1000000]
+    python benchmarks/closed_loop.py [--json] [--repeats 3] [--members 1000] [--largest 8000]
 
-The rival is what one would write oneself: a plain Python loop of the target-vector algorithm whose operations
-go through `solve_ivp` with events for stall and empty, at the loosest tolerance that keeps the fill within
-1e-6.  Its right-hand side is either the paper's law in plain numbers, the cheapest that Python has, or a flow
-law through its interface, as for a law of which nothing else is known.  Under the paper's law the fill is
-a parabola in time, which Runge-Kutta steps hit exactly, so solve_ivp has an easy time there, and the rival
-keeps no record.  Ours is timed in three ways: compiled and called from Python with numbers (`linear_fill`) or
-as an ensemble of one, which are the ones that a target is set for; as a script meets it, with
-all checks, choices and texts (`closed_form`, `simulate`); and among many (`simulate_ensemble`).  Times are
-the least of several rounds, by the wall's clock and by the processor's, which other work disturbs less.  The
-growth is measured after everything has been compiled, so that the peak memory of the process shows what
-an ensemble adds.
+Both sides carry out the whole target-vector loop of the paper's disc under the calibrated law: noisy samples,
+two valves a command, and the motion of every pair that was driven.  The rival is what one would write
+oneself: a plain Python loop with the injections of `moving_injection`, solve_ivp with events, by the method
+and tolerance that is fastest over the injections of a run among those that keep each fill within 1e-6.  It
+takes for granted that a pair is at rest and vented at the next sample, keeps no record and looks after no
+residual fill.  Ours are runs of `simulate_ensemble`, each with its own flow, moment, rotor and noise, and all
+of that.  Before the time is taken, a run without noise must agree; the error of a member's fills is shown.
+Times are of the processor, with one thread, the least of several rounds; the growth is measured after
+everything has been compiled, so that the peak memory of the process shows what an ensemble adds.
 """
 
 from __future__ import annotations
 
 import argparse
+import cmath
 import json
 import math
 import os
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
-from closed_loop_growth import Growth, compile_seconds, consequences_seconds, growth, order_of_growth
-from closed_loop_lines import FILL_ERROR, Line, Rivals, ensemble_lines, loosest, run_lines
-from closed_loop_plain import by_the_law, in_numbers
-from rich.console import Console
-from rich.table import Table
+import numpy as np
+from moving_injection import FILL_ERROR, METHODS, TOLERANCES, WANTED, Rival, least, ours, piped_scene
 
-from ringbalance.controller.ensemble import simulate_ensemble
+from ringbalance.controller.algorithms.built_in import vector_shares
+from ringbalance.controller.ensemble import (
+    RELATIVE_ERROR,
+    ensemble_dynamics,
+    simulate_ensemble,
+    simulate_members,
+)
+from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
+from ringbalance.scene.models import Scene
+
+GAIN = 0.3
+"""Of the paper's, which suits the paper's own law; the calibrated law moves more liquid."""
+TIME_LIMIT = 20.0
+"""s, of a run: some 40 samples."""
+JUDGED = 20
+"""Injections of a run by which the rival's method is chosen."""
+RIVAL_RUNS = 2
+END_ERROR = 1e-9
+"""m, of a run's last amplitude: some of its fills are within 1e-6."""
+
+
+FIRST_CALL = """
+import time
+from ringbalance.controller.ensemble import simulate_ensemble
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loader import bundled_scene, load_scene
-from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import liquid_ring_scene
+scene = load_scene(bundled_scene("liquid_ring_paper"))
+start = time.process_time()
+simulate_ensemble(scene, paper_model(scene), 1, 0)
+print(time.process_time() - start)
+"""
 
 
-def compare(scene: Scene, *, repeats: int, members: int, console: Console) -> tuple[list[Line], Rivals]:
-    """All ratios. Args: `repeats`: timed rounds. `members`: of the ensembles. `console`: for progress."""
-    paper = paper_model(scene)
-    rivals = {
-        "paper's law in numbers": loosest(scene, paper, in_numbers(scene, paper)),
-        "paper's law by its interface": loosest(scene, paper, by_the_law(scene, paper)),
-    }
-    console.print("one run")
-    lines = run_lines(scene, paper, rivals, repeats)
-    console.print(f"{members} noisy runs under the paper's law")
-    rounds = min(repeats, 3)
-    lines += ensemble_lines(scene, paper, rivals, members, rounds)
-    console.print("calibration, and as many under the calibrated law with a gain that suits it")
-    calibrated = calibrate(scene).model
-    gain = 0.3 * scene.controller.proportional
-    # The rival has no mass in its column and no gas line, so ours leaves them out, too: `moving_injection`
-    # compares both with them.
-    tuned = replace(scene, tolerance=1.0, controller=replace(scene.controller, proportional=gain))
-    own = {"calibrated law": loosest(tuned, calibrated, by_the_law(tuned, calibrated))}
-    lines += ensemble_lines(tuned, calibrated, own, members, rounds)
-    return lines, rivals | own
+@dataclass(kw_only=True)
+class Carried:
+    """Injections by solve_ivp for the plain loop, with a list of what was asked for."""
+
+    rival: Rival
+    total: float
+    method: str = "LSODA"
+    tolerance: float = 1e-8
+    asked: list[tuple[float, float]] = field(default_factory=list)
+
+    def operate(self, fill: float, duration: float) -> float:
+        """Fill of the driven chamber at the next sample."""
+        self.asked.append((fill, duration))
+        return self.rival.inject(duration, method=self.method, tolerance=self.tolerance, fill=fill)
 
 
-def comparison(line: Line) -> dict[str, object]:
-    """One line of the document. Returns: A document for json."""
-    return {
-        "what": line.what,
-        "ours_s": line.ours._asdict(),
-        "rival_s": line.rival._asdict(),
-        "ratio": line.ratio,
-        "processor_ratio": line.processor_ratio,
-        "wanted": line.wanted,
-    }
+def plain_run(scene: Scene, model: BalancerModel, plain: Carried, seed: int) -> tuple[complex, int]:
+    """One target-vector run as one would write it oneself.
 
-
-def document(
-    lines: Sequence[Line], rivals: Rivals, sizes: Sequence[Growth], others: dict[str, float]
-) -> dict[str, object]:
-    """All that was measured.
-
-    Args: `lines`: comparisons. `rivals`: by name. `others`: single times, s.
-    Returns: A document for json.
+    Args: `plain`: carries an operation through. `seed`: of the noise.
+    Returns: Vibration at the end, m, and the number of samples.
     """
+    settings, sensor, random = scene.controller, scene.sensor, np.random.default_rng(seed)
+    exact = sensor.amplitude_noise == sensor.phase_noise == 0
+    fills = [scene.disc.initial_fill] * (scene.disc.chambers // 2)
+    now, samples, integral = 0.0, 0, 0.0
+    before: tuple[float, float, float] | None = None
+    while True:
+        v, z = _vibration(scene, model, fills, plain.total), random.standard_normal(2)
+        amplitude = abs(abs(v) + sensor.amplitude_noise * z[0])
+        phase = cmath.phase(v) + sensor.phase_noise * z[1]
+        samples += 1
+        if now >= scene.run.time_limit or (exact and amplitude <= settings.limit):
+            return v, samples
+        if amplitude <= settings.limit:
+            integral, before = 0.0, None
+        else:
+            wanted, integral = _pid(scene, (now, amplitude, phase), before, integral)
+            before = (now, amplitude, phase)
+            now += _gas(scene, plain, fills, wanted, phase, scene.run.time_limit - now)
+        now += min(settings.period, max(scene.run.time_limit - now, 0.0))
+
+
+def _vibration(scene: Scene, model: BalancerModel, fills: Sequence[float], total: float) -> complex:
+    rotor = scene.rotor
+    k = cmath.rect(rotor.influence_coefficient, -rotor.lag_angle)
+    moment = sum(
+        float(model.moment.pair_moment(fill_ratio=x, opposite_fill_ratio=total - x))
+        * cmath.rect(1.0, math.pi * i / len(fills))
+        for i, x in enumerate(fills)
+    )
+    return cmath.rect(rotor.initial_amplitude, rotor.initial_phase) + k * moment
+
+
+def _pid(
+    scene: Scene,
+    sample: tuple[float, float, float],
+    before: tuple[float, float, float] | None,
+    integral: float,
+) -> tuple[float, float]:
+    now, amplitude, phase = sample
+    if before is None:
+        return scene.controller.proportional * amplitude, integral
+    dt, settings = now - before[0], scene.controller
+    turned = math.cos(phase - before[2]) < 0
+    area = 0.0 if turned else integral + (amplitude + before[1]) / 2 * dt
+    slope = settings.derivative_time * (amplitude - before[1]) / dt
+    wanted = settings.proportional * (amplitude + area / (settings.integral_time or math.inf) + slope)
+    return wanted, integral if wanted > settings.maximum_gas_time and not turned else area
+
+
+def _gas(
+    scene: Scene, plain: Carried, fills: list[float], wanted: float, phase: float, remaining: float
+) -> float:
+    """Drive the two chambers and return how long the gas was on."""
+    settings, half, longest = scene.controller, len(fills), 0.0
+    length = min(max(wanted, 0.0), settings.maximum_gas_time)
+    angle = phase + settings.assumed_lag_angle
+    first, near, second, far = vector_shares(2 * half, angle, length, (False,) * 2 * half)
+    for chamber, share in ((first, near), (second, far)):
+        duration = min(share, remaining)
+        if share < settings.minimum_gas_time or duration <= 0:
+            continue
+        pair, positive = chamber % half, chamber < half
+        driven = plain.operate(fills[pair] if positive else plain.total - fills[pair], duration)
+        fills[pair] = driven if positive else plain.total - driven
+        longest = max(longest, duration)
+    return longest
+
+
+def fastest(rival: Rival, dynamics: Dynamics, asked: list[tuple[float, float]]) -> tuple[str, float, float]:
+    """Method and tolerance that keep each fill within `FILL_ERROR` in the least time; our largest error."""
+    exact = [ours(dynamics, t, error=1e-10, count=1, fill=x) for x, t in asked]
+    near = [ours(dynamics, t, error=RELATIVE_ERROR, count=1, fill=x) for x, t in asked]
+    best = (math.inf, "", 0.0)
+    for method in METHODS:
+        for tolerance in TOLERANCES:
+            inject = partial(rival.inject, method=method, tolerance=tolerance)
+            if all(
+                abs(inject(t, fill=x) - end) <= FILL_ERROR for (x, t), end in zip(asked, exact, strict=True)
+            ):
+                spent = least(lambda f=inject: [f(t, fill=x) for x, t in asked], 2)  # type: ignore[misc]
+                best = min(best, (spent, method, tolerance))
+                break
+    if not best[1]:
+        raise RuntimeError("solve_ivp does not reach the error asked for")
+    return best[1], best[2], float(np.max(np.abs(np.subtract(near, exact))))
+
+
+def check_same(scene: Scene, model: BalancerModel, carried: Carried) -> None:
+    """Make sure that both sides do the same work. Raises: RuntimeError: they do not end alike."""
+    still = replace(scene, sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0))
+    end, samples = plain_run(still, model, carried, 0)
+    member = simulate_members(still, model)
+    error = abs(abs(end) - float(member.final_amplitude[0]))
+    if samples != member.samples[0] or error > END_ERROR:
+        raise RuntimeError(f"{samples} and {member.samples[0]} samples, {error:.1e} m apart at the end")
+
+
+def rival_run(scene: Scene, model: BalancerModel, carried: Carried) -> None:
+    """Some noisy runs."""
+    for seed in range(RIVAL_RUNS):
+        plain_run(scene, model, carried, seed)
+
+
+def growth(ensemble: Callable[[int], object], *, first: int, largest: int) -> list[dict[str, float]]:
+    """Ensembles that double up to the largest. Args: `ensemble`: runs so many members."""
+    found, size = [], first
+    while size <= largest:
+        used = time.process_time()
+        ensemble(size)
+        spent, peak = time.process_time() - used, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        found.append({"members": size, "processor_s": spent, "peak_memory_MiB": peak / 1024})
+        size *= 2
+    return found
+
+
+def compile_seconds() -> list[float]:
+    """Processor time, s, of a machine's first ensemble, compiling, and of the first of a later process."""
+    with tempfile.TemporaryDirectory() as folder:
+        kept = os.environ | {"NUMBA_CACHE_DIR": folder}
+        call = partial(subprocess.run, env=kept, capture_output=True, text=True, check=True)
+        return [float(call([sys.executable, "-c", FIRST_CALL]).stdout) for _ in range(2)]
+
+
+def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
+    """All that is measured. Returns: a document for json."""
+    scene = piped_scene()
+    gain = GAIN * scene.controller.proportional
+    scene = replace(
+        scene,
+        controller=replace(scene.controller, proportional=gain),
+        run=replace(scene.run, time_limit=TIME_LIMIT),
+    )
+    model = calibrate(scene).model
+    dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG, HELD))
+    plant = ensemble_dynamics(scene, model).plant(total=2 * scene.disc.initial_fill)
+    if not all(plant[name][0] > 0 for name in ("inertia", "line", "lifts", "valve_lag")):
+        raise RuntimeError("the ensemble leaves out what is to be compared")
+    carried = Carried(rival=Rival(scene, model), total=2 * scene.disc.initial_fill)
+    check_same(scene, model, carried)
+    carried.asked.clear()
+    plain_run(scene, model, carried, 0)
+    by_time = sorted(carried.asked, key=lambda one: one[1])
+    judged = [by_time[round(i)] for i in np.linspace(0, len(by_time) - 1, JUDGED)]
+    carried.method, carried.tolerance, error = fastest(carried.rival, dynamics, judged)
+    if error > FILL_ERROR:
+        raise RuntimeError(f"an ensemble's fills are off by {error:.1e}")
+    carried.asked.clear()
+    theirs = least(partial(rival_run, scene, model, carried), repeats) / RIVAL_RUNS
+    injections = len(carried.asked) / (repeats * RIVAL_RUNS)
+    simulate_ensemble(scene, model, 1, 0)
+    one = partial(simulate_ensemble, scene, model, seed=0, workers=1)
+    own = least(lambda: one(members), repeats) / members
     return {
-        "solve_ivp_rtol": {name: plain.tolerance for name, plain in rivals.items()},
-        "fill_error": FILL_ERROR,
-        "cores": os.cpu_count(),
-        "comparisons": [comparison(line) for line in lines],
-        "growth": [asdict(size) for size in sizes],
-        "order_of_growth": order_of_growth(sizes),
-        "seconds": others,
+        "solve_ivp_s": theirs,
+        "method": carried.method,
+        "rtol": carried.tolerance,
+        "injections": injections,
+        "ours_s": own,
+        "fill_error": error,
+        "ratio": theirs / own,
+        "wanted": WANTED,
+        "growth": growth(one, first=largest // 8, largest=largest),
+        "first_ensemble_s": compile_seconds(),
     }
-
-
-def show(lines: Sequence[Line], sizes: Sequence[Growth], others: dict[str, float], console: Console) -> None:
-    """Print tables. Args: `lines`: comparisons. `others`: single times, s. `console`: where to."""
-    table = Table(title="beside solve_ivp at 1e-6 in fill")
-    for name in ("what", "ours, us", "solve_ivp, us", "times faster", "asked for", "by processor time"):
-        table.add_column(name)
-    for line in lines:
-        table.add_row(
-            line.what,
-            f"{line.ours.wall * 1e6:.4g}",
-            f"{line.rival.wall * 1e6:.4g}",
-            f"{line.ratio:.4g}",
-            "" if line.wanted is None else f"{line.wanted:g}",
-            f"{line.processor_ratio:.4g}",
-        )
-    console.print(table)
-    grown = Table(title="growth")
-    for name in ("members", "s", "processor s", "peak memory, MiB"):
-        grown.add_column(name)
-    for size in sizes:
-        grown.add_row(
-            str(size.members),
-            f"{size.seconds:.3g}",
-            f"{size.processor_seconds:.3g}",
-            f"{size.peak_memory_MiB:.4g}",
-        )
-    console.print(grown)
-    console.print(f"order of growth {order_of_growth(sizes) or math.nan:.3f}")
-    for what, seconds in others.items():
-        console.print(f"{what}: {seconds:.3g} s")
 
 
 def main() -> None:
     """Run the benchmark from the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON document")
-    parser.add_argument("--repeats", type=int, default=7)
-    parser.add_argument("--members", type=int, default=100_000)
-    parser.add_argument("--largest", type=int, default=1_000_000)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--members", type=int, default=1000)
+    parser.add_argument("--largest", type=int, default=8000)
     asked = parser.parse_args()
-    told = Console(stderr=True)
-    scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
-    lines, rivals = compare(scene, repeats=asked.repeats, members=asked.members, console=told)
-    model = paper_model(scene)
-    ensemble = partial(simulate_ensemble, scene, model, seed=0)
-    sizes = growth(ensemble, first=1000, largest=asked.largest, factor=10, console=told)
-    told.print("consequences, and the first calls of fresh processes")
-    first, later = compile_seconds()
-    others = {
-        "find_consequences": consequences_seconds(scene),
-        "first ensemble of a machine, compiling": first,
-        "first ensemble of a later process": later,
-    }
+    found = compare(asked.repeats, asked.members, asked.largest)
     if asked.json:
-        print(json.dumps(document(lines, rivals, sizes, others), allow_nan=False, indent=2))
-    else:
-        show(lines, sizes, others, Console())
+        print(json.dumps(found, indent=2))
+        return
+    for name, value in found.items():
+        for row in value if isinstance(value, list) else (value,):
+            print(f"{name}: {row}")
 
 
 if __name__ == "__main__":

@@ -37,7 +37,6 @@ from openfoam_waves import (
     turning_gravity,
 )
 
-from ringbalance.mesh.bent_tube import Segment
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.physics.convergence import gci
 from ringbalance.physics.sloshing import sloshing_modes, sloshing_response
@@ -56,7 +55,7 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     developed_section,
     friction_ratio,
 )
-from ringbalance.verification.reference.bent_tube import BentTubeFlow
+from ringbalance.verification.reference.bent_tube import BentTubeFlow, Segment
 
 HERE = Path(__file__).resolve().parent
 KEPT = HERE / "openfoam.json"

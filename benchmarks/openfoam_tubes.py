@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from openfoam_case import HexMesh, Run, extruded, field, last_number, run, sides, vector, write_case
 
-from ringbalance.mesh.bent_tube import Segment, swept_tube
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
+from ringbalance.verification.reference.bent_tube import Segment, swept_tube
 
 _SLAB = 0.05
 _VELOCITY = "[0 1 -1 0 0 0 0]"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
 from ringbalance.verification.navier_stokes.meshes import (
     Patch,
     geometric_vertices,
@@ -16,8 +17,6 @@ from ringbalance.verification.navier_stokes.meshes import (
     with_midpoints,
 )
 from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
-from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 Field = Callable[[FloatArray], FloatArray]
 
@@ -106,16 +105,14 @@ def kovasznay(*, reynolds: float) -> tuple[Field, Field, Field]:
     return velocity, gradient, pressure
 
 
-def kovasznay_flow(
-    *, cells: int, reynolds: float = 40.0, shape: str = "triangle"
-) -> tuple[FlowSystem, FlowSolution]:
+def kovasznay_flow(*, cells: int, reynolds: float = 40.0) -> tuple[FlowSystem, FlowSolution]:
     """Kovasznay's flow on (-1/2, 1) x (-1/2, 1/2), its velocity given all round.
 
-    Args: `cells`: along each side. `reynolds`: Re. `shape`: of the cells, "triangle" or "quad".
+    Args: `cells`: along each side. `reynolds`: Re.
     """
     sides = dict.fromkeys(("west", "east", "south", "north"), "boundary")
     x, y = np.linspace(-0.5, 1.0, 2 * cells + 1), np.linspace(-0.5, 0.5, 2 * cells + 1)
-    mesh = patch_mesh(patches=[Patch.tensor(x=x, y=y, sides=sides)], shape=shape)
+    mesh = patch_mesh([Patch.tensor(x=x, y=y, sides=sides)])
     velocity = kovasznay(reynolds=reynolds)[0]
     conditions = [
         Dirichlet(boundary="boundary", component=0, value=lambda x: velocity(x)[0]),
@@ -182,7 +179,7 @@ def taylor_couette(
     ring = Patch.ruled(inner=inner, outer=outer, blend=blend, sides={"south": "inner", "north": "outer"})
     walls = (("inner", inner_speed), ("outer", outer_speed))
     conditions = [Dirichlet(boundary=b, component=c, value=_spinning(w, c)) for b, w in walls for c in (0, 1)]
-    space = FlowSpace.taylor_hood(mesh=patch_mesh(patches=[ring], shape="triangle"))
+    space = FlowSpace.taylor_hood(mesh=patch_mesh([ring]))
     system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, stress_form=True)
     solution = solve_flow(system=system, coefficients=Coefficients(viscosity=viscosity))
     gap = outer_radius**2 - inner_radius**2
@@ -209,7 +206,7 @@ def cavity_flow(*, cells: int, reynolds: float, wall_ratio: float = 4.0) -> tupl
     half = geometric_vertices(cells=cells // 2, ratio=wall_ratio) / 2
     line = with_midpoints(vertices=np.concatenate([half, 1 - half[-2::-1]]))
     sides = {"west": "wall", "east": "wall", "south": "wall", "north": "lid"}
-    mesh = patch_mesh(patches=[Patch.tensor(x=line, y=line, sides=sides)], shape="quad")
+    mesh = patch_mesh([Patch.tensor(x=line, y=line, sides=sides)])
     conditions = [Dirichlet(boundary="lid", component=0, value=1.0), Dirichlet(boundary="lid", component=1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
     system = FlowSystem.of(space=FlowSpace.taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
@@ -226,14 +223,12 @@ def cavity_flow(*, cells: int, reynolds: float, wall_ratio: float = 4.0) -> tupl
 _CENTRE, _RADIUS, _HEIGHT, _LENGTH = (0.2, 0.2), 0.05, 0.41, 2.2
 
 
-def cylinder_mesh(
-    *, around: int, across: int, along: int, shape: str = "triangle", growth: float = 8.0
-) -> Any:
+def cylinder_mesh(*, around: int, across: int, along: int, growth: float = 8.0) -> Any:
     """Curved mesh of benchmark 2D-1: a ring of four patches about the cylinder, then the channel.
 
     Args: `around`: cells on a quarter of the cylinder, and across the channel. `across`: cells from the
-        cylinder to the channel wall. `along`: cells from the ring to the outlet. `shape`: "triangle" or
-        "quad". `growth`: last cell over first cell from the cylinder outwards.
+        cylinder to the channel wall. `along`: cells from the ring to the outlet. `growth`: last cell
+        over first cell from the cylinder outwards.
     Returns: Quadratic mesh with boundaries inflow, outflow, wall, cylinder.
     Source: Schaefer and Turek, Benchmark computations of laminar flow around a cylinder (1996), Fig. 1.
     """
@@ -251,7 +246,7 @@ def cylinder_mesh(
     x = with_midpoints(vertices=geometric_vertices(cells=along, ratio=4.0))
     channel = {"east": "outflow", "south": "wall", "north": "wall"}
     patches.append(Patch.tensor(x=_HEIGHT + (_LENGTH - _HEIGHT) * x, y=_HEIGHT * line[:, 0], sides=channel))
-    return patch_mesh(patches=patches, shape=shape)
+    return patch_mesh(patches)
 
 
 def cylinder_flow(*, mesh: Any) -> tuple[FlowSystem, FlowSolution]:

@@ -23,7 +23,7 @@ from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.registry import balancer_class
+from ringbalance.scene.registry import registered
 from ringbalance.scene.units import DIMENSIONS
 
 Progress = Callable[[float, float], None]
@@ -187,7 +187,7 @@ class Balancer(Protocol):
         ...
 
     def rotor(self) -> CommonRotor:
-        """The rotor alone, for another balancer. Raises: SceneError: it stands still or does not vibrate."""
+        """The rotor alone. Raises: SceneError: it stands still, or never vibrates steadily."""
         ...
 
     def on_rotor(self, rotor: CommonRotor | None) -> Self:
@@ -240,7 +240,7 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
     Args: `options`: of its class, such as `flow_law` of a liquid ring; None counts as not given.
     Raises: ValueError: an option that this balancer does not have.
     """
-    made = balancer_class(scene.balancer)
+    made = registered("balancer", scene.balancer)
     given = {name: value for name, value in options.items() if value is not None}
     if foreign := sorted(set(given) - made.options):
         raise ValueError(f"the balancer {scene.balancer} has no {', '.join(foreign)}: leave that out")
@@ -250,7 +250,7 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
 
 def takes(scene: SceneFile, option: str) -> bool:
     """Whether the balancer of a scene has an option, such as "flow_law"."""
-    return option in balancer_class(scene.balancer).options
+    return option in registered("balancer", scene.balancer).options
 
 
 def balancer_under(law: str, scene: SceneFile) -> Balancer:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Balancer, CommonRotor, Draws
+from ringbalance.controller.balancer import Balancer, CommonRotor, Draws, vibrating
 from ringbalance.controller.tuning.dead_time import offset_text
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.result import Result, Rows, Table
@@ -198,7 +198,7 @@ def compare(first: Balancer, second: Balancer, *, runs: int = RUNS) -> Compariso
     Of the second its balancer alone counts.  Each has the settings that its formulas recommend.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
-    rotor = first.rotor()
+    rotor = vibrating(first.scene, first.rotor())
     try:
         # Whether the second can work there at all is known before anything is run.
         both = first.on_rotor(None), second.on_rotor(rotor)

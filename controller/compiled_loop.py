@@ -40,9 +40,9 @@ from ringbalance.controller.loop_records import (
     USABLE,
     Record,
 )
+from ringbalance.reduced_model.injection.column import gas_volume
 from ringbalance.reduced_model.injection.dynamics import P, X
 from ringbalance.reduced_model.injection.events import rests, would_start
-from ringbalance.reduced_model.injection.gas import gas_volume
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import in_place
 

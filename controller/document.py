@@ -6,8 +6,8 @@ Where a scene does not give its gas line, whole runs at both ends of the default
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from typing import Any, Final
 
 import numpy as np
@@ -50,7 +50,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "time_s": simulation.time.tolist(),
         "amplitude_m": simulation.amplitude.tolist(),
         "phase_rad": simulation.phase.tolist(),
-        "injections": [_injection(injection) for injection in simulation.injections],
+        "injections": [_injection(each) for each in simulation.injections],
         "fill_ratio": {letter: fill.tolist() for letter, fill in simulation.fill_ratio.items()},
         "overshoots": simulation.overshoots,
         "misadjustments": simulation.misadjustments,
@@ -231,81 +231,56 @@ def _sparkline(values: FloatArray) -> str:
     return "".join(_BARS[round(share * (len(_BARS) - 1))] for share in depth)
 
 
-@dataclass(frozen=True, kw_only=True)
-class LineRun:
-    """One run with one end of the range."""
-
-    end: str
-    """ "slow" or "fast"."""
-    conductance: float
-    """m^3/(s Pa)."""
-    valve_lag: float
-    """s."""
-    run: Simulation
-
-
-def line_runs(nominal: Simulation) -> tuple[LineRun, ...]:
-    """Runs of the same scene and law with all terms of an injection modelled; none where the scene gives its
-    gas line, the law no forces, or algorithm or sensor are the caller's own."""
+def line_runs(nominal: Simulation) -> dict[str, Simulation]:
+    """Runs of the same scene and law with all terms of an injection modelled, "slow" and "fast"; none where
+    the scene gives its gas line, the law no forces, or algorithm or sensor are the caller's own."""
     scene, flow = nominal.scene, nominal.model.flow
     ends = line_ends(scene)
     if len(ends) == 1 or not gives_forces(flow) or not nominal.as_scene:
-        return ()
-    found = []
+        return {}
+    # The paper's law has no mass in the tube and no crest.
+    terms = (FILLING, LAG) if isinstance(flow, PaperLaw) else (INERTIA, HELD, FILLING, LAG)
+    found = {}
     for end in ends:
-        gas = replace(
-            scene.gas,
-            conductance=end.line.conductance,
-            critical_ratio=end.line.critical_ratio,
-            valve_lag=end.valve_lag,
-        )
-        # The paper's law has no mass in the tube and no crest.
-        own = () if isinstance(flow, PaperLaw) else (INERTIA, HELD)
-        terms = (*own, FILLING, LAG)
-        run = nominal.again(replace(scene, gas=gas), terms)
-        found.append(
-            LineRun(end=end.name, conductance=end.line.conductance, valve_lag=end.valve_lag, run=run)
-        )
-    return tuple(found)
+        conductance, ratio = end.line.conductance, end.line.critical_ratio
+        gas = replace(scene.gas, conductance=conductance, critical_ratio=ratio, valve_lag=end.valve_lag)
+        found[end.name] = nominal.again(replace(scene, gas=gas), terms)
+    return found
 
 
-def command_document(run: Simulation) -> dict[str, Any]:
-    """What `ringbalance simulate --json` prints of a run."""
-    return simulation_document(run) | {"gas_line_runs": line_runs_document(line_runs(run))}
-
-
-def line_runs_table(runs: Sequence[LineRun]) -> Table:
+def line_runs_table(runs: Mapping[str, Simulation]) -> Table:
     """How the runs end."""
     return Table(
         caption="The scene gives no gas line; with both ends of its default range",
         heads=("line", "run", "settling time", "amplitude at the end"),
         rows=[
             (
-                each.end,
-                each.run.verdict.value,
-                given(each.run.settling_time, "s", digits=3),
-                given(float(each.run.amplitude[-1]), "m", digits=3),
+                end,
+                run.verdict.value,
+                given(run.settling_time, "s", digits=3),
+                given(float(run.amplitude[-1]), "m", digits=3),
             )
-            for each in runs
+            for end, run in runs.items()
         ],
     )
 
 
-def line_runs_document(runs: Sequence[LineRun]) -> list[dict[str, Any]]:
-    """For JSON, in SI."""
-    return [
+def command_document(nominal: Simulation) -> dict[str, Any]:
+    """What `ringbalance simulate --json` prints of a run."""
+    runs = [
         {
-            "end": found.end,
-            "conductance_m3_per_s_Pa": found.conductance,
-            "valve_lag_s": found.valve_lag,
-            "settled": found.run.settled,
-            "settling_time_s": found.run.settling_time,
-            "verdict": found.run.verdict.value,
-            "outcome": found.run.outcome.value,
-            "final_amplitude_m": float(found.run.amplitude[-1]),
-            "overshoots": found.run.overshoots,
-            "injections": len(found.run.injections),
-            "status": found.run.status,
+            "end": end,
+            "conductance_m3_per_s_Pa": run.scene.gas.conductance,
+            "valve_lag_s": run.scene.gas.valve_lag,
+            "settled": run.settled,
+            "settling_time_s": run.settling_time,
+            "verdict": run.verdict.value,
+            "outcome": run.outcome.value,
+            "final_amplitude_m": float(run.amplitude[-1]),
+            "overshoots": run.overshoots,
+            "injections": len(run.injections),
+            "status": run.status,
         }
-        for found in runs
+        for end, run in line_runs(nominal).items()
     ]
+    return simulation_document(nominal) | {"gas_line_runs": runs}

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -23,7 +24,6 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, F
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
 
@@ -86,49 +86,43 @@ class MemberRuns:
         )
 
 
+Noise = Callable[[int], np.random.Generator]
+"""Makes the random numbers of a member by its place."""
+
+
+def member_noise(seed: int, number: int) -> np.random.Generator:
+    """Random numbers of a member of an ensemble."""
+    key = np.random.SeedSequence(entropy=seed, spawn_key=(number, _NOISE))
+    return np.random.Generator(np.random.PCG64(key))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class EnsemblePlan:
+class _Plan:
     """What all members of an ensemble share."""
 
+    scene: Scene
     plan: LoopPlan
     loop: LoopFactor
     """Of a member with the scene's own values."""
-    rotor: Rotor
-    assumed_lag: float
-    """rad."""
-    scene: Scene
     law: FlowLaw
 
     @classmethod
     def of(
-        cls, *, scene: Scene, model: BalancerModel, dynamics: Dynamics, controller: BuiltIn | None = None
-    ) -> EnsemblePlan:
-        """Prepare the runs of an ensemble. Args: `controller`: default the scene's target vector."""
+        cls, scene: Scene, model: BalancerModel, *, dynamics: Dynamics | None, controller: BuiltIn | None
+    ) -> _Plan:
         algorithm = controller or target_vector_of(scene)
         plan = LoopPlan.of(
             scene=scene,
             model=model,
-            dynamics=dynamics,
+            dynamics=dynamics or ensemble_dynamics(scene, model),
             controller=algorithm,
             relative_error=RELATIVE_ERROR,
             most_samples=MOST_SAMPLES,
         )
-        return cls(
-            plan=plan,
-            loop=loop_factor(scene, model, algorithm),
-            rotor=scene.rotor,
-            assumed_lag=scene.controller.assumed_lag_angle,
-            scene=scene,
-            law=model.flow,
-        )
+        loop = loop_factor(scene, model, algorithm)
+        return cls(scene=scene, plan=plan, loop=loop, law=model.flow)
 
-    def run(self, members: Members, *, seed: int, number: int = 0) -> MemberRuns:
-        """Run some members; `number`, of the first of them in the ensemble, identifies its noise."""
-
-        def noise(place: int) -> np.random.Generator:
-            key = np.random.SeedSequence(entropy=seed, spawn_key=(number + place, _NOISE))
-            return np.random.Generator(np.random.PCG64(key))
-
+    def run(self, members: Members, noise: Noise) -> MemberRuns:
         runs = self.plan.runs(members.proportional.size)
         runs["speed"], runs["proportional"] = members.velocity_factor, members.proportional
         runs["gain"] = members.moment_factor * members.influence_coefficient * np.exp(-1j * members.lag_angle)
@@ -144,9 +138,9 @@ class EnsemblePlan:
         """Whether each member's loop is expected to stay within the limit, as `LoopFactor.stays`."""
         if not self.loop.fixed:
             return np.full(members.proportional.shape, self.loop.stays)
-        nominal = self.rotor.influence_coefficient
+        nominal = self.scene.rotor.influence_coefficient
         faster = members.velocity_factor * members.moment_factor * members.influence_coefficient / nominal
-        error = np.cos(members.lag_angle - self.assumed_lag)
+        error = np.cos(members.lag_angle - self.scene.controller.assumed_lag_angle)
         largest = self.loop.largest_staying / max(self.loop.limit / 2.0, 1e-300)
         return np.asarray(members.proportional * self.loop.rate * faster <= largest * np.maximum(error, 0.0))
 
@@ -256,13 +250,14 @@ def simulate_ensemble(
     if n < 1 or workers < 1:
         raise ValueError(f"an ensemble needs members and workers, not n={n} and workers={workers}")
     model = flow_law if isinstance(flow_law, BalancerModel) else BalancerModel.of(flow_law)
-    followed = ensemble_dynamics(scene, model) if dynamics is None else dynamics
     widths = MemberUncertainty.of(scene, model) if uncertainty_95 is None else uncertainty_95
-    plan = EnsemblePlan.of(scene=scene, model=model, dynamics=followed, controller=controller)
+    plan = _Plan.of(scene, model, dynamics=dynamics, controller=controller)
     tally = _Tally(time_limit=scene.run.time_limit, quantiles=quantiles)
 
     def run(block: int) -> MemberRuns:
-        return _block(scene, plan, widths, seed=seed, block=block, size=n - block * BLOCK)
+        drawn = Members.drawn(scene, uncertainty_95=widths, seed=seed, block=block)
+        first = block * BLOCK
+        return plan.run(drawn.at(slice(n - first)), lambda place: member_noise(seed, first + place))
 
     for runs in _in_order(run, blocks=math.ceil(n / BLOCK), workers=workers):
         tally.add(runs)
@@ -276,19 +271,20 @@ def simulate_members(
     model: BalancerModel,
     *,
     members: Members | None = None,
-    dynamics: Dynamics | None = None,
     size: int = 1,
-    seed: int = 0,
+    noise: Noise | None = None,
+    controller: BuiltIn | None = None,
 ) -> MemberRuns:
     """Run given members, by default `size` alike ones, and keep how each ended.
 
-    Raises: SceneError, ValueError: as `simulate_ensemble`, and for more members than a block holds.
+    Args: `noise`: default that of an ensemble's first members with the seed 0. `controller`: default the
+        scene's target vector.
+    Raises: SceneError, ValueError: as `simulate_ensemble`.
     """
     given = Members.alike(scene, size=size) if members is None else members
-    if given.proportional.size > BLOCK:
-        raise ValueError(f"at most {BLOCK} members at once")
-    followed = ensemble_dynamics(scene, model) if dynamics is None else dynamics
-    return EnsemblePlan.of(scene=scene, model=model, dynamics=followed).run(given, seed=seed)
+    return _Plan.of(scene, model, dynamics=None, controller=controller).run(
+        given, noise or partial(member_noise, 0)
+    )
 
 
 def ensemble_dynamics(scene: Scene, model: BalancerModel) -> Dynamics:
@@ -306,14 +302,6 @@ def ensemble_dynamics(scene: Scene, model: BalancerModel) -> Dynamics:
         raise SceneError([fault])
     modelled = terms_modelled(run_models(scene=scene, model=model))
     return dynamics_of(scene=scene, model=model, modelled=modelled)
-
-
-def _block(
-    scene: Scene, plan: EnsemblePlan, widths: MemberUncertainty, *, seed: int, block: int, size: int
-) -> MemberRuns:
-    """The first `size` members of one block."""
-    drawn = Members.drawn(scene, uncertainty_95=widths, seed=seed, block=block)
-    return plan.run(drawn.first(size), seed=seed, number=block * BLOCK)
 
 
 def _in_order(run: Callable[[int], MemberRuns], *, blocks: int, workers: int) -> Iterator[MemberRuns]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -19,14 +18,13 @@ from ringbalance.controller.loop_plan import CHUNK, LoopPlan, RunsInHand, Trace,
 from ringbalance.controller.loop_records import NONE
 from ringbalance.controller.outcome import Facts, run_findings
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
-from ringbalance.controller.simulation import Injection, Outcome, Sample, Simulation
+from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.controller.terms import check_fit, check_settings, dynamics_of, run_models, terms_modelled
 from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, Regime
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
-from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
@@ -112,13 +110,26 @@ def simulate(
         injections=_injections(trace, scene.disc.chambers),
         amplitude=np.abs(vibration),
     )
-    return _record(
-        facts,
-        time=time,
-        phase=np.angle(vibration),
-        fills=fills,
+    return Simulation(
+        scene=scene,
+        model=balancer,
+        controller=facts.own_algorithm or scene.controller.kind,
         as_scene=controller is None and sensor is None,
-        used=used,
+        outcome=facts.outcome,
+        settling_time=facts.settling_time,
+        loop=loop,
+        findings=run_findings(facts),
+        time=time,
+        amplitude=facts.amplitude,
+        phase=np.angle(vibration),
+        fill_ratio=dict(zip(chamber_letters(scene.disc.chambers), fills, strict=True)),
+        injections=facts.injections,
+        samples=facts.samples,
+        **{name: int(facts.run[name]) for name in ("overshoots", "shortened", "misadjustments")},
+        terms_modelled=terms_modelled(used),
+        models_used=used,
+        presentation=Presentation(document=command_document, rows=simulation_rows),
+        again=partial(_again, balancer),
     )
 
 
@@ -226,47 +237,6 @@ def _injections(trace: Trace, chambers: int) -> tuple[Injection, ...]:
             run_dry=float(row["run_dry"]),
         )
         for row in trace.injections
-    )
-
-
-def _record(
-    facts: Facts,
-    *,
-    time: FloatArray,
-    phase: FloatArray,
-    fills: FloatArray,
-    as_scene: bool,
-    used: tuple[ModelUsed, ...],
-) -> Simulation:
-    """Judge a finished run and freeze it."""
-    scene, settled = facts.scene, facts.outcome is Outcome.SETTLED
-    return Simulation(
-        scene=scene,
-        model=facts.plant.model,
-        balancer="liquid_ring",
-        controller=facts.own_algorithm or scene.controller.kind,
-        as_scene=as_scene,
-        outcome=facts.outcome,
-        settled=settled,
-        settling_time=facts.settling_time if settled else None,
-        hold_time=scene.controller.hold_time,
-        loop=facts.loop,
-        findings=run_findings(facts),
-        time=time,
-        amplitude=facts.amplitude,
-        phase=phase,
-        fill_ratio=dict(zip(chamber_letters(scene.disc.chambers), fills, strict=True)),
-        injections=facts.injections,
-        samples=facts.samples,
-        overshoots=int(facts.run["overshoots"]),
-        shortened=int(facts.run["shortened"]),
-        misadjustments=int(facts.run["misadjustments"]),
-        noise_floor=facts.noise_floor,
-        energy=math.fsum(injection.energy for injection in facts.injections),
-        terms_modelled=terms_modelled(used),
-        models_used=used,
-        presentation=Presentation(document=command_document, rows=simulation_rows),
-        again=partial(_again, facts.plant.model),
     )
 
 

@@ -212,8 +212,6 @@ def _settings(scene: Scene) -> dict[str, Any]:
         "time_limit": scene.run.time_limit,
         "amplitude_noise": sensor.amplitude_noise,
         "phase_noise": sensor.phase_noise,
-        "noise_floor": noise_floor(
-            amplitude_noise=sensor.amplitude_noise, initial_amplitude=scene.rotor.initial_amplitude
-        ),
+        "noise_floor": noise_floor(scene),
         "idle_tolerated": IDLE_OPERATIONS + scene.disc.chambers,
     }

@@ -135,10 +135,10 @@ class Members:
     draw_down: FloatArray | None = None
     """Factor of the depth over a port at which gas enters it; None: all have the scene's."""
 
-    def first(self, size: int) -> Members:
-        """The first of them."""
+    def at(self, places: slice | list[int]) -> Members:
+        """Some of them."""
         kept: dict[str, Any] = {
-            name: values if values is None else values[..., :size] for name, values in vars(self).items()
+            name: values if values is None else values[..., places] for name, values in vars(self).items()
         }
         return Members(**kept)
 

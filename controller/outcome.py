@@ -54,14 +54,6 @@ class Facts:
         letters = chamber_letters(self.scene.disc.chambers)
         return tuple(letters[i] for i in np.flatnonzero(self.run["refused"]))
 
-    @property
-    def noise_floor(self) -> float:
-        """Rise of the amplitude between two samples that noise alone does not explain, m."""
-        return noise_floor(
-            amplitude_noise=self.scene.sensor.amplitude_noise,
-            initial_amplitude=self.scene.rotor.initial_amplitude,
-        )
-
     @cached_property
     def unreachable_amplitude(self) -> float:
         """Vibration that remains with the liquid at its best, m."""
@@ -115,7 +107,7 @@ class Facts:
             return Outcome.CAPACITY_EXCEEDED
         if self.run["drains"]:
             return Outcome.DRIFTING
-        higher = self.amplitude[-1] > self.amplitude[0] + self.noise_floor
+        higher = self.amplitude[-1] > self.amplitude[0] + noise_floor(self.scene)
         if cause == RISING or (cause == IDLE and higher):
             return Outcome.DRIFTING if self.run["drift"] > NOTICEABLE else Outcome.DIVERGING
         if self.loop.unstable:

@@ -74,7 +74,7 @@ def wrapped(angle: float) -> float:
     return math.atan2(math.sin(angle), math.cos(angle))
 
 
-def noisy_sensor(*, sensor: loop_models.Sensor, seed: int) -> Sensor:
+def noisy_sensor(*, sensor: loop_models.Sensor, seed: int | np.random.Generator) -> Sensor:
     """A sensor with independent Gaussian noise on amplitude and phase from numpy's default generator.
 
     An amplitude that noise would make negative is folded back, as a rectifying instrument shows it.

@@ -188,19 +188,13 @@ class Simulation(PresentedResult):
 
     scene: Scene
     model: BalancerModel
-    balancer: str
-    """ "liquid_ring"."""
     controller: str
     """`controller.kind` of the scene; of another algorithm the name of its type."""
     as_scene: bool
     """Whether algorithm and sensor are those of the scene."""
     outcome: Outcome
-    settled: bool
-    """Whether the amplitude held within the limit for the hold time and is expected to stay."""
     settling_time: float | None
     """s, from which on it first held, whatever the time limit; None when not settled."""
-    hold_time: float
-    """s."""
     loop: LoopFactor
     """The loop about the balanced state."""
     findings: tuple[Finding, ...]
@@ -221,10 +215,6 @@ class Simulation(PresentedResult):
     """Injections shortened or left out so that the driven chamber keeps its residual fill."""
     misadjustments: int
     """Operations after which the measured amplitude was higher by more than the noise floor."""
-    noise_floor: float
-    """m."""
-    energy: float
-    """Work of the driving gas against the surroundings over all injections, J."""
     models_used: tuple[ModelUsed, ...]
     """Every physical term, with its model and its estimated contribution."""
     terms_modelled: tuple[str, ...]
@@ -242,7 +232,31 @@ class Simulation(PresentedResult):
         """What the outcome says of the loop."""
         return _VERDICTS.get(self.outcome, RunVerdict.NOT_SETTLED)
 
-    # Most runs are one of many, of which nobody asks what follows.
+    @property
+    def balancer(self) -> str:
+        """Kind of the scene."""
+        return self.scene.balancer
+
+    @property
+    def settled(self) -> bool:
+        """Whether the amplitude held within the limit for the hold time and is expected to stay."""
+        return self.outcome is Outcome.SETTLED
+
+    @property
+    def hold_time(self) -> float:
+        """s."""
+        return self.scene.controller.hold_time
+
+    @property
+    def noise_floor(self) -> float:
+        """Rise of the amplitude between two samples that noise alone does not explain, m."""
+        return noise_floor(self.scene)
+
+    @property
+    def energy(self) -> float:
+        """Work of the driving gas against the surroundings over all injections, J."""
+        return math.fsum(injection.energy for injection in self.injections)
+
     @property
     def law(self) -> str:
         """Name of the model, such as "paper" or "calibrated"."""
@@ -279,11 +293,10 @@ ROUND_OFF: Final = 1e-9
 NOISE_DEVIATIONS: Final = 3.0
 
 
-def noise_floor(*, amplitude_noise: float, initial_amplitude: float) -> float:
-    """Rise of the amplitude between two samples that noise alone does not explain.
+def noise_floor(scene: Scene) -> float:
+    """Rise of the amplitude between two samples that noise alone does not explain, m.
 
     3 sqrt(2) sigma: three standard deviations of the difference of two samples.
-    Args: `amplitude_noise`: sigma, m. `initial_amplitude`: m; a billionth of it guards against round-off.
-    Returns: m.
     """
-    return NOISE_DEVIATIONS * math.sqrt(2) * amplitude_noise + ROUND_OFF * initial_amplitude
+    noise, largest = scene.sensor.amplitude_noise, scene.rotor.initial_amplitude
+    return NOISE_DEVIATIONS * math.sqrt(2) * noise + ROUND_OFF * largest

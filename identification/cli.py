@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ringbalance.identification.criticism.review import Review
+from ringbalance.identification.criticism import Review
 from ringbalance.identification.documents import fit_document, fit_rows
-from ringbalance.identification.fitting import Loss, problem_of
+from ringbalance.identification.fitting import FitResult, Loss, problem_of
 from ringbalance.identification.fitting import fit as fit_scene
 from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.reading import read_observations
-from ringbalance.identification.result import FitResult
 from ringbalance.identification.saving import save_result
 from ringbalance.scene.faults import SceneError, did_you_mean
 from ringbalance.scene.loader import read_scene

@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.against_fit import against_fit
-from ringbalance.identification.balancers import MODEL_ERRORS, exact_inputs
-from ringbalance.identification.criticism.law_comparison import summaries
-from ringbalance.identification.criticism.review import Review
+from ringbalance.identification.criticism import Review, summaries
+from ringbalance.identification.fitting import FitResult, FittedParameter, Noise, exact_inputs
 from ringbalance.identification.identifiability import Identified
+from ringbalance.identification.intervals import covariance
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.identification.likelihood import Block
 from ringbalance.identification.next_measurement import NextMeasurement
-from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
+from ringbalance.identification.optimisation import Optimum
+from ringbalance.identification.parameters import MODEL_ERRORS
 from ringbalance.results.numbers import rounded
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
-from ringbalance.scene.arrays import finite
+from ringbalance.scene.arrays import FloatArray, IntArray, finite
 from ringbalance.scene.describe import in_usual_unit, si_unit, usual_unit
+from ringbalance.scene.uncertain import NORMAL_95
 
 
 def fit_document(
@@ -30,121 +32,71 @@ def fit_document(
 ) -> dict[str, Any]:
     """What `ringbalance fit --json` prints."""
     scene = result.optimum.residuals.problem.scene
-    names = [parameter.name for parameter in result.parameters]
     return {
-        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
-        "data": [_file(each) for each in data],
+        "scene": _chosen(scene, "name source sha256"),
+        "data": [
+            _chosen(each, "file kind source sha256")
+            | {"rows": len(each), "uncertainty_given": sorted(each.uncertainty)}
+            for each in data
+        ],
         "parameters": [_parameter(each) for each in result.parameters],
         "combinations": [asdict(each) for each in result.combinations],
-        "correlations": {"names": names, "matrix": result.correlations.tolist()},
-        "noise": [_noise(each) for each in result.noise],
-        "residuals": [_residuals(each) for each in result.residuals],
-        "data_over_fit": [
-            {
-                "kind": each.kind,
-                "column": each.column,
-                "slope": each.slope,
-                "slope_uncertainty": each.slope_uncertainty,
-            }
-            for each in against_fit(result)
+        "correlations": {
+            "names": [parameter.name for parameter in result.parameters],
+            "matrix": result.correlations.tolist(),
+        },
+        "noise": [asdict(each) for each in result.noise],
+        "residuals": [
+            _chosen(each, "file kind")
+            | {name: getattr(each, name).tolist() for name in ("lines", "normalised", "down_weighted")}
+            for each in result.residuals
         ],
-        "held": dict(result.held),
-        "pulls": dict(result.pulls),
+        "data_over_fit": [
+            _chosen(each, "kind column slope slope_uncertainty") for each in against_fit(result)
+        ],
         "exact": exact_inputs(result),
-        "loss": result.loss,
-        "starts": result.starts,
-        "evaluations": result.evaluations,
-        "log_likelihood": result.log_likelihood,
+        **_chosen(result, "loss starts evaluations log_likelihood"),
+        **{name: dict(getattr(result, name)) for name in ("held", "pulls")},
         "criticism": _criticism(told),
-        "next_measurement": _following(following),
+        "next_measurement": _chosen(following, "parameter text")
+        | {
+            "candidates": [
+                {"measurement": each.candidate, "expected_width_ratio": each.ratio}
+                for each in following.gains
+            ]
+        },
         **fit_rows(result, data=data, told=told, following=following).document(),
     }
 
 
+def _chosen(record: Any, names: str) -> dict[str, Any]:
+    """Fields and properties of a record that stand in the document under their own names."""
+    return {name: getattr(record, name) for name in names.split()}
+
+
 def _criticism(told: Review) -> dict[str, Any]:
-    findings = [
-        {
-            "test": each.test,
-            "residuals_of": each.block,
-            "p_value": each.p_value,
-            "corrected_p_value": each.corrected,
-            "fails": each.fails,
-        }
-        for each in told.criticism.findings
-    ]
-    laws = [
-        {
-            "other_law": each.other,
-            "separation": each.separation,
-            "preference": each.preference,
-            "text": each.text,
-        }
-        for each in told.laws
-    ]
     return {
-        "describes": told.describes,
-        "text": told.text,
-        "findings": findings,
-        "laws": laws,
-        "explained": [asdict(each) for each in told.explained],
-        "readings": [asdict(each) for each in told.readings],
-        "ranges": [asdict(each) for each in told.ranges],
-    }
-
-
-def _following(found: NextMeasurement) -> dict[str, Any]:
-    return {
-        "parameter": found.parameter,
-        "text": found.text,
-        "candidates": [
-            {"measurement": each.candidate, "expected_width_ratio": each.ratio} for each in found.gains
+        **_chosen(told, "describes text"),
+        "findings": [
+            _chosen(each, "test p_value fails")
+            | {"residuals_of": each.block, "corrected_p_value": each.corrected}
+            for each in told.criticism.findings
         ],
-    }
-
-
-def _file(data: Observations) -> dict[str, Any]:
-    return {
-        "file": data.file,
-        "kind": data.kind,
-        "source": data.source,
-        "rows": len(data),
-        "sha256": data.sha256,
-        "uncertainty_given": sorted(data.uncertainty),
+        "laws": [
+            {"other_law": each.other} | _chosen(each, "separation preference text") for each in told.laws
+        ],
+        **{
+            name: [asdict(each) for each in getattr(told, name)]
+            for name in ("explained", "readings", "ranges")
+        },
     }
 
 
 def _parameter(found: FittedParameter) -> dict[str, Any]:
     return {
-        "name": found.name,
-        "path": found.path,
-        "value": found.value,
+        **_chosen(found, "name path value at_bound before before_interval contradicts doubts text"),
         "interval": [finite(end) for end in found.interval],
-        "at_bound": list(found.at_bound),
-        "before": found.before,
-        "before_interval": None if found.before_interval is None else list(found.before_interval),
-        "contradicts": found.contradicts,
-        "doubts": list(found.doubts),
         "verdict": found.verdict.value,
-        "text": found.text,
-    }
-
-
-def _noise(found: Noise) -> dict[str, Any]:
-    return {
-        "group": found.group,
-        "standard_deviation": found.standard_deviation,
-        "estimated": found.estimated,
-        "degrees_of_freedom": found.freedom,
-    }
-
-
-def _residuals(found: FileResiduals) -> dict[str, Any]:
-    return {
-        "file": found.file,
-        "kind": found.kind,
-        "lines": found.lines.tolist(),
-        "normalised": found.normalised.tolist(),
-        "down_weighted": found.down_weighted.tolist(),
     }
 
 
@@ -179,16 +131,12 @@ def fit_rows(
         findings=(
             *_review(told),
             *_findings(result),
-            Finding(code="next_measurement", values=_text(following)),
+            Finding(code="next_measurement", values={"text": following.text}),
         ),
         facts=[(name, text) for name, text in facts.items() if text],
         tables=(Table(heads=heads, rows=rows, note="from, to: ends of the 95 % interval"),),
         listed=0,
     )
-
-
-def _text(following: NextMeasurement) -> dict[str, Value]:
-    return {"text": following.text}
 
 
 def _quantity(found: FittedParameter) -> Quantity:
@@ -261,7 +209,9 @@ def _noise_finding(noise: Noise) -> Finding:
     assert column is not None
     size = column.written(noise.standard_deviation)
     more: dict[str, Value] = {"size": size, "standard_deviation": noise.standard_deviation}
-    return Finding(code="noise_estimated", values=numbers | more | {"freedom": round(noise.freedom or 0)})
+    return Finding(
+        code="noise_estimated", values=numbers | more | {"freedom": round(noise.degrees_of_freedom or 0)}
+    )
 
 
 def _pairs(result: FitResult) -> Iterator[Finding]:
@@ -299,3 +249,102 @@ def _listed(lines: Sequence[int]) -> str:
 def _causes(names: Iterable[str]) -> list[str]:
     """Causes of the errors of models among the names of inputs."""
     return list(dict.fromkeys(MODEL_ERRORS[name][0] for name in names if name in MODEL_ERRORS))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AgainstFit:
+    """Numbers of one column of one kind of data, SI; of a vibration its real and imaginary parts."""
+
+    kind: str
+    column: str
+    dimension: str | None
+    unit: str
+    """Of the file's column."""
+    component: IntArray
+    """Of every number: 0, or 1 of the imaginary part of a vibration."""
+    measured: FloatArray
+    """Less what is no quantity of the device, such as the vibration without trial weight."""
+    measured_uncertainty: FloatArray
+    """Expanded (95 %), by the noise that is stated or estimated."""
+    fitted: FloatArray
+    fitted_uncertainty: FloatArray
+    """Expanded (95 %), of all that was fitted together."""
+
+    @property
+    def slope(self) -> float | None:
+        """Measured over fitted values, a line through zero weighted by noise; None for fitted zeros."""
+        square = self._square
+        return float(np.sum(self._weights * self.measured * self.fitted) / square) if square else None
+
+    @property
+    def slope_uncertainty(self) -> float | None:
+        """Of the slope by the noise, expanded (95 %)."""
+        return float(NORMAL_95 / np.sqrt(self._square)) if self._square else None
+
+    @property
+    def _square(self) -> float:
+        return float(np.sum(self._weights * self.fitted**2))
+
+    @property
+    def _weights(self) -> FloatArray:
+        return np.asarray((NORMAL_95 / self.measured_uncertainty) ** 2)
+
+
+def against_fit(result: FitResult) -> list[AgainstFit]:
+    """One entry for each kind and column that was fitted, in the order of the data."""
+    best = result.optimum
+    numbers = _beside(best)
+    parts: dict[str, list[tuple[Block, FloatArray]]] = {}
+    for block, rows in best.residuals.problem.rows:
+        parts.setdefault(block.group, []).append((block, numbers[:, rows]))
+    return [_entry(each) for each in parts.values()]
+
+
+def _entry(parts: Sequence[tuple[Block, FloatArray]]) -> AgainstFit:
+    first = parts[0][0]
+    kind, name = first.observations.kind, first.column
+    column = first.kind.column(name)
+    joined = np.concatenate([numbers for _, numbers in parts], axis=1)
+    return AgainstFit(
+        kind=kind,
+        column=name,
+        dimension=None if column is None else column.dimension,
+        unit="" if column is None else column.unit,
+        component=np.concatenate([_component(block) for block, _ in parts]),
+        measured=joined[0],
+        measured_uncertainty=joined[1],
+        fitted=joined[2],
+        fitted_uncertainty=joined[3],
+    )
+
+
+def _component(block: Block) -> IntArray:
+    rows = len(block.observations)
+    return np.arange(block.measured.size) // rows
+
+
+def _beside(best: Optimum) -> FloatArray:
+    """Measured, its uncertainty, fitted, its uncertainty, of all numbers, shape (4, n)."""
+    residuals = best.residuals
+    problem, scale = residuals.problem, residuals.scale
+    free = problem.free
+    effects, _ = best.of_all
+    spread = covariance(np.concatenate(best.of_all))
+    b, n = residuals.linear_values(best.t)
+    fitted = problem.at(best.t) + residuals.held @ (n - residuals.pulled)
+    kept = np.r_[: best.t.size, best.t.size + free.shape[1] : effects.shape[1]]
+    of_device, spread = effects[:, kept], spread[np.ix_(kept, kept)]
+    found = []
+    for block, mine in problem.rows:
+        lower = np.linalg.inv(block.whiten)
+        rows = lower @ (of_device[mine] / scale[mine][:, None])
+        noise = lower / scale[mine][None, :]
+        found.append(
+            [
+                lower @ (problem.measured[mine] - free[mine] @ b),
+                NORMAL_95 * np.sqrt(np.sum(noise**2, axis=1)),
+                lower @ fitted[mine],
+                NORMAL_95 * np.sqrt(np.einsum("ij,jk,ik->i", rows, spread, rows)),
+            ]
+        )
+    return np.concatenate([np.array(each) for each in found], axis=1)

@@ -1,30 +1,182 @@
-"""The fit of a scene's parameters to measurements: maximum likelihood, profiles, verdicts."""
+"""The fit of a scene to measurements: maximum likelihood, profiles, verdicts, and what it finds."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final, Literal
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
 
 import numpy as np
 
-from ringbalance.identification.balancers import both_sides, held_for, informed, models_for, parameters_for
 from ringbalance.identification.identifiability import Combination, Identified, combinations, verdicts
 from ringbalance.identification.intervals import Profile, covariance, profiles
-from ringbalance.identification.joint import about_pulls, joint_of, scene_as_fitted
+from ringbalance.identification.joint import Joint, about_pulls, joint_of, scene_as_fitted
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS, kinds_of
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum, optimum
-from ringbalance.identification.parameters import FitError, Parameter
-from ringbalance.identification.result import FileResiduals, FitResult, FittedParameter, Noise
+from ringbalance.identification.parameters import (
+    FitError,
+    Parameter,
+    both_sides,
+    changed,
+    held_for,
+    informed,
+    models_for,
+    parameters_for,
+    path_of,
+    values_of,
+)
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.origins import Origin
 from ringbalance.scene.uncertain import NORMAL_95
+
+LAMBDA_FAR: Final = 2**0.25
+"""Factor on lambda, or its inverse, from which it is doubted: halfway, in logarithms, from 1 to the square
+root of two that rms amplitudes are wrong by where zero to peak is stated."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedParameter:
+    """One parameter before and after; SI, intervals of 95 %."""
+
+    name: str
+    value: float
+    interval: tuple[float, float]
+    at_bound: tuple[bool, bool]
+    """Whether an end of the interval is a rule of the scene and not the data."""
+    before: float
+    """Of the scene."""
+    before_interval: tuple[float, float] | None
+    """By the scene's [uncertainty]; None where nothing is known beforehand."""
+    verdict: Identified
+    text: str
+    """The verdict with its reason, in one sentence."""
+    profile: Profile
+    curve: tuple[tuple[float, float], ...] = ()
+    """Values, SI, and the rise of minus two log likelihood there, over that at the ends of the interval."""
+
+    @property
+    def half_width(self) -> float | None:
+        """The larger distance from the value to an end of its interval; None: it has no end."""
+        width = max(self.interval[1] - self.value, self.value - self.interval[0])
+        return width if math.isfinite(width) else None
+
+    @property
+    def origin(self) -> Origin:
+        """Of the value in a saved scene."""
+        return "measured" if self.verdict is Identified.IDENTIFIED else "inferred"
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the value lies outside what was known before: [uncertainty] or the data are wrong."""
+        low, high = self.before_interval or (-math.inf, math.inf)
+        return not low <= self.value <= high
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the value, each in one sentence."""
+        found = []
+        if self.contradicts:
+            found.append(
+                "the fitted value lies outside what the scene's [uncertainty] states; one of the two is wrong"
+            )
+        if self.name == "lambda_factor" and not 1 / LAMBDA_FAR < self.value < LAMBDA_FAR:
+            found.append(
+                "lambda follows from the geometry within a few percent, and a value so far from 1 mostly has "
+                "another cause: how amplitudes are counted, a unit, the influence coefficient, or the law"
+            )
+        return tuple(found)
+
+    @property
+    def path(self) -> str:
+        """Place in the scene, such as "tube.bore"."""
+        return path_of(self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Noise of one column of one kind of data."""
+
+    group: str
+    """Kind and column."""
+    standard_deviation: float | None
+    """SI; None where the data give it row by row."""
+    estimated: bool
+    degrees_of_freedom: float | None
+    """Behind an estimate."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _FileResiduals:
+    """Residuals of one file over their standard deviation, one row a row of the file."""
+
+    file: str
+    kind: str
+    lines: IntArray
+    """Shape (n,)."""
+    normalised: FloatArray
+    """Measured less fitted; shape (n, 1), or (n, 2) of a vibration: real and imaginary part."""
+    down_weighted: BoolArray
+    """Rows that a robust loss counts less than half, shape (n,)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FitResult:
+    """A fit of a scene's parameters to files of measurements."""
+
+    parameters: tuple[FittedParameter, ...]
+    correlations: FloatArray
+    """Of the parameters in their own scales, in that order."""
+    combinations: tuple[Combination, ...]
+    """Products of powers of parameters that are not identified by themselves."""
+    noise: tuple[Noise, ...]
+    residuals: tuple[_FileResiduals, ...]
+    held: Mapping[str, float]
+    """Uncertain inputs of the scene that were not fitted, with their standard deviations, SI; their effect is
+    in all intervals."""
+    pulls: Mapping[str, float]
+    """The likeliest error of each of them, over its expanded uncertainty (95 %)."""
+    loss: str
+    starts: int
+    evaluations: int
+    """Predictions of all data."""
+    log_likelihood: float
+    """Of the data at the optimum, priors and held inputs with it, but for constants."""
+    scene: Any
+    """With the fitted values, the values to which held inputs are pulled, and corrected models."""
+    joint: Joint
+    """Parameters and held inputs together."""
+    optimum: Optimum
+    """For criticism and for the choice of the next measurement."""
+
+    @property
+    def pulled(self) -> tuple[str, ...]:
+        """Held inputs that the data pull out of what is stated of them, each in one sentence."""
+        return tuple(
+            f"the data pull {name} off by {abs(pull):.2g} of its stated uncertainties (95 %), and it was not "
+            "fitted: fit it, or look at what is stated of it"
+            for name, pull in self.pulls.items()
+            if abs(pull) > 1
+        )
+
+    def parameter(self, name: str) -> FittedParameter:
+        """One parameter by name. Raises: KeyError: it was not fitted."""
+        for each in self.parameters:
+            if each.name == name:
+                return each
+        raise KeyError(name)
+
 
 Loss = Literal["linear", "soft_l1"]
 STARTS: Final = 3
 _NO_EFFECT: Final = 1e-3
 """Of a standard deviation of the data, in all, below which a held input is left out."""
 _HALF: Final = 0.5
+_LITTLE: Final = 1e-4
+"""Of a quantity, or in SI units where it is zero."""
 
 
 def fit(
@@ -72,6 +224,18 @@ def problem_of(
         parameters=parameters_for(scene, names),
         blocks=tuple(Block.of(each) for each in data),
     )
+
+
+def exact_inputs(result: FitResult) -> list[str]:
+    """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
+    problem, t = result.optimum.residuals.problem, result.optimum.t
+    known = {*held_for(problem.scene, ()), *(parameter.name for parameter in result.parameters)}
+    found = []
+    for name, value in values_of(problem.scene).items():
+        nearby = changed(problem.scene, name, -_LITTLE * abs(value) if value else _LITTLE)
+        if name not in known and np.any(replace(problem, scene=nearby).at(t) != problem.at(t)):
+            found.append(name)
+    return found
 
 
 def _result(best: Optimum, held: dict[str, float], loss: str) -> FitResult:
@@ -143,16 +307,19 @@ def _noises(best: Optimum) -> tuple[Noise, ...]:
     estimated = problem.estimated_groups
     given = dict.fromkeys(b.group for b in problem.blocks if not b.estimated)
     rows = [
-        Noise(group=name, standard_deviation=float(s), estimated=True, freedom=float(f))
+        Noise(group=name, standard_deviation=float(s), estimated=True, degrees_of_freedom=float(f))
         for name, s, f in zip(estimated, best.residuals.noise, best.freedom, strict=True)
     ]
     return (
         *rows,
-        *(Noise(group=name, standard_deviation=None, estimated=False, freedom=None) for name in given),
+        *(
+            Noise(group=name, standard_deviation=None, estimated=False, degrees_of_freedom=None)
+            for name in given
+        ),
     )
 
 
-def _residuals(best: Optimum) -> tuple[FileResiduals, ...]:
+def _residuals(best: Optimum) -> tuple[_FileResiduals, ...]:
     """Normalised after what is no parameter has taken up its part."""
     problem, residuals = best.residuals.problem, best.residuals
     whole = best.at[: problem.measured.size] / np.sqrt(residuals.weights)
@@ -160,7 +327,7 @@ def _residuals(best: Optimum) -> tuple[FileResiduals, ...]:
     for block, mine in problem.rows:
         weights = block.observations.rows_of(residuals.weights[mine])
         found.append(
-            FileResiduals(
+            _FileResiduals(
                 file=block.observations.file,
                 kind=block.observations.kind,
                 lines=block.observations.lines,

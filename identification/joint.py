@@ -9,17 +9,16 @@ which makes 95 % intervals as wide as Student's.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from scipy.special import stdtrit
 
-from ringbalance.identification.balancers import MODEL_ERRORS, both_sides, changed, models_for
 from ringbalance.identification.intervals import covariance
 from ringbalance.identification.likelihood import Problem
 from ringbalance.identification.optimisation import Optimum, optimum
-from ringbalance.identification.result import Joint
+from ringbalance.identification.parameters import MODEL_ERRORS, both_sides, changed, models_for
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.fitted import LARGEST_ERROR
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
@@ -30,6 +29,23 @@ _CLOSE: Final = 0.1
 """Standard deviations of a measured number by which a prediction with all pulls may miss the linear one."""
 _UNKNOWN: Final = 0.5
 """Standard deviation, in t, at most of what nothing is known of: a scene states no interval beyond zero."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Joint:
+    """Normal distribution of fitted parameters and held inputs."""
+
+    names: tuple[str, ...]
+    """Of the parameters, then of the held inputs, as the fit names them."""
+    values: FloatArray
+    """SI; of an error of a model in its standard deviations."""
+    covariance: FloatArray
+    """Of these, shape (n, n)."""
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
 
 
 def about_pulls(best: Optimum, held: Mapping[str, float], *, scene: AnyScene, loss: str) -> Optimum:

@@ -12,19 +12,29 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Final
 
+from ringbalance.controller.balancer import Input, balancer_of
 from ringbalance.identification.device import Device, Models
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.physics.tube.loss import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.faults import did_you_mean
+from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.paths import with_values_at
 from ringbalance.scene.uncertain import (
     NORMAL_95,
     SHAPE,
     UNCERTAIN_QUANTITIES,
     half_widths,
     nominal_value,
+    shifted,
+    with_model_error,
     with_value,
 )
 
@@ -122,6 +132,7 @@ _SYMBOLS: Final = {
 _REACH: Final = {"bore": 3.0, "outer_radius": 1.1, "inner_radius": 1.1, "central_angle": 1.1, "speed": 1.1}
 """Factor up to which a logarithmic parameter is looked for."""
 _WIDE: Final = 30.0
+_ANGLE: Final = "rad"
 _FAR: Final = 1000.0
 """The same of a vibration."""
 START: Final = ("initial_amplitude", "initial_phase")
@@ -217,3 +228,166 @@ def _range(scene: Scene, name: str, start: float, offset: float) -> tuple[float,
         return fixed[name]
     reach = _REACH.get(name, _WIDE)
     return start / reach, start * reach
+
+
+_OF_FLOW: Final = {
+    f"model: {cause}": (cause, 1.0, 0.0) for cause in (START_ERROR, CLEARING_ERROR, CAVITY_ERROR)
+}
+_OF_LOSS: Final = {
+    f"model: {cause}, {part}": (cause, even, 1.0 - even)
+    for cause in (*MODEL_CAUSES, *BUILT_CAUSES)
+    for part, even in (("even", 1.0), ("odd", 0.0))
+}
+MODEL_ERRORS: Final = {**_OF_FLOW, **_OF_LOSS}
+"""One standard deviation of each error of a scene's models, by name: inputs of a fit, held and uncertain.
+
+Each cause of k's uncertainty is a random function of Re, of two parts (`with_errors`): those of the
+correlations, and those of a tube as it was built, which give the shape of k(u) freedom of its own. What
+clears the crest and the pressure of the cavity there are known within the spans of
+`reduced_model.tube.regime`. The start of the flow has no measurements to compare with: the column's inertia,
+a valve that does not open as fast as it closes, and to which side liquid runs that stands on the crest when
+the gas is shut, up to half of the tube. The time L/2u in which the flow passes that half is taken for their
+expanded uncertainty (95 %).
+"""
+
+
+class _Side:
+    """What a fit asks of a scene, through its `Balancer`: quantities go by their paths, such as
+    "rotor.damping" and "masses.friction_arm[0]"."""
+
+    def __init__(self, scene: Any) -> None:
+        self.scene = scene
+
+    @cached_property
+    def inputs(self) -> Mapping[str, Input]:
+        """Quantities that may be uncertain and that the scene has, by name."""
+        return {each.path: each for each in balancer_of(self.scene).inputs()}
+
+    @property
+    def models(self) -> Models | None:
+        """Models that predictions take; None where there is but one."""
+        return None
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """Names of the errors of its models, of `MODEL_ERRORS`."""
+        return ()
+
+    def named(self, name: str) -> Sequence[str]:
+        """Its own names of what kinds of data inform, as the liquid ring names that."""
+        return [path for path in self.inputs if name in (path, path.rpartition(".")[2])]
+
+    def parameter(self, name: str) -> Parameter:
+        """Raises: FitError: a name that cannot be fitted."""
+        if name not in self.inputs:
+            raise FitError.unknown(name, tuple(self.inputs))
+        given = self.inputs[name]
+        start, is_angle = given.value, given.unit == _ANGLE
+        if start <= 0 and not is_angle:
+            raise FitError(f"{name} is zero: give a value above zero to fit it")
+        return Parameter(
+            name=name,
+            symbol=name,
+            start=start,
+            lowest=start - math.pi if is_angle else start / _WIDE,
+            highest=start + math.pi if is_angle else start * _WIDE,
+            prior=given.half_width / NORMAL_95 or None,
+            scale=1.0 if is_angle else None,
+            change=lambda scene, value: with_values_at(scene, {name: value}),
+        )
+
+    def moved(self, name: str, change: float) -> SceneFile:
+        """The scene with one uncertain quantity changed, SI, as far as a device can have it."""
+        given = self.inputs[name]
+        lowest = -math.inf if given.unit == _ANGLE else 0.1 * given.value
+        moved: SceneFile = with_values_at(self.scene, {name: max(given.value + change, lowest)})
+        return moved
+
+
+class _LiquidRing(_Side):
+    """Quantities go by their keys, such as "bore"."""
+
+    scene: Scene
+
+    @cached_property
+    def inputs(self) -> Mapping[str, Input]:
+        given = {key: each for path, each in super().inputs.items() if (key := path.partition(".")[2])}
+        # A mesh has no plates, and may not be stretched by all of its dimensions.
+        return {key: given[key] for key in given if nominal_value(scene=self.scene, quantity=key) is not None}
+
+    @property
+    def models(self) -> Models:
+        return Models.of(self.scene)
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """A prescribed k has no model."""
+        return tuple(MODEL_ERRORS if self.scene.tube.drag_coefficient is None else _OF_FLOW)
+
+    def named(self, name: str) -> Sequence[str]:
+        """A prescribed k stands in for the loss that it leaves out."""
+        prescribed = self.scene.tube.drag_coefficient is not None
+        return ["drag_coefficient" if prescribed and name == "extra_loss" else name]
+
+    def parameter(self, name: str) -> Parameter:
+        return Parameter.of(self.scene, name)
+
+    def moved(self, name: str, change: float) -> SceneFile:
+        return shifted(scene=self.scene, quantity=name, change=change)
+
+
+def _side(scene: SceneFile) -> _Side:
+    return _LiquidRing(scene) if scene.balancer == Scene.balancer else _Side(scene)
+
+
+def models_for(scene: SceneFile) -> Models | None:
+    """Models that predictions take; None where there is but one."""
+    return _side(scene).models
+
+
+def parameters_for(scene: SceneFile, names: Sequence[str]) -> tuple[Parameter, ...]:
+    """Parameters by name. Raises: FitError: a name that cannot be fitted, or twice the same, or none."""
+    if not names or len(set(names)) < len(names):
+        raise FitError("name at least one parameter, and each once")
+    side = _side(scene)
+    return tuple(side.parameter(name) for name in names)
+
+
+def informed(scene: SceneFile, data: Sequence[Observations]) -> list[str]:
+    """Parameters that data inform."""
+    side = _side(scene)
+    names = (name for each in data for name in KINDS[each.kind].informs(each))
+    return list(dict.fromkeys(own for name in names for own in side.named(name)))
+
+
+def held_for(scene: SceneFile, fitted: Sequence[str]) -> dict[str, float]:
+    """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted, and of what its
+    models may be off by."""
+    side = _side(scene)
+    widths = {name: each.half_width / NORMAL_95 for name, each in side.inputs.items() if name not in fitted}
+    return {name: sd for name, sd in widths.items() if sd} | dict.fromkeys(side.errors, 1.0)
+
+
+def values_of(scene: SceneFile) -> dict[str, float]:
+    """Every quantity that may be uncertain and that the scene has, SI, by name."""
+    return {name: each.value for name, each in _side(scene).inputs.items()}
+
+
+def both_sides(scene: SceneFile, name: str, change: float) -> tuple[SceneFile, SceneFile]:
+    """The scene with one of these lower and higher by a change, SI, as far as a device can have it."""
+    # Errors of models are nearly linear, and there are many of them.
+    low = scene if name in MODEL_ERRORS else changed(scene, name, -change)
+    return low, changed(scene, name, change)
+
+
+def changed(scene: SceneFile, name: str, change: float) -> SceneFile:
+    """The scene with one uncertain quantity changed, SI, or an error of a model, in standard deviations."""
+    if name in MODEL_ERRORS:
+        return with_model_error(liquid_ring_scene(scene), name, change)
+    return _side(scene).moved(name, change)
+
+
+def path_of(name: str) -> str:
+    """Place in the scene of what fits name "bore"; of eccentric masses the name is one."""
+    table = UNCERTAIN_QUANTITIES.get(name)
+    return name if table is None else f"{table}.{name}"

@@ -123,7 +123,7 @@ class ChamberTable:
             low, high = np.where(excess > 0, level, low), np.where(excess > 0, high, level)
             step = level - excess / np.minimum(slopes[0], -1e-300)
             better = np.where((step >= low) & (step <= high), step, (low + high) / 2)
-            if np.all(np.abs(better - level) <= 1e-16 * self.nodes[-1]):
+            if np.all(np.abs(better - level) <= _SETTLED * self.nodes[-1]):
                 break
             level = better
         level = np.where(wanted <= 0, self.nodes[-1], level)
@@ -131,6 +131,8 @@ class ChamberTable:
 
 
 _NEWTON_STEPS: Final = 60
+_SETTLED: Final = 1e-15
+"""Of the largest level: a few times the round-off, below which a step changes nothing."""
 
 
 def _hermite(nodes: FloatArray, columns: FloatArray) -> CubicHermiteSpline:

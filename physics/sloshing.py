@@ -41,7 +41,7 @@ class _SloshingModes:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Meshes:
+class _Meshes:
     """On which waves are solved: those given of a sector, two of an imported chamber's section."""
 
     disc: Disc
@@ -106,7 +106,7 @@ def sloshing_modes(
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)) or modes < 1:
         raise ValueError("fill_ratio must lie within (0, 1], and at least one mode must be asked for")
-    meshes = Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc, modes=modes))
+    meshes = _Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc, modes=modes))
     if len(meshes.cells) != 3:
         raise ValueError("cells must list three meshes, finest first")
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
@@ -146,7 +146,7 @@ def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ..
     if modes < 1:
         raise ValueError("at least one mode must be asked for")
     top = disc.max_fill_ratio
-    meshes = Meshes(disc=disc, cells=default_sloshing_cells(disc=disc, modes=modes)[1:])
+    meshes = _Meshes(disc=disc, cells=default_sloshing_cells(disc=disc, modes=modes)[1:])
     tolerance = 1e-6 if disc.geometry is None else 1e-3
 
     def excess(logarithm: float, mode: int) -> float:
@@ -162,7 +162,7 @@ def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ..
     return tuple(found)
 
 
-def _lowest(meshes: Meshes, a: float, level: int, modes: int) -> FloatArray:
+def _lowest(meshes: _Meshes, a: float, level: int, modes: int) -> FloatArray:
     ratios = meshes.system(a, level)[0].natural_frequencies()
     if ratios.size < modes:
         raise ValueError(f"a mesh has {ratios.size} modes, not {modes}: give it more cells along the surface")
@@ -187,7 +187,7 @@ _WITHIN: Final = 9
 """Points between the neighbours of an extreme, in each round."""
 
 
-def swept(
+def _swept(
     response: Callable[[FloatArray], FloatArray], *, frequency_ratio: float, natural: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Extremes of a forced response while all natural frequencies vary within `FREQUENCY_UNCERTAINTY`.
@@ -238,9 +238,6 @@ class SloshingResponse:
     """Largest displacement of the surface, m zero-to-peak, shape (n,)."""
     surface_amplitude_interval: FloatArray
     """The same of it, m, shape (n, 2)."""
-    damped_share: FloatArray
-    """Amplification with the walls' Stokes layers over that without any viscosity, shape (n,): near 1 away
-    from resonance, and where it is small the peak rests on an estimate of the damping."""
     status: Status
 
 
@@ -274,13 +271,13 @@ def sloshing_response(
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     _check(fills, angular_velocity, kinematic_viscosity, gravity, frequency_ratio)
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
-    meshes = Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc))
+    meshes = _Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc))
     ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
 
     def on_mesh(radius: float, level: int) -> FloatArray:
         system, unit = meshes.system(radius, level)
         answers = _answers(system, np.array([frequency_ratio]), ekman)[0]
-        return np.asarray(answers * [1.0, unit / disc.outer_radius, 1.0, 1.0])
+        return np.asarray(answers * [1.0, unit / disc.outer_radius, 1.0])
 
     found = np.array([[on_mesh(float(a), level) for level in meshes.levels] for a in radii])
     widths = np.array(
@@ -290,31 +287,30 @@ def sloshing_response(
     amplitude = Estimate(value=scale * found[:, 0, 1], uncertainty=scale * widths[:, 1])
     ends = np.array([_interval(meshes, float(a), frequency_ratio, ekman) for a in radii])
     # At either end the solution errs by about the same share as in the middle.
-    share = (widths / found[:, 0])[:, [0, 1, 3]]
+    share = widths / found[:, 0]
     ends *= 1 + np.stack([-np.minimum(share, 1.0), share], axis=1)
     return SloshingResponse(
         fill_ratio=fills,
         surface_radius=radii,
         amplification=Estimate(value=found[:, 0, 0].copy(), uncertainty=widths[:, 0]),
         amplification_interval=ends[:, :, 0].copy(),
-        pressure_amplification=Estimate(value=found[:, 0, 3].copy(), uncertainty=widths[:, 3]),
+        pressure_amplification=Estimate(value=found[:, 0, 2].copy(), uncertainty=widths[:, 2]),
         pressure_amplification_interval=ends[:, :, 2].copy(),
         surface_amplitude=amplitude,
         surface_amplitude_interval=scale * ends[:, :, 1],
-        damped_share=found[:, 0, 2].copy(),
         status=_status(fills, disc.outer_radius - radii, scale * ends[:, 1, 1], scale - radii),
     )
 
 
-def _interval(meshes: Meshes, radius: float, ratio: float, ekman: float) -> FloatArray:
+def _interval(meshes: _Meshes, radius: float, ratio: float, ekman: float) -> FloatArray:
     """Ends by natural frequencies of moment, displacement (as `_answers`) and wall pressure, shape (2, 3)."""
     # Peaks are looked for on the mesh in the middle, if there are three.
     system, _ = meshes.system(radius, len(meshes.levels) // 3)
 
     def response(ratios: FloatArray) -> FloatArray:
-        return _answers(system, ratios, ekman)[:, [0, 1, 3]]
+        return _answers(system, ratios, ekman)
 
-    return np.stack(swept(response, frequency_ratio=ratio, natural=system.natural_frequencies()))
+    return np.stack(_swept(response, frequency_ratio=ratio, natural=system.natural_frequencies()))
 
 
 def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float, ratio: float) -> None:
@@ -327,27 +323,24 @@ def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float, ra
 
 
 def _answers(system: SloshingSystem, ratios: FloatArray, ekman: float) -> FloatArray:
-    """Amplification, largest displacement for g/omega^2 = 1 (any unit of length), share left by damping, and
-    amplification of the wall pressure, by rows along the ratios.
+    """Amplification, largest displacement for g/omega^2 = 1 (any unit of length), amplification of the wall
+    pressure, by rows along the ratios.
     """
     s = ratios[:, None, None]
     forcing = 1j * s * (system.outflow[1] + 1j * system.outflow[2])[:, None]
     swinging = -(s**2) * system.kinetic + 2j * s * system.coriolis + system.centrifugal
     layers = 1j * s * np.sqrt(1j * s * ekman) * system.wall_loss
-    damped, free, still = (
+    damped, still = (
         np.linalg.solve(matrix, forcing)[:, :, 0].T
-        for matrix in (swinging + layers, swinging, system.centrifugal.astype(np.complex128))
+        for matrix in (swinging + layers, system.centrifugal.astype(np.complex128))
     )
     # Of the swing of the liquid's first moment, both components.
-    moment, reference, undamped = (
-        np.linalg.norm(system.outflow[1:] @ psi, axis=0) for psi in (damped, still, free)
-    )
+    moment, reference = (np.linalg.norm(system.outflow[1:] @ psi, axis=0) for psi in (damped, still))
     displacement = np.abs(system.flux @ damped).max(axis=0) / ratios
     pressure = (
         system.wall_drive - 1j * ratios * (system.potential @ damped) + 2 * (system.surface_mean @ damped)
     )
-    columns = (moment / reference, displacement, moment / undamped, np.abs(pressure / system.wall_drive))
-    return np.stack(columns, axis=1)
+    return np.stack([moment / reference, displacement, np.abs(pressure / system.wall_drive)], axis=1)
 
 
 def _status(fills: FloatArray, depth: FloatArray, amplitude: FloatArray, beyond: FloatArray) -> Status:

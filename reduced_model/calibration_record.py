@@ -16,14 +16,14 @@ from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.gas_line import LineAnswer
 from ringbalance.reduced_model.instability import AsynchronousInstability
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, DirectedState
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.operating_point import OperatingPoint, TubeLiquid
 from ringbalance.reduced_model.residual_liquid import Holding, ResidualLiquid
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
-from ringbalance.reduced_model.tube.regime import gas_over_crest, possible_cavity
+from ringbalance.reduced_model.tube.regime import TubeEnds, gas_over_crest, possible_cavity
 from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
@@ -153,13 +153,13 @@ def _flow_parts(scene: Scene, calibration: Calibration) -> dict[str, _Parts]:
         found["drag_coefficient"] = (point.k, error * (point.k + 1), point.k_model_uncertainty)
     if point.cavitation_margin is None or point.hump_pressure is None or point.velocity == 0:
         return found
-    state = DirectedState.of(
-        law=law, fills=fills, gas_pressure=point.gas_pressure, reverse=point.velocity < 0
-    )
-    margin = state.margin(law=law)[1] or 0.0
+    reverse = point.velocity < 0
+    margin = law.cavity_margin(fills=fills, gas_pressure=point.gas_pressure, reverse=reverse)[1] or 0.0
+    ends = law.ends(fill_ratio=fills[0], opposite_fill_ratio=fills[1], gas_pressure=point.gas_pressure)
+    part = _crest_part(law, point, ends.reversed() if reverse else ends, margin)
     rounding = error * abs(point.gas_pressure)
     return found | {
-        "crest_pressure": (point.hump_pressure, rounding, _crest_part(law, point, state, margin)),
+        "crest_pressure": (point.hump_pressure, rounding, part),
         "cavitation_margin": (point.cavitation_margin, rounding, margin),
     }
 
@@ -178,12 +178,12 @@ def _level_parts(calibration: Calibration) -> dict[str, _Parts]:
     return {name: (value, width, math.sqrt(2) * model) for name, value in values.items() if value is not None}
 
 
-def _crest_part(law: CalibratedLaw, point: OperatingPoint, state: DirectedState, margin: float) -> float:
+def _crest_part(law: CalibratedLaw, point: OperatingPoint, ends: TubeEnds, margin: float) -> float:
     """Model part of the crest's pressure, the larger of a cavity's, which has bounds, and a full siphon's."""
     if point.cavitation_margin is None or point.cavity_pressure is None:
         return 0.0
-    low, high = (float(bound) for bound in possible_cavity(law.path, state.ends))
-    gas = max(float(gas_over_crest(law.path, state.ends)), high)
+    low, high = (float(bound) for bound in possible_cavity(law.path, ends))
+    gas = max(float(gas_over_crest(law.path, ends)), high)
     pressure = point.hump_pressure or 0.0
     full = point.cavity_pressure + point.cavitation_margin
     highest = max(gas if pressure > high else high, full + margin)

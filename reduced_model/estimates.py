@@ -19,7 +19,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 
@@ -49,8 +49,6 @@ from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.loop_models import Sensor
 from ringbalance.scene.models import Scene
-
-Number = TypeVar("Number", float, FloatArray)
 
 
 def first_gas_time(scene: Scene) -> float:
@@ -89,11 +87,6 @@ def deciding_gas_time(scene: Scene, *, rate: float) -> float:
 
 def _within_limits(scene: Scene, commanded: float) -> float:
     return min(max(commanded, scene.controller.minimum_gas_time), scene.controller.maximum_gas_time)
-
-
-def start_up_time(*, density: float, length: float, velocity: Number, driving_pressure: Number) -> Number:
-    """Time scale tau on which the column in the tube starts, s: rho L u0/p = 2 L/((k + 1) u0)."""
-    return density * length * velocity / driving_pressure
 
 
 def long_start_up_loss(start_up: float, *, laminar: float = 0.0) -> float:
@@ -145,7 +138,7 @@ def steady(scene: Scene) -> Scene:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RangeFlow:
+class _RangeFlow:
     """The tube's flow over the fills of `SHARES`, the opposite chamber with the rest of the pair's liquid."""
 
     driving: FloatArray
@@ -173,13 +166,13 @@ class RangeFlow:
         return bool(np.any(self.velocity > 0))
 
 
-def range_flow(scene: Scene) -> RangeFlow:
+def range_flow(scene: Scene) -> _RangeFlow:
     """The flow over the range of fills, unprimed. Source: `column_flow`."""
     return _range_flow(steady(scene))
 
 
 @lru_cache(maxsize=8)
-def _range_flow(scene: Scene) -> RangeFlow:
+def _range_flow(scene: Scene) -> _RangeFlow:
     own = chamber_pressure(scene=scene, fill_ratio=scene.disc.max_fill_ratio * np.array(SHARES))
     tube = TubeFlow.of(Designs(scene=scene, size=own.size))
     ends, gas = tube.ends(own, own[::-1]), np.full_like(own, pressure_factor(scene) * scene.gas.pressure)
@@ -188,7 +181,7 @@ def _range_flow(scene: Scene) -> RangeFlow:
     if tube.path.crest:
         separated = tube.flow(ends, primed=False).separation_velocity
     primes = resting_pressure(tube.path, ends) > gas_over_crest(tube.path, ends)
-    return RangeFlow(
+    return _RangeFlow(
         driving=driving,
         siphon=tube.velocity(driving, driving > 0, to_crest=False),
         separated=separated,
@@ -270,7 +263,7 @@ def crest(scene: Scene) -> Contribution:
     )
 
 
-def _lost_at_crest(flow: RangeFlow) -> float:
+def _lost_at_crest(flow: _RangeFlow) -> float:
     driven = flow.siphon > 0
     if np.any(driven & ~flow.primes):
         return 1.0
@@ -308,7 +301,7 @@ def _tube_part(scene: Scene, part: TubePart) -> Contribution:
     )
 
 
-def _range_velocities(flow: RangeFlow) -> FloatArray:
+def _range_velocities(flow: _RangeFlow) -> FloatArray:
     """From a quarter of the slowest flow, full or separated, to twice the fastest, m/s."""
     velocities = np.concatenate([flow.siphon, flow.separated])
     ends = np.log(velocities[(velocities > 0) & np.isfinite(velocities)])
@@ -351,12 +344,8 @@ def inertia(scene: Scene) -> Contribution:
         return Contribution(value=None, formula="nothing flows")
     re = abs(flow.equal) * scene.tube.bore / scene.liquid.kinematic_viscosity
     laminar = float(1 - turbulent_share(reynolds=np.array(re)))
-    times = start_up_time(
-        density=scene.liquid.density,
-        length=scene.tube.length,
-        velocity=flow.velocity[flow.starts],
-        driving_pressure=flow.driving[flow.starts],
-    )
+    velocity, driving = flow.velocity[flow.starts], flow.driving[flow.starts]
+    times = scene.liquid.density * scene.tube.length * velocity / driving
     # A column that never moves costs nothing to start.
     slowest = max(float(np.max(times)), 1e-12)
     return Contribution(

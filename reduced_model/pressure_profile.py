@@ -15,7 +15,7 @@ from ringbalance.physics.gas import vented_pressure
 from ringbalance.physics.pressure.hydrostatics import column_radius
 from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.physics.tube.state import TubeState
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, DirectedState
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
 from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.reduced_model.tube.path import (
@@ -108,21 +108,18 @@ class HumpProfile:
         gas = scene.gas.pressure if gas_pressure is None else gas_pressure
         other = law.max_fill_ratio - fill_ratio if opposite_fill_ratio is None else opposite_fill_ratio
         flow = law.evaluate(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas, primed=primed)
-        forward, backward = (
-            DirectedState.of(law=law, fills=(fill_ratio, other), gas_pressure=gas, reverse=r)
-            for r in (False, True)
-        )
-        state = backward if driving_pressure(law.path, forward.ends) < 0 else forward
-        tube = reversed_tube(scene.tube) if state.reverse else scene.tube
-        margin = state.margin(law=law)
+        ends = law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=other, gas_pressure=gas)
+        reverse = bool(driving_pressure(law.path, ends) < 0)
+        tube, along = (reversed_tube(scene.tube), ends.reversed()) if reverse else (scene.tube, ends)
+        margin = law.cavity_margin(fills=(fill_ratio, other), gas_pressure=gas, reverse=reverse)
         if Regime(int(flow.regime)) is Regime.BLOCKED and not bool(flow.primed):
-            line = _blocked(scene, law, forward, primed, points)
+            line = _blocked(scene, law, ends, primed, points)
         else:
-            cavity = _pressure_over_crest(law, state, abs(float(flow.velocity)))
-            line = _flowing(scene, law.path, tube, abs(float(flow.velocity)), state.ends, cavity, points)
-            if state.reverse:
+            cavity = _pressure_over_crest(law, along, reverse, abs(float(flow.velocity)))
+            line = _flowing(scene, law.path, tube, abs(float(flow.velocity)), along, cavity, points)
+            if reverse:
                 line = _Line(share=1 - line.share[::-1], pressure=line.pressure[::-1], full=line.full[::-1])
-        return _profile(scene, law, flow, state, margin, line)
+        return _profile(scene, law, flow, along, reverse, margin, line)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -138,13 +135,14 @@ def _profile(
     scene: Scene,
     law: CalibratedLaw,
     flow: Flow,
-    state: DirectedState,
+    ends: TubeEnds,
+    reverse: bool,
     margin: tuple[float, float] | tuple[None, None],
     line: _Line,
 ) -> HumpProfile:
     tube, humped = scene.tube, scene.tube.hump_radius is not None
     start, end = crest_span(tube)
-    crest = start if state.reverse else end
+    crest = start if reverse else end
     place = int(np.argmin(np.abs(line.share - crest)))
     return HumpProfile(
         path=line.share * tube.length,
@@ -155,25 +153,21 @@ def _profile(
         velocity=float(flow.velocity),
         hump_path=crest * tube.length if humped else None,
         hump_pressure=float(line.pressure[place]) if humped else None,
-        cavity_pressure=_cavity_pressure(law, state),
+        cavity_pressure=float(cavity_pressure(law.path, ends)) if humped else None,
         cavitation_margin=margin[0],
         cavitation_margin_uncertainty=margin[1],
     )
 
 
-def _pressure_over_crest(law: CalibratedLaw, state: DirectedState, velocity: float) -> float | None:
+def _pressure_over_crest(law: CalibratedLaw, ends: TubeEnds, reverse: bool, velocity: float) -> float | None:
     """Of the cavity or gas that the column spills into at a velocity; None where it is full, or at rest."""
-    head = law.heads.to_crest(reverse=state.reverse)
+    head = law.heads.to_crest(reverse=reverse)
     if head is None or velocity == 0:
         return None
-    log_u, driving = np.log(velocity), driving_pressure(law.path, state.ends)
+    log_u, driving = np.log(velocity), driving_pressure(law.path, ends)
     if law.density * float(np.exp(law.heads.head(log_u))) > driving * (1 - 1e-9):
         return None
-    return float(resting_pressure(law.path, state.ends) - law.density * np.exp(head(log_u)))
-
-
-def _cavity_pressure(law: CalibratedLaw, state: DirectedState) -> float | None:
-    return float(cavity_pressure(law.path, state.ends)) if law.path.crest else None
+    return float(resting_pressure(law.path, ends) - law.density * np.exp(head(log_u)))
 
 
 def _flowing(
@@ -253,10 +247,10 @@ def _full_again(at: Places, behind: Callable[[Places], FloatArray], cavity: floa
     return float(brentq(above, start, stop))
 
 
-def _blocked(scene: Scene, law: CalibratedLaw, state: DirectedState, primed: bool, points: int) -> _Line:
+def _blocked(scene: Scene, law: CalibratedLaw, ends: TubeEnds, primed: bool, points: int) -> _Line:
     """Two columns at rest and what lies between; without a crest, each chamber's pressure up to the
     middle."""
-    ends, path, is_covered = state.ends, law.path, bool(covered(law.path, state.ends))
+    path, is_covered = law.path, bool(covered(law.path, ends))
     near, far = ends.upstream_pressure(), ends.downstream_pressure()
     is_open = discharges_openly(path, ends)
     if not path.crest:

@@ -17,8 +17,10 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import AS_GIVEN, balancer_of
+from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements
+from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
-from ringbalance.controller.eccentric_mass.study import eccentric_study
+from ringbalance.controller.eccentric_mass.tuning import tune_eccentric
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
@@ -38,7 +40,7 @@ from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import InputUncertainty, SceneFile
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.scene.units import DIMENSIONS
-from ringbalance.verification import paper_numbers
+from ringbalance.verification import papers
 from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
@@ -129,13 +131,13 @@ def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
 
 def _paper() -> Record:
     """What the paper says, for comparison."""
-    low, high = paper_numbers.LOWEST_PRESSURE, paper_numbers.HIGHEST_PRESSURE
+    low, high = papers.LOWEST_PRESSURE, papers.HIGHEST_PRESSURE
     return {
         "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
         "lambda_m": paper.PAPER_LAMBDA,
-        "lambda_spread": paper_numbers.LAMBDA_TOLERANCE,
+        "lambda_spread": papers.LAMBDA_TOLERANCE,
         "working_range_Pa": [low.value, high.value],
-        "figure_4_pressures_Pa": [paper_numbers.LOW_PRESSURE, paper_numbers.HIGH_PRESSURE],
+        "figure_4_pressures_Pa": [papers.LOW_PRESSURE, papers.HIGH_PRESSURE],
     }
 
 
@@ -232,7 +234,7 @@ def _total(calibration: Calibration, quantity: str) -> float | None:
 
 def _flow_law(scene: Scene, calibration: Calibration) -> Record:
     """Both laws over the fill, at the pressures of Fig. 4, or at the scene's own and at twice that."""
-    drawn = [paper_numbers.LOW_PRESSURE, paper_numbers.HIGH_PRESSURE]
+    drawn = [papers.LOW_PRESSURE, papers.HIGH_PRESSURE]
     pressures = drawn if scene.gas.pressure in drawn else [scene.gas.pressure, 2 * scene.gas.pressure]
     fill = np.linspace(0.0, scene.disc.max_fill_ratio, LAW_POINTS)
 
@@ -304,13 +306,19 @@ def _plain_study(scene: SceneFile) -> Record:
 
 def _eccentric_study(scene: EccentricScene) -> Record:
     """The run, balanced and with its masses locked, its loops and requirements, and the true values."""
-    study = eccentric_study(scene).document()
+    run = simulate_eccentric(scene)
     truth = {
         "unbalance_kg_m": scene.imbalance.mass * scene.imbalance.radius,
         "phase_rad": scene.imbalance.phase,
         "friction_arm_m": list(scene.masses.friction_arm),
     }
-    return {"truth": truth, "closed_loop": {"balanced": study.pop("run")}, **study}
+    return {
+        "truth": truth,
+        "closed_loop": {"balanced": run.to_dict()},
+        "locked": locked_run(scene).to_dict(),
+        "tuning": tune_eccentric(scene, runs=0).to_dict(),
+        "requirements": [each.document() for each in eccentric_requirements(scene, run)],
+    }
 
 
 _STUDIES: Final[Mapping[str, Callable[..., Record]]] = MappingProxyType({"eccentric_mass": _eccentric_study})

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ringbalance.identification.against_fit import against_fit
 from ringbalance.identification.cli import DONE, FitRequest, keep_inputs, run_fit
+from ringbalance.identification.documents import against_fit
 from ringbalance.identification.fitting import Loss
 from ringbalance.identification.kinds.registry import template as template_of
 from ringbalance.reports.simulate_cli import check_output

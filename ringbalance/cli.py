@@ -57,7 +57,7 @@ COMMANDS = {
         "Speed against accuracy: designs a second and error of every model.",
     ),
     "extremes": (
-        "ringbalance.verification.extremes.cli:extremes",
+        "ringbalance.verification.extremes.study:extremes",
         "Limits of validity: where results stop, what is reported beyond, and whether the invariants hold "
         "inside.",
     ),

@@ -9,15 +9,14 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
-from ringbalance.identification.criticism.review import Review
+from ringbalance.identification.criticism import Review
 from ringbalance.identification.documents import fit_document, fit_rows
-from ringbalance.identification.fitting import Loss
+from ringbalance.identification.fitting import FitResult, FittedParameter, Loss
 from ringbalance.identification.fitting import fit as fit_scene
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.next_measurement import NextMeasurement, next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.reading import read_observations
-from ringbalance.identification.result import FitResult, FittedParameter
 from ringbalance.reports.cli import draw_pictures
 from ringbalance.reports.report import Report
 from ringbalance.reports.report import write_report as write_scene_report
@@ -26,8 +25,7 @@ from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.changes import checked_scene, document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
-from ringbalance.verification.extremes.cli import base_of
-from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
+from ringbalance.verification.extremes.study import SIZES, Extremes, base_of, find_extremes
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases as run_scene_cases
 from ringbalance.verification.trade import TradeStudy, trade_study

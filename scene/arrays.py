@@ -1,4 +1,4 @@
-"""Arrays and numbers as every room has them: types, and what numpy has only at the price of a slow start."""
+"""Arrays and numbers as every room has them: types, and what numpy lacks."""
 
 from __future__ import annotations
 
@@ -15,12 +15,6 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 ComplexArray = npt.NDArray[np.complex128]
 StringArray = npt.NDArray[np.str_]
-
-
-def distinct(values: npt.ArrayLike) -> FloatArray:
-    """The different values in rising order, as np.unique gives them: that imports numpy's masked arrays."""
-    ordered = np.sort(np.asarray(values, dtype=np.float64).ravel())
-    return ordered[np.append(True, ordered[1:] != ordered[:-1])] if ordered.size else ordered
 
 
 def clipped(values: npt.ArrayLike, low: float, high: float) -> FloatArray:

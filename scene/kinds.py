@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.reading import Reading, read_document
 from ringbalance.scene.keys.schema import Schema
-from ringbalance.scene.registry import registered_scene
+from ringbalance.scene.registry import registered
 from ringbalance.scene.units import format_quantity
 
 
@@ -36,7 +36,7 @@ class SceneKind:
 
 def scene_kind(name: str) -> SceneKind:
     """The kind of scene of a registered balancer. Raises: KeyError: none of that name is registered."""
-    kind: SceneKind = registered_scene(name)
+    kind: SceneKind = registered("scene", name)
     return kind
 
 

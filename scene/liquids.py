@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import bisect
 import csv
 import math
 from collections.abc import Iterable, Mapping
@@ -27,6 +26,7 @@ from ringbalance.scene.units import FieldError
 _ZERO_CELSIUS = 273.15
 _SAME_TEMPERATURE = 0.01
 _WATER = "water"
+_COLUMNS = ("T_C", "rho_kg_m3", "nu_m2_s", "vapour_pressure_Pa")
 _ALIASES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
     {
         "water": ("water", ()),
@@ -47,14 +47,6 @@ HOTTEST = 373.05
 """K (99.9 degC); water boils at atmospheric pressure just above."""
 _DENSITY, _VISCOSITY, _VAPOUR = "liquid.density", "liquid.kinematic_viscosity", "liquid.vapour_pressure"
 _OUTRIGHT = "density and kinematic_viscosity given outright"
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Row:
-    temperature: float
-    density: float
-    viscosity: float
-    vapour_pressure: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,20 +135,20 @@ def _properties(liquid: KnownLiquid, temperature: float) -> tuple[float, float, 
     return _interpolated(_library()[liquid.name][1], inside)
 
 
-def _interpolated(rows: tuple[_Row, ...], temperature: float) -> tuple[float, float, float]:
-    index = bisect.bisect_left([row.temperature for row in rows], temperature)
-    upper = rows[index]
-    if upper.temperature == temperature:
-        return upper.density, upper.viscosity, upper.vapour_pressure
-    lower = rows[index - 1]
-    share = (temperature - lower.temperature) / (upper.temperature - lower.temperature)
+def _interpolated(rows: FloatArray, temperature: float) -> tuple[float, float, float]:
+    """Args: `rows`: temperature, density, kinematic viscosity and vapour pressure, shape (n, 4), rising."""
+    upper = int(np.searchsorted(rows[:, 0], temperature))
+    last, density, viscosity, vapour = rows[upper].tolist()
+    if last == temperature:
+        return density, viscosity, vapour
+    first, *lower = rows[upper - 1].tolist()
+    share = (temperature - first) / (last - first)
     # Linear in 1/T rather than in T: the same share, weighted with the upper temperature over T.
-    inverse_share = share * upper.temperature / temperature
-    log_ratio = math.log(upper.viscosity / lower.viscosity)
+    inverse_share = share * last / temperature
     return (
-        lower.density + share * (upper.density - lower.density),
-        lower.viscosity * math.exp(inverse_share * log_ratio),
-        lower.vapour_pressure + share * (upper.vapour_pressure - lower.vapour_pressure),
+        lower[0] + share * (density - lower[0]),
+        lower[1] * math.exp(inverse_share * math.log(viscosity / lower[1])),
+        lower[2] + share * (vapour - lower[2]),
     )
 
 
@@ -169,7 +161,7 @@ def _plain(name: str) -> str:
 
 
 @cache
-def _library() -> Mapping[str, tuple[KnownLiquid, tuple[_Row, ...]]]:
+def _library() -> Mapping[str, tuple[KnownLiquid, FloatArray]]:
     table = list(csv.DictReader(_data_lines("fluid_properties.csv")))
     entries = (
         _entry(key, [line for line in table if line["fluid"] == key])
@@ -183,29 +175,21 @@ def _data_lines(name: str) -> list[str]:
     return [line for line in text.splitlines() if not line.startswith("#")]
 
 
-def _entry(key: str, lines: Iterable[Mapping[str, str]]) -> tuple[KnownLiquid, tuple[_Row, ...]]:
+def _entry(key: str, lines: Iterable[Mapping[str, str]]) -> tuple[KnownLiquid, FloatArray]:
     ordered = sorted(lines, key=lambda line: float(line["T_C"]))
-    rows = tuple(_row(line) for line in ordered)
+    rows = np.array([[float(line[column]) for column in _COLUMNS] for line in ordered])
+    rows[:, 0] += _ZERO_CELSIUS
     name, aliases = _ALIASES[key]
     source = f"{ordered[0]['source']}; {ordered[0]['status']}"
     liquid = KnownLiquid(
         name=name,
         aliases=aliases if key == name else (*aliases, key),
-        temperatures=(COLDEST, HOTTEST) if name == _WATER else tuple(row.temperature for row in rows),
+        temperatures=(COLDEST, HOTTEST) if name == _WATER else tuple(rows[:, 0].tolist()),
         density_uncertainty=max(float(line["u95_rho_percent"]) for line in ordered) / 100,
         viscosity_uncertainty=max(float(line["u95_nu_percent"]) for line in ordered) / 100,
         source=source,
     )
     return liquid, rows
-
-
-def _row(line: Mapping[str, str]) -> _Row:
-    return _Row(
-        temperature=float(line["T_C"]) + _ZERO_CELSIUS,
-        density=float(line["rho_kg_m3"]),
-        viscosity=float(line["nu_m2_s"]),
-        vapour_pressure=float(line["vapour_pressure_Pa"]),
-    )
 
 
 def _water_properties(*, temperature: float) -> tuple[float, float, float]:

@@ -14,7 +14,7 @@ from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
 from ringbalance.scene.keys.fields import Bounds, OneLine, number, numbers, whole
 from ringbalance.scene.loop_models import RunSettings
-from ringbalance.scene.registry import registered_function
+from ringbalance.scene.registry import registered
 
 Number = Annotated[float, number(Bounds())]
 Numbers = Annotated[tuple[float, ...], numbers()]
@@ -161,7 +161,7 @@ class SceneFile:
 
     def __repr__(self) -> str:
         """Name, file and hash; the values are its fields."""
-        lines = registered_function("scene_lines")(self)
+        lines = registered("function", "scene_lines")(self)
         return summary_text((f"Scene {self.name!r} ({self.source}, SHA-256 {self.sha256[:12]})", *lines))
 
     def with_values(self, values: Mapping[str, object], *, origin: Origin = "given") -> Self:
@@ -173,7 +173,7 @@ class SceneFile:
         Raises: SceneError: everything that is wrong with the result; or this record was itself changed in
             another way.
         """
-        return cast(Self, registered_function("with_values")(self, values, origin=origin))
+        return cast(Self, registered("function", "with_values")(self, values, origin=origin))
 
     def origin_of(self, path: str) -> ShownOrigin:
         """Where the value at a path such as "tube.bore" comes from.

@@ -7,20 +7,13 @@ calibration never loads what eccentric masses need.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, Literal
 
+Part = Literal["scene", "balancer", "function"]
 
-@dataclass(frozen=True, kw_only=True)
-class _Places:
-    scene: str
-    balancer: str
-
-
-_FUNCTIONS: dict[str, str] = {}
-_REGISTERED: dict[str, _Places] = {}
-"""By the word of the key `balancer`; the first is the default of a scene file."""
+_PLACES: dict[tuple[Part, str], str] = {}
+"""Of a part of a kind of balancer, or of a function by its name; the first kind is a scene file's default."""
 
 
 def register(name: str, *, scene: str, balancer: str) -> None:
@@ -30,34 +23,20 @@ def register(name: str, *, scene: str, balancer: str) -> None:
         `ringbalance.scene.kinds.SceneKind`. `balancer`: place of its class, of the shape of
         `ringbalance.controller.balancer.Balancer`.
     """
-    _REGISTERED[name] = _Places(scene=scene, balancer=balancer)
-
-
-def balancers() -> tuple[str, ...]:
-    """Words that the key `balancer` may have, the default first."""
-    return tuple(_REGISTERED)
-
-
-def registered_scene(name: str) -> Any:
-    """What was registered as the kind of scene of a balancer. Raises: KeyError: there is no such balancer."""
-    return _at(_REGISTERED[name].scene)
-
-
-def balancer_class(name: str) -> Any:
-    """What makes the balancer of a scene of that kind. Raises: KeyError: there is no such balancer."""
-    return _at(_REGISTERED[name].balancer)
+    _PLACES["scene", name], _PLACES["balancer", name] = scene, balancer
 
 
 def register_function(name: str, *, place: str) -> None:
     """Make a function known that methods of a scene use, by its place "module:name"; it imports scenes."""
-    _FUNCTIONS[name] = place
+    _PLACES["function", name] = place
 
 
-def registered_function(name: str) -> Any:
-    """The function that was registered under a name. Raises: KeyError: none was."""
-    return _at(_FUNCTIONS[name])
+def balancers() -> tuple[str, ...]:
+    """Words that the key `balancer` may have, the default first."""
+    return tuple(name for part, name in _PLACES if part == "scene")
 
 
-def _at(place: str) -> Any:
-    module, _, name = place.partition(":")
-    return getattr(import_module(module), name)
+def registered(part: Part, name: str) -> Any:
+    """What was registered under a name. Raises: KeyError: nothing was."""
+    module, _, attribute = _PLACES[part, name].partition(":")
+    return getattr(import_module(module), attribute)

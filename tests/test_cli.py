@@ -208,22 +208,23 @@ def test_every_fault_stands_on_its_line(
     assert len(told.err.strip().splitlines()) == 2
 
 
-def test_an_interrupt_gives_130(command: Callable[[BaseException | int], int]) -> None:
-    assert command(KeyboardInterrupt()) == 130
-
-
-def test_an_unwritable_file_is_bad_input(
-    command: Callable[[BaseException | int], int], capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("outcome", "code", "told"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (PermissionError(13, "Permission denied", "law.json"), 2, "law.json"),
+        (OSError(28, "No space left on device"), 2, "No space left on device (in act"),
+    ],
+)
+def test_what_ends_a_command_is_said(
+    command: Callable[[BaseException | int], int],
+    outcome: BaseException,
+    code: int,
+    told: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert command(PermissionError(13, "Permission denied", "law.json")) == 2
-    assert "law.json" in capsys.readouterr().err
-
-
-def test_what_the_machine_refuses_is_reported_with_its_place(
-    command: Callable[[BaseException | int], int], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert command(OSError(28, "No space left on device")) == 2
-    assert "No space left on device (in act" in capsys.readouterr().err
+    assert command(outcome) == code
+    assert told in capsys.readouterr().err
 
 
 def test_a_fault_of_the_program_is_not_hidden(command: Callable[[BaseException | int], int]) -> None:

@@ -20,8 +20,7 @@ from ringbalance.controller.eccentric_mass.tuning import tune_eccentric
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
-from ringbalance.verification.extremes.cli import base_of
-from ringbalance.verification.extremes.study import Size, find_extremes
+from ringbalance.verification.extremes.study import Size, base_of, find_extremes
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "commands.md"
 SHARED: Final = "Keys that several commands have"

@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import FloatArray, IntArray
+from ringbalance.verification.navier_stokes.flow import FlowSpace, FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution
-from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import FlowSystem
 
 _MARGIN = 0.05
 """Share of an element by which a point may lie outside it: a chord's sagitta on a coarser curved mesh."""

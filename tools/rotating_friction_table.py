@@ -36,15 +36,14 @@ from ringbalance.physics.tube.rotation_table import (
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import Workers
-from ringbalance.verification.navier_stokes.continuation import StepRule, follow
-from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings
+from ringbalance.verification.navier_stokes.flow import FlowSystem
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, StepRule, follow
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     friction_ratio,
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.system import FlowSystem
 
 COLUMNS = ("table", "a", "b", "coarse", "medium", "fine", "uncertainty")
 

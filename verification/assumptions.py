@@ -11,8 +11,8 @@ from typing import Any, Final, Literal
 from ringbalance.mesh.geometry import surface_radius
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import RestsOn
-from ringbalance.verification.eccentric_scenes import changed
 from ringbalance.verification.evidence import Evidence
+from ringbalance.verification.papers import changed
 
 KNOWN: Final = ("given", "measured")
 """Origins of a value that somebody vouches for: it is taken as it stands."""

@@ -16,8 +16,8 @@ from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.assumptions import assumptions_of, overridden, widened
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
-from ringbalance.verification.eccentric_scenes import driven_scene
 from ringbalance.verification.evidence import CaseCode, Evidence, Found, Level, NotRunError, Reference
+from ringbalance.verification.papers import driven_scene
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
 from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
 
@@ -156,7 +156,7 @@ def _quantities(definition: CaseDefinition, evidence: Evidence) -> tuple[Quantit
 def _judge_one(
     definition: CaseDefinition, quantity: Quantity, found: Found, reference: Reference | None
 ) -> QuantityResult:
-    judgement = judge_quantity(
+    verdict, comparison = judge_quantity(
         kind=definition.kind,
         metric=quantity.metric,
         limit=quantity.limit,
@@ -165,10 +165,10 @@ def _judge_one(
     )
     return QuantityResult(
         quantity=quantity,
-        verdict=judgement.verdict,
+        verdict=verdict,
         found=found,
         reference=reference,
-        comparison=judgement.comparison,
+        comparison=comparison,
     )
 
 

@@ -91,19 +91,10 @@ def compare(
     return Comparison(error=found - reference, validation_uncertainty=math.hypot(*parts, round_off))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Judgement:
-    """One quantity of a case, judged."""
-
-    verdict: Verdict
-    comparison: Comparison
-    """Against the reference, or against the limit where the metric knows no reference."""
-
-
 def judge_quantity(
     *, kind: Kind, metric: Metric, limit: float, found: Found, reference: Reference | None
-) -> Judgement:
-    """Judge one quantity by its metric and limit.
+) -> tuple[Verdict, Comparison]:
+    """Judge one quantity by its metric and limit, compared with its reference, or with the limit as a bound.
 
     `validation` (claims) and `within_uncertainty`: E = S - D against 2 u_val, without what assumed inputs
     add. It holds when |E| <= 2 u_val <= limit |D| (limit alone where D is zero) and no assumed input takes
@@ -124,7 +115,7 @@ def judge_quantity(
         reference_uncertainty=against.uncertainty,
     )
     if not found.conclusive:
-        return Judgement(verdict=Verdict.INCONCLUSIVE, comparison=comparison)
+        return Verdict.INCONCLUSIVE, comparison
     if bound:
         verdict = _by_bound(kind, metric, found, comparison)
     elif metric in ("relative", "absolute"):
@@ -132,7 +123,7 @@ def judge_quantity(
         verdict = _yes_or_no(kind, abs(comparison.error) <= limit * scale)
     else:
         verdict = _by_uncertainty(kind, limit, found, against, comparison)
-    return Judgement(verdict=verdict, comparison=comparison)
+    return verdict, comparison
 
 
 def _yes_or_no(kind: Kind, holds: bool) -> Verdict:

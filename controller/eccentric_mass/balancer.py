@@ -21,14 +21,13 @@ from ringbalance.controller.balancer import (
     inputs_of,
     outcomes_of,
     rotor_fault,
-    vibrating,
 )
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
+from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements, reach_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
-from ringbalance.controller.eccentric_mass.study import eccentric_requirements, reach_of
 from ringbalance.controller.eccentric_mass.tuning import EccentricTuning, drawn_run, tune_eccentric
 from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
@@ -106,17 +105,14 @@ class EccentricMassBalancer:
             problem = "without damping the vibration before balancing never becomes steady"
             raise rotor_fault(scene, "rotor.damping", problem, "a damping coefficient above 0 N*s/m")
         imbalance = scene.imbalance
-        return vibrating(
-            scene,
-            CommonRotor(
-                source=scene.source,
-                speed=speed,
-                influence=parameters.influence(speed),
-                unbalance=cmath.rect(imbalance.mass * imbalance.radius, imbalance.phase),
-                mass=parameters.mass,
-                noise=scene.sensor.position_noise,
-                limit=scene.supervisor.limit,
-            ),
+        return CommonRotor(
+            source=scene.source,
+            speed=speed,
+            influence=parameters.influence(speed),
+            unbalance=cmath.rect(imbalance.mass * imbalance.radius, imbalance.phase),
+            mass=parameters.mass,
+            noise=scene.sensor.position_noise,
+            limit=scene.supervisor.limit,
         )
 
     def on_rotor(self, rotor: CommonRotor | None) -> EccentricMassBalancer:

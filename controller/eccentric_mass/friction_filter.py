@@ -63,7 +63,7 @@ class _FrictionFlow(NamedTuple):
 
 
 @compiled
-def friction_flow(
+def _friction_flow(
     model: TrackModel, rate: float, arm: float, speed: float, torque: float, step: float, euler: bool
 ) -> _FrictionFlow:
     """Carry a moving mass one step on, by the exponential Rosenbrock-Euler rule, which bears any step.
@@ -98,7 +98,7 @@ def friction_step(
 
     Source: Eqs. 32 to 38 of the paper on eccentric masses, with the flow as transition and Joseph's update.
     """
-    flow = friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
+    flow = _friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
     wander = noise.arm * step
     p11 = (
         flow.by_rate**2 * estimate.rate_variance

@@ -114,7 +114,7 @@ def whirl_transition(model: WhirlModel, angular_velocity: float, step: float) ->
 
 
 @compiled
-def euler_transition(model: WhirlModel, angular_velocity: float, step: float) -> FloatArray:
+def _euler_transition(model: WhirlModel, angular_velocity: float, step: float) -> FloatArray:
     """The paper's transition I + A dt, shape (6, 6), which keeps the steady whirl but not the way there.
 
     Source: Eq. 14 of the paper on eccentric masses.
@@ -206,7 +206,7 @@ def filter_matrices(
     exact = whirl_transition(model, angular_velocity, step)
     return FilterMatrices(
         angular_velocity,
-        euler_transition(model, angular_velocity, step) if euler else exact,
+        _euler_transition(model, angular_velocity, step) if euler else exact,
         _process_covariance(model, noise, angular_velocity, step),
         _sensor_matrix(angular_velocity, laboratory),
     )

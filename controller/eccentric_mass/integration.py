@@ -221,7 +221,7 @@ def plant_step(
         if flags[mass] == LOCKED:
             after[6 + mass] = 0.0
     drive = drive_of(parameters, command, speed_rate)
-    if held_step(parameters, after, flags, speed, drive, step):
+    if _held_step(parameters, after, flags, speed, drive, step):
         return after, flags
     parts = substeps(parameters, speed, speed_rate, step)
     short = step / parts
@@ -233,7 +233,7 @@ def plant_step(
 
 
 @compiled
-def held_step(
+def _held_step(
     parameters: PlantParameters,
     state: FloatArray,
     stuck: IntArray,
@@ -403,7 +403,7 @@ class _PlantRun(NamedTuple):
 
 
 @compiled
-def run_steps(
+def _run_steps(
     parameters: PlantParameters,
     times: FloatArray,
     speeds: FloatArray,
@@ -441,7 +441,7 @@ def run_plant(scene: EccentricScene, *, locked: bool = False, progress: Progress
     states[0] = rest_state(scene.masses.initial_angle)
     for begin, end in stretches(count):
         off = np.zeros((end - begin, 2))
-        states[begin : end + 1], passed = run_steps(
+        states[begin : end + 1], passed = _run_steps(
             parameters, times, speeds, states[begin], flags, off, step, begin
         )
         flags = passed[-1]

@@ -67,7 +67,7 @@ class _Profile(NamedTuple):
     """At the corners, rad/s."""
 
 
-def recorded(
+def _recorded(
     scene: EccentricScene, seed: int | None, progress: Progress, settings: StrategySettings
 ) -> tuple[Record, Findings, float | None]:
     """Every sample before the first that means nothing, and what the strategy found.
@@ -276,7 +276,7 @@ def simulate_eccentric(
     Source: Fig. 3 of the paper on eccentric masses.
     """
     check_substeps(scene)
-    record, findings, innovation = recorded(
+    record, findings, innovation = _recorded(
         scene, seed, progress or (lambda _, __: None), settings or StrategySettings.of(scene)
     )
     cause = Cause(int(record.cause[-1]))

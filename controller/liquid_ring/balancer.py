@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
+from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.balancer import (
     CommonRotor,
     Draws,
@@ -22,10 +23,9 @@ from ringbalance.controller.balancer import (
     inputs_of,
     outcomes_of,
     requirements_of,
-    vibrating,
 )
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
-from ringbalance.controller.ensemble import simulate_members
+from ringbalance.controller.ensemble import member_noise, simulate_members
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.members import Members, MemberUncertainty
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
@@ -56,48 +56,30 @@ _GAIN: Final = 30.0
 _PRESSURE: Final = 3.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Options:
+@dataclass(frozen=True, eq=False)
+class LiquidRingBalancer:
+    """A disc with chambers that a gas drives liquid between; options as in `ringbalance.simulate`."""
+
+    options = frozenset({"flow_law", "controller", "sensor", "modelled"})
+    scene: Scene
+    _: KW_ONLY
     flow_law: Any = None
+    """May be a name that `law_by_name` knows, too."""
     controller: Controller[Any] | None = None
     sensor: Sensor | None = None
     modelled: Collection[str] | None = None
     to_time_limit: bool = False
 
-
-class LiquidRingBalancer:
-    """A disc with chambers that a gas drives liquid between."""
-
-    options = frozenset({"flow_law", "controller", "sensor", "modelled"})
-
-    def __init__(
-        self,
-        scene: Scene,
-        *,
-        flow_law: Any = None,
-        controller: Controller[Any] | None = None,
-        sensor: Sensor | None = None,
-        modelled: Collection[str] | None = None,
-        to_time_limit: bool = False,
-    ) -> None:
-        """Arguments as in `ringbalance.simulate`; `flow_law` may be a name that `law_by_name` knows, too."""
-        if controller is not None and not (hasattr(controller, "start") and hasattr(controller, "step")):
-            raise TypeError(
-                f"an algorithm has start() and step(state, measurement), which {controller!r} has not"
-            )
-        self.scene = scene
-        self._given = _Options(
-            flow_law=flow_law,
-            controller=controller,
-            sensor=sensor,
-            modelled=modelled,
-            to_time_limit=to_time_limit,
-        )
+    def __post_init__(self) -> None:
+        """Refuse what is no algorithm."""
+        own = self.controller
+        if own is not None and not (hasattr(own, "start") and hasattr(own, "step")):
+            raise TypeError(f"an algorithm has start() and step(state, measurement), which {own!r} has not")
 
     @cached_property
     def model(self) -> BalancerModel:
         """The disc under its law."""
-        law = self._given.flow_law
+        law = self.flow_law
         if law is None:
             return calibrated_model(self.scene)
         if isinstance(law, str):
@@ -110,9 +92,6 @@ class LiquidRingBalancer:
     def models_used(self) -> tuple[ModelUsed, ...]:
         """Every physical term, with its model and its estimated contribution."""
         return run_models(scene=self.scene, model=self.model)
-
-    def _as(self, scene: Scene, **changed: Any) -> LiquidRingBalancer:
-        return LiquidRingBalancer(scene, **vars(replace(self._given, **changed)))
 
     def inputs(self) -> tuple[Input, ...]:
         """Those of the scene, with what it assumes where it states no uncertainty."""
@@ -147,13 +126,11 @@ class LiquidRingBalancer:
         trace: bool = False,
         progress: Progress | None = None,
     ) -> Outcomes:
-        """See `Balancer`; without traces, many devices of the target-vector algorithm run compiled."""
+        """See `Balancer`; without traces, runs of the program's own algorithm and sensor are many at once."""
         scene = with_values_at(self.scene, settings)
-        compiled = scene.controller.kind == "target_vector" and self._given == _Options(
-            flow_law=self._given.flow_law
-        )
-        if draws.devices and compiled and not trace:
-            return self._compiled(scene, draws)
+        own = (self.controller, self.sensor, self.modelled) != (None, None, None) or self.to_time_limit
+        if not trace and not own:
+            return self._untraced(scene, draws)
         runs = (
             self._traced(scene, number, devices=draws.devices, progress=progress) for number in draws.numbers
         )
@@ -169,14 +146,23 @@ class LiquidRingBalancer:
         ]
         return outcomes_of(traced, trace=trace)
 
-    def _compiled(self, scene: Scene, draws: Draws) -> Outcomes:
-        number, last = np.array(draws.numbers), max(draws.numbers)
-        members = Members.drawn(scene, uncertainty_95=self._widths, seed=scene.run.seed, block=0)
-        runs = simulate_members(scene, self.model, members=members.first(last + 1), seed=scene.run.seed)
+    def _untraced(self, scene: Scene, draws: Draws) -> Outcomes:
+        seed, numbers = scene.run.seed, list(draws.numbers)
+        members = Members.alike(scene, size=len(numbers))
+        if draws.devices:
+            members = Members.drawn(scene, uncertainty_95=self._widths, seed=seed, block=0).at(numbers)
+
+        def noise(place: int) -> np.random.Generator:
+            number = numbers[place]
+            return member_noise(seed, number) if draws.devices else np.random.default_rng(seed + number)
+
+        runs = simulate_members(
+            scene, self.model, members=members, noise=noise, controller=controller_of(scene, self.model)
+        )
         return Outcomes(
-            settled=runs.settled[number],
-            settling_time=runs.settling_time[number],
-            final_amplitude=runs.final_amplitude[number],
+            settled=runs.settled,
+            settling_time=runs.settling_time,
+            final_amplitude=runs.final_amplitude,
         )
 
     @cached_property
@@ -186,32 +172,28 @@ class LiquidRingBalancer:
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> Simulation:
         if devices:
             return drawn_run(scene, self.model, self._widths, number=number)
-        given = self._given
         run = simulate(
             replace(scene, run=replace(scene.run, seed=scene.run.seed + number)),
             self.model,
-            controller=given.controller,
-            sensor=given.sensor,
+            controller=self.controller,
+            sensor=self.sensor,
             progress=progress,
-            modelled=given.modelled,
-            to_time_limit=given.to_time_limit,
+            modelled=self.modelled,
+            to_time_limit=self.to_time_limit,
         )
-        return replace(run, findings=(*run.findings, *_of_own_law(given.flow_law, run)))
+        return replace(run, findings=(*run.findings, *_of_own_law(self.flow_law, run)))
 
     def rotor(self) -> CommonRotor:
         """See `Balancer`."""
         rotor = self.scene.rotor
-        return vibrating(
-            self.scene,
-            CommonRotor(
-                source=self.scene.source,
-                speed=rotor.speed,
-                influence=rotor.influence,
-                unbalance=rotor.initial_unbalance,
-                mass=None,
-                noise=self.scene.sensor.amplitude_noise,
-                limit=self.scene.controller.limit,
-            ),
+        return CommonRotor(
+            source=self.scene.source,
+            speed=rotor.speed,
+            influence=rotor.influence,
+            unbalance=rotor.initial_unbalance,
+            mass=None,
+            noise=self.scene.sensor.amplitude_noise,
+            limit=self.scene.controller.limit,
         )
 
     def on_rotor(self, rotor: CommonRotor | None) -> LiquidRingBalancer:
@@ -248,7 +230,7 @@ class LiquidRingBalancer:
             ),
         )
         check_ring(scene)
-        return self._as(scene)
+        return replace(self, scene=scene)
 
     def span(self) -> float:
         """The scene's time limit, s."""
@@ -257,7 +239,7 @@ class LiquidRingBalancer:
     def lasting(self, span: float) -> LiquidRingBalancer:
         """See `Balancer`."""
         run = replace(self.scene.run, time_limit=span)
-        return self._as(replace(self.scene, run=run), to_time_limit=True)
+        return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
 
     def advised(self) -> tuple[LiquidRingBalancer, Mapping[str, float]]:
         """The gain that `tune` recommends for the target-vector algorithm, and its valve offsets."""
@@ -268,7 +250,7 @@ class LiquidRingBalancer:
         if best is None:
             return self, {}
         changes = _changes(self.scene.controller, best.scene.controller, chambers=self.scene.disc.chambers)
-        return self._as(best.scene), changes
+        return replace(self, scene=best.scene), changes
 
     def recommend(self, *, progress: Callable[[str], None] | None = None) -> Tuning:
         """See `Balancer`."""

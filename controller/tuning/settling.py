@@ -179,7 +179,7 @@ def _beyond_capacity(
     )
 
     def fraction(asked: Scene, at_least: float) -> float:
-        residual = drawn.first(runs).residual_fill(asked, law=model.flow)
+        residual = drawn.at(slice(runs)).residual_fill(asked, law=model.flow)
         left = (
             ring.unreachable_vibration(
                 rotor=_rotor(scene, drawn, number), least_fill=max(float(fill), at_least)
@@ -209,7 +209,7 @@ def drawn_run(scene: Scene, model: BalancerModel, widths: MemberUncertainty, *, 
     faster = rotor.influence_coefficient * float(drawn.velocity_factor[number])
     run = replace(scene.run, seed=scene.run.seed + number)
     gas, rotor = drawn.gas_of(scene.gas, number), replace(rotor, influence_coefficient=faster)
-    residual = drawn.first(number + 1).residual_fill(scene, law=model.flow)[number]
+    (residual,) = drawn.at([number]).residual_fill(scene, law=model.flow)
     asked = replace(scene, rotor=rotor, gas=gas, run=run)
     return simulate(asked, model, residual_fill=float(residual))
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -32,13 +30,9 @@ from ringbalance.controller.tuning.search import (
     with_ways_out,
 )
 from ringbalance.controller.tuning.settling import MEMBERS, RUNS, Progress, SettlingTimes, settling_times
-from ringbalance.controller.tuning.view import tuning_rows
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
-from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers, line_document
+from ringbalance.reduced_model.gas_line import LineAnswer, largest_correction, line_answers
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.reduced_model.terms import neglected_in_injections
-from ringbalance.results.result import Presentation
-from ringbalance.scene.arrays import finite
 from ringbalance.scene.models import Scene
 
 
@@ -105,7 +99,6 @@ def _judged(
     # The law-based algorithm asks for the time in which the law moves the whole residual.
     gain = (1.0 / loop.rate if settings.kind == "law_based" else settings.proportional) if flows else None
     return Tuning(
-        presentation=Presentation(document=tuning_document, rows=tuning_rows),
         scene=tuned,
         law=model.name,
         gain=None if settings.kind == "law_based" else gain,
@@ -159,56 +152,6 @@ def _margins(scene: Scene, loop: LoopFactor, known: FactorUncertainty) -> Margin
         integral=settings.period / (settings.integral_time or math.inf) if fixed else 0.0,
         derivative=settings.derivative_time / settings.period if fixed else 0.0,
     )
-
-
-def tuning_document(tuning: Tuning) -> dict[str, Any]:
-    """A tuning as a JSON document in SI; null: there is none, or a quantile is not reached."""
-    loop, margins, settling, scene = tuning.loop, tuning.margins, tuning.settling, tuning.scene
-    return {
-        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
-        "balancer": scene.balancer,
-        "law": tuning.law,
-        "controller": scene.controller.kind,
-        "status": tuning.status,
-        "gain": tuning.gain,
-        "loop_factor": loop.value,
-        "loop_factor_limit": loop.limit,
-        "present": {"loop_factor": tuning.present.value, "unstable": tuning.present.unstable},
-        "vibration_rate_m_per_s": loop.rate,
-        "stationary_deviation_m": finite(loop.deviation),
-        "margins": None
-        if margins is None
-        else {name: finite(value) for name, value in asdict(margins).items()}
-        | {"left_gain_factor": margins.left_gain_factor, "left_phase": margins.left_phase},
-        "uncertainty": [asdict(part) for part in tuning.contributions],
-        "first_gas_time_s": tuning.first_gas_time,
-        "last_gas_time_s": tuning.last_gas_time,
-        "minimum_gas_time_s": scene.controller.minimum_gas_time,
-        "smallest_correction_m": tuning.smallest_correction,
-        "dead_zone_m": tuning.dead_zone,
-        "dead_time_s": list(tuning.dead_times) or None,
-        "gas_time_offset_s": list(scene.controller.offsets(scene.disc.chambers)),
-        "change": tuning.change,
-        "tried": [] if tuning.search is None else [asdict(row) for row in tuning.search.tried],
-        "reachable_limit_m": None if tuning.search is None else tuning.search.limit,
-        "faster_valve": None if tuning.search is None else tuning.search.valve,
-        "shorter_opening_s": None if tuning.search is None else tuning.search.opening,
-        "limit_m": scene.controller.limit,
-        "beyond_capacity_m": tuning.beyond_capacity,
-        "reachable": tuning.reachable,
-        "gas_line": line_document(tuning.gas_line),
-        "settling_time_s": None if settling is None else settling.quantiles,
-        "fraction_settled": None if settling is None else settling.settled.value,
-        "fraction_settled_95": None if settling is None else [settling.settled.low, settling.settled.high],
-        "fraction_beyond_capacity": None if settling is None else settling.beyond_capacity,
-        "fraction_beyond_pressure": None if settling is None else settling.beyond_pressure,
-        "fraction_drifted": None if settling is None else settling.drifted,
-        "runs": 0 if settling is None else settling.runs,
-        "left_out": [],
-        "neglected": asdict(neglected_in_injections(tuning.models_used)),
-        "models_used": [asdict(used) for used in tuning.models_used],
-        **tuning.rows().document(),
-    }
 
 
 def _over_capacity(scene: Scene, beyond: float) -> str:

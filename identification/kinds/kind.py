@@ -117,7 +117,7 @@ class Observations:
     def __len__(self) -> int:
         return int(self.lines.size)
 
-    def where(self, chosen: BoolArray) -> Observations:
+    def where(self, chosen: BoolArray | IntArray) -> Observations:
         """Some of the rows."""
         return replace(
             self,
@@ -176,6 +176,8 @@ class Kind:
     """Whether a column `chamber` has the letter of the driven chamber."""
     balancer: str = ""
     """Whose scenes predict it; empty: of a test bench."""
+    any_rotor: bool = False
+    """Whether the scenes of a balancer without kinds of its own predict it too."""
     predict: Callable[[Any, Observations, Any], FloatArray] = _by_no_scene
     """Scene, observations and models (`device.Models`) to what was measured; a vibration counts as its real
     and its imaginary part."""

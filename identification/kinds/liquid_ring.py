@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import newton
 
+from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.identification.device import Device, Models, runs_back
 from ringbalance.identification.kinds.kind import (
@@ -37,6 +38,7 @@ from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.scene.arrays import ComplexArray, FloatArray, IntArray
 from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import SceneFile
 
 _DONE: Final = 1e-10
 """In ln u."""
@@ -50,13 +52,13 @@ _WEIGHTS: Final = (0.5, 1.0, 2.0)
 """Of what makes the vibration at the start."""
 
 
-def _trial_changes(scene: Scene, observations: Observations, _: object) -> FloatArray:
+def _trial_changes(scene: SceneFile, observations: Observations, _: object) -> FloatArray:
     """Change of the vibration by known unbalances, m.
 
     V = V0 + K U exp(j angle), K = kappa exp(-j lag).  V0 is that of the series and not of the scene: it is
     fitted with every parameter, and known beforehand to nobody.
     """
-    return parts(_change(scene, observations))
+    return parts(balancer_of(scene).rotor().influence * _weights(observations))
 
 
 def _trial_amplitudes(scene: Scene, observations: Observations, _: object) -> FloatArray:
@@ -67,12 +69,12 @@ def _trial_amplitudes(scene: Scene, observations: Observations, _: object) -> Fl
     identified by themselves.
     """
     start = cmath.rect(scene.rotor.initial_amplitude, scene.rotor.initial_phase)
-    return np.asarray(np.abs(start + _change(scene, observations)))
+    return np.asarray(np.abs(start + scene.rotor.influence * _weights(observations)))
 
 
-def _change(scene: Scene, observations: Observations) -> ComplexArray:
-    unbalance = observations.columns["unbalance"] * np.exp(1j * observations.columns["angle"])
-    return np.asarray(scene.rotor.influence * unbalance)
+def _weights(observations: Observations) -> ComplexArray:
+    """U exp(j angle), kg m."""
+    return np.asarray(observations.columns["unbalance"] * np.exp(1j * observations.columns["angle"]))
 
 
 def _effect_of_starts(observations: Observations) -> FloatArray:
@@ -85,7 +87,6 @@ def _injections(scene: Scene, observations: Observations, models: Models) -> Flo
     """Change of the vibration, K [M(x_after) - M(x_before)] e_pair, m.
 
     M is the moment of the pair of chambers that the gas acts on, e its direction.
-    Raises: ValueError: as `_chamber_numbers`.
     """
     device = Device.of(scene, models)
     fills, moment = device.once(observations, _fills), device.law.moment
@@ -98,14 +99,8 @@ def _injections(scene: Scene, observations: Observations, models: Models) -> Flo
 
 
 def _chamber_numbers(scene: Scene, observations: Observations) -> IntArray:
-    """Index of the driven chamber of each row. Raises: ValueError: a letter that the disc does not have."""
+    """Index of the driven chamber of each row."""
     letters = chamber_letters(scene.disc.chambers)
-    for line, letter in zip(observations.lines, observations.chamber, strict=True):
-        if letter not in letters:
-            raise ValueError(
-                f'{observations.file}: line {line}, column "chamber": "{letter}" is no chamber of the scene; '
-                f"allowed: {', '.join(letters)}"
-            )
     return np.array([letters.index(letter) for letter in observations.chamber], dtype=np.int64)
 
 
@@ -184,11 +179,8 @@ def _pressures(scene: Scene, observations: Observations, _: object) -> FloatArra
 def _ranges(scene: Scene) -> Ranges:
     gas, volume = scene.gas.pressure, chamber_volume(disc=scene.disc)
     fastest = math.sqrt(2 * gas / scene.liquid.density)
-    low, high = scene.controller.limit, max(scene.rotor.initial_amplitude, scene.controller.limit)
-    kappa = scene.rotor.influence_coefficient
     return {
-        **dict.fromkeys(("amplitude", "amplitude_before", "amplitude_after"), (low, high)),
-        "unbalance": (low / kappa, high / kappa),
+        **_ranges_of_rotor(scene),
         "gas_time": (scene.controller.minimum_gas_time, scene.controller.maximum_gas_time),
         "mass": (0.0, scene.liquid.density * volume),
         "volume": (0.0, volume),
@@ -196,6 +188,13 @@ def _ranges(scene: Scene) -> Ranges:
         "pressure_difference": (gas * 1e-3, gas),
         "pressure": (gas, gas),
     }
+
+
+def _ranges_of_rotor(scene: SceneFile) -> Ranges:
+    rotor = balancer_of(scene).rotor()
+    low, high, kappa = rotor.limit, max(rotor.amplitude, rotor.limit), abs(rotor.influence)
+    amplitudes = ("amplitude", "amplitude_before", "amplitude_after")
+    return {**dict.fromkeys(amplitudes, (low, high)), "unbalance": (low / kappa, high / kappa)}
 
 
 def _ranges_of_liquid(scene: Scene) -> Ranges:
@@ -208,8 +207,8 @@ def _ranges_of_liquid(scene: Scene) -> Ranges:
     }
 
 
-def _some_weights(scene: Scene) -> Grid:
-    unbalance = scene.rotor.initial_amplitude / scene.rotor.influence_coefficient
+def _some_weights(scene: SceneFile) -> Grid:
+    unbalance = abs(balancer_of(scene).rotor().unbalance)
     return {"unbalance": [x * unbalance for x in _WEIGHTS], "angle": [0.0, np.pi / 2, np.pi]}
 
 
@@ -235,11 +234,13 @@ _WEIGHT: Final = (
 LIQUID_RING: Final[Mapping[str, Kind]] = {
     "trial_weight": _kind(
         title="vibration with a known unbalance on the rotor",
+        any_rotor=True,
         columns=(*_WEIGHT, phase("phase [deg]")),
         predict=_trial_changes,
         informs=always("influence_coefficient", "lag_angle"),
         free=_effect_of_starts,
         offers=_some_weights,
+        ranges=_ranges_of_rotor,
     ),
     "trial_amplitude": _kind(
         title="amplitude alone of the vibration with a known unbalance on the rotor",

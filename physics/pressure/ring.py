@@ -8,7 +8,7 @@ moves unmodelled.  With gravity across the shaft each number is the mean over a 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -18,8 +18,9 @@ from ringbalance.mesh.chamber import default_cells
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
 from ringbalance.physics.convergence import GridConvergence, gci
 from ringbalance.physics.pressure.hydrostatics import displaced_by_gravity, hydrostatic_pressure
-from ringbalance.physics.pressure.ring_samples import QUANTITIES, WIDTH, Sample, Turn, empty_sample, turn_mean
+from ringbalance.physics.pressure.loads import liquid_integrals
 from ringbalance.physics.pressure.solve import RotatingLiquid
+from ringbalance.physics.pressure.surface import refined_surface, solve_at_rest
 from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.loop_models import Shaft
@@ -35,6 +36,40 @@ _AVERAGING = 1e-8
 _EPSILON = float(np.finfo(np.float64).eps)
 _CANCELLED = MappingProxyType({2: 20.0, 3: 1000.0})
 """Rounding of a film's coordinates, by dimension, over eps R2/depth."""
+QUANTITIES = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume", "resultant_force")
+"""In the order of `_Sample.values`."""
+_WIDTH = len(QUANTITIES)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Turn:
+    """Gravity as a chamber sees it over a turn."""
+
+    gravity: float
+    """m/s^2; zero: left out."""
+    shaft: Shaft
+    samples: int
+    """Even number of angles over a turn, for a horizontal shaft."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Sample:
+    """Means over a turn on one mesh."""
+
+    values: FloatArray
+    """In the order of `QUANTITIES`, SI totals, shape (5,)."""
+    ripple: FloatArray
+    """First harmonic of wall pressure (Pa) and moment (kg m), zero-to-peak, shape (2,)."""
+    surfaces: tuple[FloatArray, ...] = ()
+    """Found surfaces, one per angle, m; empty without gravity."""
+    status: Status
+    unknowns: int = 0
+    residual: float = 0.0
+    """Largest relative residual of the linear systems."""
+    flux_mismatch: float = 0.0
+    """Largest mismatch of flux and force on a found surface, relative."""
+    rounding: float = 0.0
+    """Largest rounding of a found surface's place, in mean depths."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +152,7 @@ def ring_quantities(
     if axial and len(meshes[0]) == 2:
         raise ValueError("gravity along the shaft needs dimension 3")
     liquid = RotatingLiquid(density=density, angular_velocity=angular_velocity)
-    turn = Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity, turn_samples))
+    turn = _Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity, turn_samples))
     case = _Case(disc=disc, liquid=liquid, fills=fills, meshes=meshes, turn=turn)
     return _collect(case, [_on_meshes(case, float(x), turn) for x in fills])
 
@@ -163,17 +198,17 @@ def _turn_samples(disc: Disc, liquid: RotatingLiquid, gravity: float, wanted: in
     return 2 * max(2, int(np.ceil(harmonics / 2)))
 
 
-def _on_meshes(case: _Case, x: float, turn: Turn) -> tuple[Sample, ...]:
+def _on_meshes(case: _Case, x: float, turn: _Turn) -> tuple[_Sample, ...]:
     """Samples on every mesh, finest first, each starting from the surfaces of the coarser one."""
     disc, liquid, meshes = case.disc, case.liquid, case.meshes
     if x == 0:
         half = float(half_angle(disc=disc, radius=disc.outer_radius))
         drop = liquid.density * disc.outer_radius * np.sin(half) / half
-        return (empty_sample(moment_per_volume=drop),) * len(meshes)
-    found: list[Sample] = []
+        return (_empty_sample(moment_per_volume=drop),) * len(meshes)
+    found: list[_Sample] = []
     for k, cells in reversed(list(enumerate(meshes))):
         halves = found and all(n == 2 * m for n, m in zip(cells, meshes[k + 1], strict=True))
-        sample = turn_mean(
+        sample = _turn_mean(
             disc=disc,
             liquid=liquid,
             fill_ratio=x,
@@ -185,9 +220,9 @@ def _on_meshes(case: _Case, x: float, turn: Turn) -> tuple[Sample, ...]:
     return tuple(reversed(found))
 
 
-def _collect(case: _Case, samples: Sequence[tuple[Sample, ...]]) -> RingQuantities:
+def _collect(case: _Case, samples: Sequence[tuple[_Sample, ...]]) -> RingQuantities:
     failed = [next((s.status for s in levels if not s.status.ok), Status()) for levels in samples]
-    still = Turn(gravity=0.0, shaft="horizontal", samples=2)
+    still = _Turn(gravity=0.0, shaft="horizontal", samples=2)
     kept = [
         levels if status.ok else _on_meshes(case, float(x), still)
         for levels, status, x in zip(samples, failed, case.fills, strict=True)
@@ -218,12 +253,12 @@ def _collect(case: _Case, samples: Sequence[tuple[Sample, ...]]) -> RingQuantiti
     )
 
 
-def _ripple(samples: Sequence[tuple[Sample, ...]]) -> dict[str, FloatArray]:
+def _ripple(samples: Sequence[tuple[_Sample, ...]]) -> dict[str, FloatArray]:
     ripple = np.array([levels[0].ripple for levels in samples])
     return {"wall_pressure": ripple[:, 0], "moment": ripple[:, 1]}
 
 
-def _statistics(samples: Sequence[tuple[Sample, ...]]) -> Statistics:
+def _statistics(samples: Sequence[tuple[_Sample, ...]]) -> Statistics:
     finest = [levels[0] for levels in samples]
     return Statistics(
         unknowns=max(sample.unknowns for sample in finest),
@@ -233,7 +268,7 @@ def _statistics(samples: Sequence[tuple[Sample, ...]]) -> Statistics:
 
 
 def _judge(
-    case: _Case, samples: Sequence[tuple[Sample, ...]], values: FloatArray
+    case: _Case, samples: Sequence[tuple[_Sample, ...]], values: FloatArray
 ) -> list[list[GridConvergence]]:
     sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in case.meshes]
     rows = []
@@ -265,10 +300,10 @@ class _Case:
     """Fill ratios, shape (n,)."""
     meshes: tuple[tuple[int, ...], ...]
     """Cells, finest first."""
-    turn: Turn
+    turn: _Turn
 
-    def rounding_bound(self, *, fill_ratio: float, samples: Sequence[Sample]) -> FloatArray:
-        """Bound of the rounding in every column of `Sample.values` on the finest mesh.
+    def rounding_bound(self, *, fill_ratio: float, samples: Sequence[_Sample]) -> FloatArray:
+        """Bound of the rounding in every column of `_Sample.values` on the finest mesh.
 
         eps [c R2/depth + 0.2 max(nodes along the depth, depth over the nodes' distance along the arc)^2],
         plus the rounding of a found surface, times the natural size of the column.
@@ -278,7 +313,7 @@ class _Case:
             times what was seen against closed forms between 1 and 180 degrees and depths down to 10 nm.
         """
         if fill_ratio == 0:
-            return np.zeros(WIDTH)
+            return np.zeros(_WIDTH)
         disc, cells = self.disc, self.meshes[0]
         a = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
         depth, arc = disc.outer_radius - a, 2 * a * float(half_angle(disc=disc, radius=a))
@@ -289,7 +324,7 @@ class _Case:
         return relative * _natural_size(case=self, fill_ratio=fill_ratio)
 
     def stated_widths(
-        self, *, samples: Sequence[tuple[Sample, ...]], widths: FloatArray, closed: BoolArray
+        self, *, samples: Sequence[tuple[_Sample, ...]], widths: FloatArray, closed: BoolArray
     ) -> FloatArray:
         """Half-widths of grid convergence, corrected where it does not cover the whole.
 
@@ -313,7 +348,7 @@ class _Case:
 
 
 def _natural_size(*, case: _Case, fill_ratio: float) -> FloatArray:
-    """Size that every column of `Sample.values` would have without symmetry, shape (5,)."""
+    """Size that every column of `_Sample.values` would have without symmetry, shape (5,)."""
     disc, density = case.disc, case.liquid.density
     a, outer = float(surface_radius(disc=disc, fill_ratio=fill_ratio)), disc.outer_radius
     volume = fill_ratio * chamber_volume(disc=disc)
@@ -326,7 +361,7 @@ def _natural_size(*, case: _Case, fill_ratio: float) -> FloatArray:
 
 def _displaced(case: _Case, x: float) -> FloatArray:
     if case.turn.gravity == 0:
-        return np.zeros(WIDTH)
+        return np.zeros(_WIDTH)
     pressure, moment, moment_per_volume = displaced_by_gravity(
         disc=case.disc, density=case.liquid.density, gravity=case.turn.gravity, fill_ratio=np.array([x])
     )[:, 0].tolist()
@@ -341,3 +376,72 @@ def _columns(
     """These in their columns, and as force the pressure on the largest wall."""
     force = pressure * disc.central_angle * disc.outer_radius * (disc.axial_width + disc.outer_radius)
     return np.array([volume, pressure, moment, moment_per_volume, force])
+
+
+def _turn_mean(
+    *,
+    disc: Disc,
+    liquid: RotatingLiquid,
+    fill_ratio: float,
+    cells: tuple[int, ...],
+    turn: _Turn,
+    coarser: _Sample | None = None,
+) -> _Sample:
+    """Solve on one mesh at every angle of gravity over half a turn and take the mean over the whole turn.
+
+    The other half of the turn is the mirror image of the first.
+    Args: `liquid`: without gravity. `coarser`: sample on half the cells, whose surfaces are a good start.
+    Source: trapezoidal rule over a period, exact up to harmonics of the order of the number of samples.
+    """
+    angles, weights = _angles(turn)
+    solutions = []
+    for k, angle in enumerate(angles):
+        start = refined_surface(coarser.surfaces[k]) if coarser and coarser.surfaces else None
+        frozen = replace(liquid, gravity=_gravity(turn, float(angle)))
+        solution = solve_at_rest(disc=disc, liquid=frozen, fill_ratio=fill_ratio, cells=cells, start=start)
+        if not solution.status.ok:
+            return _failed(solution.status)
+        solutions.append(solution)
+    totals = (
+        liquid_integrals(solution=s, density=liquid.density, axial_width=disc.axial_width) for s in solutions
+    )
+    rows = np.array([total.mirrored_alike for total in totals])
+    ripple = 2 * (weights * np.cos(angles)) @ rows[:, 1:3] if len(angles) > 1 else np.zeros(2)
+    return _Sample(
+        values=weights @ rows,
+        ripple=np.abs(ripple),
+        surfaces=tuple(s.chamber.surface_radius for s in solutions) if turn.gravity else (),
+        status=Status(),
+        unknowns=solutions[0].statistics.unknowns,
+        residual=max(s.statistics.relative_residual for s in solutions),
+        flux_mismatch=max(s.statistics.extra.get("surface_flux_mismatch", 0.0) for s in solutions),
+        rounding=max(s.statistics.extra.get("surface_rounding", 0.0) for s in solutions),
+    )
+
+
+def _empty_sample(*, moment_per_volume: float) -> _Sample:
+    """A chamber without liquid: all zero but the moment that the first drop would bring, kg/m^2."""
+    values = np.zeros(_WIDTH)
+    values[QUANTITIES.index("moment_per_volume")] = moment_per_volume
+    return replace(_failed(Status()), values=values)
+
+
+def _angles(turn: _Turn) -> tuple[FloatArray, FloatArray]:
+    if turn.gravity == 0 or turn.shaft == "vertical":
+        return np.zeros(1), np.ones(1)
+    half = turn.samples // 2
+    weights = np.full(half + 1, 2.0 / turn.samples)
+    weights[[0, -1]] /= 2
+    return np.linspace(0, np.pi, half + 1), weights
+
+
+def _gravity(turn: _Turn, angle: float) -> tuple[float, ...]:
+    if turn.gravity == 0:
+        return ()
+    if turn.shaft == "vertical":
+        return (0.0, 0.0, -turn.gravity)
+    return (turn.gravity * np.cos(angle), turn.gravity * np.sin(angle))
+
+
+def _failed(status: Status) -> _Sample:
+    return _Sample(values=np.zeros(_WIDTH), ripple=np.zeros(2), status=status)

@@ -55,6 +55,25 @@ class _FoundSurface:
     """Relative."""
 
 
+def solve_at_rest(
+    *,
+    disc: Disc,
+    liquid: RotatingLiquid,
+    fill_ratio: float,
+    cells: tuple[int, ...],
+    start: FloatArray | None = None,
+) -> PressureSolution:
+    """Pressure of the liquid below its free surface: concentric, or found where there is gravity.
+
+    Args: as `solve_with_gravity`.
+    """
+    if liquid.gravity:
+        return solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=cells, start=start)
+    radius = surface_radius(disc=disc, fill_ratio=fill_ratio)
+    chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
+    return solve_pressure(chamber=chamber, problem=liquid.problem())
+
+
 def solve_with_gravity(
     *,
     disc: Disc,

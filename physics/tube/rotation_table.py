@@ -26,7 +26,7 @@ import numpy.typing as npt
 from scipy.interpolate import RectBivariateSpline
 
 from ringbalance.physics.results import Estimate, Status, StatusCode
-from ringbalance.scene.arrays import BoolArray, FloatArray, clipped, distinct
+from ringbalance.scene.arrays import BoolArray, FloatArray, clipped
 
 Rows = Sequence[Mapping[str, str]]
 
@@ -112,7 +112,7 @@ def _columns(rows: Rows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray
 def _rectangle(table: str, rows: Rows) -> Rectangle:
     """Splines over the nodes; a = 0, where F = 1, is not in the file."""
     a, b, fine, relative = _columns(rows)
-    first, second = distinct(a), distinct(b)
+    first, second = np.unique(a), np.unique(b)
     i, j = np.searchsorted(first, a), np.searchsorted(second, b)
     gap, uncertainty_95 = (np.zeros((first.size + 1, second.size)) for _ in range(2))
     gap[i + 1, j] = np.log(fine) - _base_at(table, a, b)

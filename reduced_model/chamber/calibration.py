@@ -82,7 +82,7 @@ CHAMBER_INPUTS: Final = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class InputEffect:
+class _InputEffect:
     """Expanded uncertainties (95 %) by one input at a fixed fill ratio; arrays along the fill ratio."""
 
     wall_pressure: FloatArray
@@ -123,7 +123,7 @@ class ChamberCalibration:
     """Its numerical part, m."""
     moment_per_mass_inputs: float
     """Expanded uncertainty (95 %) of lambda by the scene's uncertain inputs, m."""
-    input_effects: Mapping[str, InputEffect]
+    input_effects: Mapping[str, _InputEffect]
     """Effect of each uncertain input."""
     status: Status
     """Of the solves or, where these are sound, of the ring's waves over the range of fills."""
@@ -205,7 +205,7 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     )
 
 
-def _input_effects(scene: Scene, fills: FloatArray) -> dict[str, InputEffect]:
+def _input_effects(scene: Scene, fills: FloatArray) -> dict[str, _InputEffect]:
     """By quantity, "fitted" for those that were fitted together; by closed forms."""
     places = np.append(fills, scene.disc.max_fill_ratio / 2)[:, None]
 
@@ -216,7 +216,7 @@ def _input_effects(scene: Scene, fills: FloatArray) -> dict[str, InputEffect]:
 
     effects = input_effects(scene, values, among=CHAMBER_INPUTS, errors=False)[1]
     return {
-        name: InputEffect(
+        name: _InputEffect(
             wall_pressure=each[0, :-1],
             hydrostatic_pressure=each[1, :-1],
             moment=each[2, :-1],
@@ -252,7 +252,7 @@ def _curve(
     inputs: list[FloatArray],
 ) -> Curve:
     value, n = estimate.value, nodes.size
-    table, missed = even_table(nodes, value[:n])
+    table, missed = _even_table(nodes, value[:n])
     if quantity == "hydrostatic_pressure":
         table, missed = pressure_table(scene, nodes, value[:n])
     return Curve(
@@ -298,7 +298,7 @@ _PLACES: Final = np.arange(1, 8) / 8
 """Within a piece, at which the table is compared."""
 
 
-def even_table(nodes: FloatArray, value: FloatArray) -> tuple[HermiteTable, FloatArray]:
+def _even_table(nodes: FloatArray, value: FloatArray) -> tuple[HermiteTable, FloatArray]:
     """A table through equally spaced fills, and its expanded uncertainty (95 %) between them, at each."""
     start, stop = float(nodes[0]), float(nodes[-1])
     table = table_from_samples(start=start, stop=stop, value=value)
@@ -315,11 +315,11 @@ def pressure_table(scene: Scene, nodes: FloatArray, value: FloatArray) -> tuple[
     """
     disc = scene.disc
     if disc.geometry is None:
-        return even_table(nodes, value)
+        return _even_table(nodes, value)
     scale = scene.liquid.density * scene.rotor.speed**2 / 2
     squares, error = _samples(disc, nodes.size, float(nodes[-1]))
     every = (squares.size - 1) // (nodes.size - 1)
-    change, missed = even_table(nodes, value - scale * squares[::every])
+    change, missed = _even_table(nodes, value - scale * squares[::every])
     fine = np.linspace(0.0, float(nodes[-1]), squares.size)
     table = table_from_samples(start=0.0, stop=float(nodes[-1]), value=scale * squares + change(fine))
     return table, scale * error + missed

@@ -23,7 +23,7 @@ from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.sloshing import HIGHEST_TRUE, LOWEST_TRUE, SMALL
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, closed_ring
 from ringbalance.reduced_model.chamber.values import chamber_closed_forms, drawing_shares, share_across
-from ringbalance.scene.arrays import FloatArray, distinct
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.rules.working import LARGEST_COMPRESSION, METAL_DENSITY, bulk_modulus
 
@@ -82,7 +82,7 @@ _CORIOLIS: Final = 2.0
 which a free particle follows gravity however thin the ring."""
 
 
-def surface_tension(scene: Scene) -> float:
+def _surface_tension(scene: Scene) -> float:
     """Surface tension to include; the scene gives none.
 
     Returns: N/m, an upper bound.
@@ -102,9 +102,9 @@ def capillary_share(scene: Scene, fills: FloatArray) -> Mapping[str, FloatArray]
     a = surface_radius(disc=disc, fill_ratio=fills)
     alpha = half_angle(disc=disc, radius=a)
     pressure = scene.liquid.density * square * (disc.outer_radius**2 - a**2) / 2
-    jump = surface_tension(scene) * (2 / disc.axial_width + 1 / (a * alpha) + 1 / a)
+    jump = _surface_tension(scene) * (2 / disc.axial_width + 1 / (a * alpha) + 1 / a)
     # A meniscus of length sqrt(sigma/(rho omega^2 a)) along each wall moves its own cross-section of liquid.
-    length = np.sqrt(surface_tension(scene) / (scene.liquid.density * square * a))
+    length = np.sqrt(_surface_tension(scene) / (scene.liquid.density * square * a))
     depth = disc.outer_radius - a
     moved = length**2 * (1 / (a * alpha * depth) + 2 / (disc.axial_width * depth))
     return {"pressures": jump / pressure, "moments": moved}
@@ -149,21 +149,21 @@ def unmodelled_fractions(scene: Scene, fills: FloatArray) -> Mapping[str, FloatA
     return found
 
 
-class Swing(NamedTuple):
+class _Swing(NamedTuple):
     """Amplification of gravity's ripple, natural frequencies being known to `FREQUENCY_UNCERTAINTY`."""
 
     lowest: FloatArray
     largest: FloatArray
 
 
-def amplification(scene: Scene, fills: FloatArray | float) -> Swing:
+def amplification(scene: Scene, fills: FloatArray | float) -> _Swing:
     """Estimate of how much the swinging liquid enlarges gravity's ripple, |1/(1 - (1 + i d)/s^2)|.
 
     Returns: Factors along the fills; 1 on a vertical shaft.
     Source: s^2 = k tanh(k ln(R2/a)), the lowest mode without Coriolis force, driven at s = 1; d, `_swing`.
     """
     if scene.environment.shaft == "vertical":
-        return Swing(np.ones(np.shape(fills)), np.ones(np.shape(fills)))
+        return _Swing(np.ones(np.shape(fills)), np.ones(np.shape(fills)))
     disc = scene.disc
     depth = np.log(disc.outer_radius / surface_radius(disc=disc, fill_ratio=fills))
     return _swing(scene, np.pi / disc.central_angle, depth, disc.central_angle / 2)
@@ -191,7 +191,7 @@ def wave_height(scene: Scene, fills: FloatArray) -> FloatArray:
     return np.asarray(height * tilt / (scene.disc.outer_radius - a[..., 0]))
 
 
-def _swing(scene: Scene, k: FloatArray | float, depth: FloatArray, alpha: FloatArray | float) -> Swing:
+def _swing(scene: Scene, k: FloatArray | float, depth: FloatArray, alpha: FloatArray | float) -> _Swing:
     """|1/(1 - (1 + i d)/s^2)| over what s may be, of modes cos(k phi) of rings ln(R2/a) deep.
 
     d = (E/2)^(1/2) [2 R2/B + q/depth + (1 - q)/alpha], q = 2 k depth/sinh(2 k depth), is what Stokes layers
@@ -206,7 +206,7 @@ def _swing(scene: Scene, k: FloatArray | float, depth: FloatArray, alpha: FloatA
     damping, square = np.sqrt(ekman / 2) * layers, k * np.tanh(k * depth)
     ends = LOWEST_TRUE**2 * square, HIGHEST_TRUE**2 * square
     low, high, nearest = (1 / np.hypot(1 - 1 / end, damping / end) for end in (*ends, np.clip(1.0, *ends)))
-    return Swing(np.minimum(low, high), np.asarray(nearest))
+    return _Swing(np.minimum(low, high), np.asarray(nearest))
 
 
 def _wave_mean(scene: Scene, fills: FloatArray) -> FloatArray:
@@ -237,10 +237,10 @@ def range_fills(scene: Scene) -> FloatArray:
     fills, resonant = scene.disc.max_fill_ratio * np.array(FILLS), _resonant_fill(scene)
     if resonant is None or not fills[0] < resonant < fills[-1]:
         return fills
-    return distinct(np.append(fills, resonant))
+    return np.unique(np.append(fills, resonant))
 
 
-class GravityShares(NamedTuple):
+class _GravityShares(NamedTuple):
     """Estimated contributions of gravity, relative, of wall pressure or moment, at the worst fill."""
 
     mean: float
@@ -250,10 +250,10 @@ class GravityShares(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def gravity_shares(scene: Scene) -> GravityShares:
+def gravity_shares(scene: Scene) -> _GravityShares:
     """Over `chamber_fills`, or over the whole range where no ring is closed."""
     if scene.environment.gravity == 0:
-        return GravityShares(mean=0.0, swing=0.0)
+        return _GravityShares(mean=0.0, swing=0.0)
     closed = chamber_fills(scene)
     fills = closed if closed.size else range_fills(scene)
     wall, moment, ratio = chamber_closed_forms(scene=scene, fill_ratio=fills)
@@ -270,7 +270,7 @@ def gravity_shares(scene: Scene) -> GravityShares:
             np.maximum(np.abs(lowest - 1), np.abs(largest - 1)) + _SWING_FLOOR,
         ),
     )
-    return GravityShares(
+    return _GravityShares(
         mean=float(np.max(np.abs(np.array(changes) - 1))),
         swing=max(float(np.max(ripple) + np.max(ripple * swing)) for ripple, swing in parts),
     )

@@ -117,7 +117,6 @@ PLANT: Final = np.dtype(
 X: Final = 0
 U: Final = 1
 P: Final = 2
-Q: Final = 3
 WORK: Final = 6
 _MOTION_REAL: Final = (
     "opens",  # s from now until the valve of `chamber` opens, infinite for never

@@ -22,13 +22,14 @@ from ringbalance.reduced_model.injection.column import (
     crest_slopes,
     crest_table,
     ends,
+    gas_volume,
     hydrostatic,
     law_log,
+    line_rates,
     quasi_steady,
     tube_loss,
 )
 from ringbalance.reduced_model.injection.dynamics import P, Record, U, X
-from ringbalance.reduced_model.injection.gas import gas_volume, line_rates
 from ringbalance.reduced_model.tube.regime import crest_margins
 from ringbalance.scene.platform.compiled import in_place, inlined
 

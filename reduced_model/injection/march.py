@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ringbalance.reduced_model.injection.column import open_to_gas
+from ringbalance.reduced_model.injection.column import end_pressure, near_end, open_to_gas
 from ringbalance.reduced_model.injection.dynamics import EVENTS, Event, P, Record, U, X
 from ringbalance.reduced_model.injection.events import (
     EMPTY,
@@ -35,7 +35,6 @@ from ringbalance.reduced_model.injection.events import (
     starts,
     would_start,
 )
-from ringbalance.reduced_model.injection.gas import end_pressure, near_end
 from ringbalance.reduced_model.injection.lift import arrived, front, set_out, shown
 from ringbalance.reduced_model.injection.step import (
     BETWEEN,

@@ -103,8 +103,6 @@ class PairState:
     """Sum of the two fill ratios, constant."""
     primed: bool = False
     """Whether the connecting tube holds a continuous column."""
-    driven_first: bool = True
-    """Whether the last gas went into the chamber on the positive side."""
     motion: Motion = field(default_factory=Motion)
     """Velocity, gas and valves, where the plant models them; at rest otherwise."""
 

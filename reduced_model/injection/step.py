@@ -13,9 +13,17 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.reduced_model.injection.column import accelerations, hydrostatic, steady, tabled
+from ringbalance.reduced_model.injection.column import (
+    accelerations,
+    gas_volume,
+    hydrostatic,
+    line_rates,
+    near_end,
+    steady,
+    tabled,
+)
 from ringbalance.reduced_model.injection.dynamics import WORK, P, Record, U, X
-from ringbalance.reduced_model.injection.gas import gas_volume, line_rates, near_end, rest_after
+from ringbalance.reduced_model.injection.gas_at_rest import rest_after
 from ringbalance.reduced_model.injection.lift import lift_rates, lift_speed
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import in_place, inlined

@@ -171,6 +171,34 @@ class CalibratedLaw:
         sides = [variant._directed(asked, reverse=reverse) for variant in self.variants]
         return flow.widened(sides[::2], sides[1::2])
 
+    def cavity_margin(
+        self, *, fills: tuple[float, float], gas_pressure: float, reverse: bool
+    ) -> tuple[float, float] | tuple[None, None]:
+        """`siphon_margin` over a primed tube's cavity in one direction, Pa; both None without a crest."""
+        head, path = self.heads.to_crest(reverse=reverse), self.path
+        if head is None:
+            return None, None
+        x, y, p = (np.asarray(v, dtype=np.float64) for v in (*fills, gas_pressure))
+        asked = Conditions(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=np.asarray(True))
+        drive = self.drive(asked, reverse=reverse)
+        driving, (low, high) = driving_pressure(path, drive.ends), possible_cavity(path, drive.ends)
+        margin, width = siphon_margin(
+            path=path,
+            heads=self.heads,
+            hump_head=head,
+            inputs=self.inputs,
+            drive=drive,
+            at_rest=np.asarray(crest_margins(path, drive.ends)[0]),
+            spread=np.asarray(max(path.released, 1 - path.released) * (high - low)),
+            velocity=velocity_of(table=self.heads.head, head=driving / self.density, where=driving > 0),
+        )
+        sides = [
+            each.cavity_margin(fills=fills, gas_pressure=gas_pressure, reverse=reverse)[0] or 0.0
+            for each in self.variants
+        ]
+        by_fitted = ((high - low) / 2 for low, high in zip(sides[::2], sides[1::2], strict=True))
+        return float(margin), math.hypot(float(width), *by_fitted)
+
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)
 
@@ -188,61 +216,6 @@ def _joined(forward: DirectedFlow, backward: DirectedFlow, reverse: BoolArray) -
         uncertainty=np.where(reverse, backward.half_width, forward.half_width),
         primed=np.where(reverse, backward.primed, forward.primed),
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class DirectedState:
-    """One state of the tube, in one direction of flow."""
-
-    reverse: bool
-    """Whether the opposite chamber is upstream."""
-    conditions: Conditions
-    drive: Drive
-    """What acts on the tube in that direction, arrays of shape ()."""
-
-    @classmethod
-    def of(
-        cls, *, law: CalibratedLaw, fills: tuple[float, float], gas_pressure: float, reverse: bool
-    ) -> DirectedState:
-        """Take a state in one direction of flow."""
-        x, y, p = (np.asarray(v, dtype=np.float64) for v in (*fills, gas_pressure))
-        asked = Conditions(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=np.asarray(True))
-        return cls._at(asked, law=law, reverse=reverse)
-
-    @classmethod
-    def _at(cls, asked: Conditions, *, law: CalibratedLaw, reverse: bool) -> DirectedState:
-        return cls(reverse=reverse, conditions=asked, drive=law.drive(asked, reverse=reverse))
-
-    @property
-    def ends(self) -> TubeEnds:
-        """Pressures at the tube's ends."""
-        return self.drive.ends
-
-    def margin(self, *, law: CalibratedLaw) -> tuple[float, float] | tuple[None, None]:
-        """`siphon_margin` over the cavity of a primed tube, Pa; both None without a crest.
-
-        The state is that in the direction of the driving pressure.
-        """
-        path, head = law.path, law.heads.to_crest(reverse=self.reverse)
-        if head is None:
-            return None, None
-        driving, (low, high) = driving_pressure(path, self.ends), possible_cavity(path, self.ends)
-        margin, width = siphon_margin(
-            path=law.path,
-            heads=law.heads,
-            hump_head=head,
-            inputs=law.inputs,
-            drive=self.drive,
-            at_rest=np.asarray(crest_margins(path, self.ends)[0]),
-            spread=np.asarray(max(path.released, 1 - path.released) * (high - low)),
-            velocity=velocity_of(table=law.heads.head, head=driving / law.density, where=driving > 0),
-        )
-        sides = [
-            self._at(self.conditions, law=each, reverse=self.reverse).margin(law=each)[0] or 0.0
-            for each in law.variants
-        ]
-        by_fitted = ((high - low) / 2 for low, high in zip(sides[::2], sides[1::2], strict=True))
-        return float(margin), math.hypot(float(width), *by_fitted)
 
 
 # Density and speed act on both chambers and on the tube at once, so the law handles them separately.

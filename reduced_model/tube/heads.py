@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -43,8 +42,6 @@ _LEVELLED: Final = 0.05
 _RISE: Final = 1e-9
 """Of ln of a head over ln u, below what tables resolve."""
 
-LogHead = Callable[[FloatArray], FloatArray]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TubeHeads:
@@ -76,7 +73,7 @@ class TubeHeads:
         start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
         places = np.linspace(start, stop, 2 * nodes - 1)
         with np.errstate(invalid="ignore", divide="ignore"):
-            values = [head(places) for head in log_heads(scene)[:3]]
+            values = log_heads(scene, places)
         if not np.all(np.isfinite(values)):
             raise _inconsistent(scene)
         if scene.tube.model_errors:
@@ -198,33 +195,18 @@ def _fraction_uncertainty(
     return np.asarray(np.sqrt(squares))
 
 
-def log_heads(scene: Scene) -> list[LogHead]:
-    """Heads over ln u, natural logarithms, from shared states.
-
-    Returns: Between the chambers and, with a crest, from either chamber to the lowest pressure at it, and
-        from the driven chamber to the end of its arc.
-    """
-    tube = scene.tube
-
-    @lru_cache(maxsize=32)
-    def state(log_velocity: bytes) -> TubeState:
-        return with_errors(tube=tube, state=tube_state(scene, np.exp(np.frombuffer(log_velocity))))
-
-    def between(log_velocity: FloatArray) -> FloatArray:
-        return np.asarray(np.log((state(log_velocity.tobytes()).k + 1) / 2) + 2 * log_velocity)
-
-    def to_crest(seen: Tube, order: int, *, lowest: bool = True) -> LogHead:
-        def head(log_velocity: FloatArray) -> FloatArray:
-            there = state(log_velocity.tobytes())
-            there = replace(there, bends=there.bends[::order])
-            u = np.exp(log_velocity)
-            return np.log(crest_head(scene=scene, tube=seen, state=there, velocity=u, lowest=lowest))
-
-        return head
-
+def log_heads(scene: Scene, log_velocity: FloatArray) -> list[FloatArray]:
+    """Natural logarithms of the heads: between the chambers and, with a crest, from either chamber to it."""
+    tube, u = scene.tube, np.exp(log_velocity)
+    state = corrected_state(scene, u)
+    between = np.log((state.k + 1) / 2) + 2 * log_velocity
     if tube.hump_radius is None:
         return [between]
-    return [between, to_crest(tube, 1), to_crest(reversed_tube(tube), -1), to_crest(tube, 1, lowest=False)]
+    back = reversed_tube(tube), replace(state, bends=state.bends[::-1])
+    to_crest = (
+        crest_head(scene=scene, tube=seen, state=there, velocity=u) for seen, there in ((tube, state), back)
+    )
+    return [between, *map(np.log, to_crest)]
 
 
 def crest_head(

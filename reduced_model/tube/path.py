@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.physics.tube.state import TubeState
-from ringbalance.scene.arrays import BoolArray, FloatArray, distinct, plain
+from ringbalance.scene.arrays import BoolArray, FloatArray, plain
 from ringbalance.scene.keys.derivations import shortest_path
 from ringbalance.scene.models import Tube
 
@@ -37,13 +37,13 @@ class Places:
 
         Args: `points`: number of even places. `doubled`: further shares at which something changes at once.
         """
-        twice = distinct(np.concatenate([[0.0, 1.0], *_bend_shares(tube), doubled]))
+        twice = np.unique(np.concatenate([[0.0, 1.0], *_bend_shares(tube), doubled]))
         crest = () if tube.hump_radius is None else crest_span(tube)
         kept = np.append(twice, crest)
         even = np.linspace(0.0, 1.0, points)
         # An even place that differs from another by rounding only would stand for nothing.
         even = even[np.min(np.abs(even[:, None] - kept), axis=1) > _SAME]
-        once = np.concatenate([even, distinct([share for share in crest if share not in twice])])
+        once = np.concatenate([even, np.unique([share for share in crest if share not in twice])])
         share = np.concatenate([once, twice, twice])
         after = np.concatenate([np.zeros(once.size + twice.size), np.ones(twice.size)]).astype(np.bool_)
         order = np.lexsort((after, share))

@@ -14,7 +14,7 @@ from matplotlib.patches import Circle
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
-from ringbalance.controller.eccentric_mass.study import DRAWS
+from ringbalance.controller.eccentric_mass.requirements import DRAWS
 from ringbalance.reports import summary
 from ringbalance.reports.figure import INK, Drawing, curve, draw, line
 from ringbalance.reports.pages import measured

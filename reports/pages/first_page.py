@@ -8,7 +8,6 @@ from typing import Final
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.members import ASSUMED_INFLUENCE
 from ringbalance.controller.tuning.highest_pressure import highest_pressure
-from ringbalance.controller.tuning.tune import tuning_document
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reports.pages.requirements import (
     CAPACITY,
@@ -83,7 +82,7 @@ def _collect(work: Work) -> Record:
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in work.scene.uncertainty),
         "time_limit_s": work.scene.run.time_limit,
         "other_reading": _other_reading(work),
-        "tuning": tuning_document(work.tuning),
+        "tuning": work.tuning.to_dict(),
     }
 
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from matplotlib.axes import Axes
 
-from ringbalance.identification.against_fit import AgainstFit
+from ringbalance.identification.documents import AgainstFit
 from ringbalance.reports.figure import (
     FOUND,
     INK,

@@ -35,7 +35,7 @@ from ringbalance.reports.figure import (
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.numbers import given
 from ringbalance.scene.models import Scene
-from ringbalance.verification import paper_numbers
+from ringbalance.verification import papers
 from ringbalance.verification.loops import AMPLITUDES, GAINS, PHASES, calibration_of, loop_scene, run_loop
 from ringbalance.verification.runner import paper_scene
 
@@ -110,8 +110,8 @@ def _velocities(scene: Scene, calibration: Calibration) -> list[Record]:
     law, fill = calibration.flow_law, np.linspace(0.0, scene.disc.max_fill_ratio, _FILLS)
     rise = law.hydrostatic_pressure(fill) - law.hydrostatic_pressure(scene.disc.max_fill_ratio - fill)
     found = []
-    printed = (paper_numbers.DEPARTURE_LOW, paper_numbers.DEPARTURE_HIGH)
-    pressures = (paper_numbers.LOW_PRESSURE, paper_numbers.HIGH_PRESSURE)
+    printed = (papers.DEPARTURE_LOW, papers.DEPARTURE_HIGH)
+    pressures = (papers.LOW_PRESSURE, papers.HIGH_PRESSURE)
     for pressure, departure in zip(pressures, printed, strict=True):
         eq_19 = calibration.paper_law.evaluate(fill_ratio=fill, gas_pressure=pressure).velocity
         levels = paper.velocity_from_pressures(
@@ -168,7 +168,7 @@ def _reading(scene: Scene, model: BalancerModel) -> Record:
         disc=scene.disc, density=scene.liquid.density, fill_ratio=scene.disc.max_fill_ratio
     )
     return {
-        "chamber_moment_eq_7_kg_m": paper_numbers.CHAMBER_MOMENT.value,
+        "chamber_moment_eq_7_kg_m": papers.CHAMBER_MOMENT.value,
         "chamber_moment_literal_kg_m": paper.PAPER_LAMBDA * float(mass),
         "chamber_moment_transferred_kg_m": paper.PAPER_LAMBDA * float(mass) / 2,
         "onset_transferred_s_per_m": onset(model),

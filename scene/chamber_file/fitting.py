@@ -16,15 +16,14 @@ import numpy as np
 from ringbalance.scene.arrays import FloatArray, IntArray, clipped
 from ringbalance.scene.chamber_file.contents import Body
 from ringbalance.scene.chamber_file.elements import corners_of, edges_of
-from ringbalance.scene.chamber_file.names import PORT
 from ringbalance.scene.chamber_file.record import OUTER_WALL, Axis, MeshUnit
+from ringbalance.scene.chamber_file.soundness import PORT
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.kinds import Finding, failed_checks, written
-from ringbalance.scene.rules.shape import SIZE_CHECKS
+from ringbalance.scene.rules.shape import DRAWING_ROUNDING, SIZE_CHECKS
 from ringbalance.scene.units import DIMENSIONS
 
-DRAWING_ROUNDING: Final = 1e-5
 _DIGITS: Final = 7
 """Of dimensions read off a mesh: rounding in a file shall not put a port just outside its wall."""
 _LEAST_FACING: Final = 0.01

@@ -23,9 +23,8 @@ from ringbalance.scene.chamber_file.contents import Body, Contents, MeshFileErro
 from ringbalance.scene.chamber_file.elements import dimension
 from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, Placed, placed, port_radius, unfitting
 from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
-from ringbalance.scene.chamber_file.names import boundaries_of
 from ringbalance.scene.chamber_file.record import ChamberGeometry, MeshKeys
-from ringbalance.scene.chamber_file.topology import Facets, oriented
+from ringbalance.scene.chamber_file.soundness import Facets, boundaries_of, oriented
 from ringbalance.scene.chamber_file.vtu_file import read_vtu
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of

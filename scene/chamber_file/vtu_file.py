@@ -23,7 +23,7 @@ import numpy.typing as npt
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.contents import Contents, Elements, MeshFileError, numbers_in, whole
 from ringbalance.scene.chamber_file.elements import MOST_NODES, NODES, VTK_KINDS
-from ringbalance.scene.chamber_file.names import KNOWN_NAMES
+from ringbalance.scene.chamber_file.soundness import KNOWN_NAMES
 
 _MOST_CONNECTED: Final = 12 * MOST_NODES
 """Numbers in the connectivity: of cells of ten nodes, which share most of them."""

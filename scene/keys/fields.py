@@ -282,34 +282,22 @@ def half_width(dimension: str | None) -> Reader:
 
     Its values are (half-width, whether it is relative); SI when it is not.
     """
-    allowed = _half_width_allowed(dimension)
+    name = DIMENSIONS[dimension].name if dimension else "a bare number"
+    units = f" in {DIMENSIONS[dimension].unit_names}" if dimension else ""
+    allowed = f'a percentage of the quantity such as "5 %", or {name}{units}'
 
     def read(value: object) -> tuple[float, bool]:
         relative = isinstance(value, str) and value.rstrip().endswith("%")
-        if dimension is None and not relative:
-            width = _number(value, allowed)
-        else:
-            width = _absolute(value, "share" if relative or dimension is None else dimension, allowed)
+        kind = "share" if relative else dimension
+        try:
+            width = parse_quantity(value, kind) if kind else _number(value, allowed)
+        except FieldError as error:
+            raise FieldError(error.problem, allowed) from error
         if width < 0 or (relative and width >= 1):
             raise FieldError("an uncertainty must be at least 0 and below 100 %", allowed)
         return width, relative
 
-    own = DIMENSIONS[dimension].name if dimension else "a bare number"
-    return Reader(read=read, allowed=allowed, summary=f"a percentage, or {own}")
-
-
-def _absolute(value: object, dimension: str, allowed: str) -> float:
-    try:
-        return parse_quantity(value, dimension)
-    except FieldError as error:
-        raise FieldError(error.problem, allowed) from error
-
-
-def _half_width_allowed(dimension: str | None) -> str:
-    own = "a bare number"
-    if dimension is not None:
-        own = f"{DIMENSIONS[dimension].name} in {DIMENSIONS[dimension].unit_names}"
-    return f'a percentage of the quantity such as "5 %", or {own}'
+    return Reader(read=read, allowed=allowed, summary=f"a percentage, or {name}")
 
 
 OneLine = Annotated[str, text()]

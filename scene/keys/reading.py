@@ -132,13 +132,29 @@ def read_document(
     document: Mapping[str, Any], *, file: str, schema: Schema
 ) -> tuple[Reading, tuple[Fault, ...]]:
     """What could be read of a TOML document, and an error for each value, key or table that could not."""
-    values, every = _read_tables(document, schema)
-    rejected, uninspected = _split(every)
-    broken = frozenset(_paths(rejected, document, schema))
+    values, rejected = _read_tables(document, schema)
+    unknown = [each for each in rejected if each.kind == "unknown"][:_MOST_GUESSED]
+    meant = {each.place: _meant(each, schema) for each in unknown}
+    broken = frozenset(".".join(map(str, each.place[:2])) for each in rejected) | {
+        path
+        for place, path in meant.items()
+        if path and len(place) <= 2 and not _stands_there(document, path)
+    }
     known = {path: value for path, value in values.items() if not {path, path.split(".")[0]} & broken}
     reading = Reading(file=file, document=document, values=known, broken=broken, schema=schema)
-    named = (_fault(each, file, schema, said=_said(each, schema)) for each in _reported(rejected, schema))
-    return reading, (*named, *(_fault(each, file, schema, said=("unknown", "")) for each in uninspected))
+    # A key that is missing where a misspelt one was meant for it is one error, not two.
+    reported = [
+        each
+        for each in rejected
+        if each.kind != "missing" or ".".join(map(str, each.place)) not in meant.values()
+    ]
+    return reading, tuple(_fault(each, file, schema, meant=meant.get(each.place)) for each in reported)
+
+
+def _stands_there(document: Mapping[str, Any], path: str) -> bool:
+    table, _, key = path.rpartition(".")
+    content = document.get(table, {}) if table else document
+    return isinstance(content, Mapping) and key in content
 
 
 def _read_tables(document: Mapping[str, Any], schema: Schema) -> tuple[dict[str, Any], list[_Rejected]]:
@@ -210,45 +226,22 @@ def _read_entries(content: object, takes: Entries, place: Place) -> tuple[Any, l
     return (None if rejected else tuple(takes.record(**values) for values, _ in read)), rejected
 
 
-def _split(rejected: list[_Rejected]) -> tuple[list[_Rejected], list[_Rejected]]:
-    """What is to be inspected, and the unknown keys and tables that are too many for it."""
-    many = [each for each in rejected if each.kind == "unknown"][_MOST_GUESSED:]
-    skipped = {id(each) for each in many}
-    return [each for each in rejected if id(each) not in skipped], many
-
-
-def _reported(rejected: list[_Rejected], schema: Schema) -> list[_Rejected]:
-    """All but the missing keys that a misspelt one was meant for."""
-    meant = {_meant(each, schema) for each in rejected if each.kind == "unknown"}
-    return [
-        each for each in rejected if each.kind != "missing" or ".".join(map(str, each.place)) not in meant
-    ]
-
-
-def _paths(rejected: list[_Rejected], document: Mapping[str, Any], schema: Schema) -> Iterator[str]:
-    """Paths of what was rejected, and those meant by a misspelt or misplaced key: neither is missing."""
-    for each in rejected:
-        yield ".".join(map(str, each.place[:2]))
-        if each.kind == "unknown" and len(each.place) <= 2:
-            meant = _meant(each, schema)
-            table, _, key = meant.rpartition(".")
-            content = document.get(table, {}) if table else document
-            if meant and not (isinstance(content, Mapping) and key in content):
-                yield meant
-
-
-def _fault(rejected: _Rejected, file: str, schema: Schema, *, said: tuple[str, str]) -> Fault:
+def _fault(rejected: _Rejected, file: str, schema: Schema, *, meant: str | None) -> Fault:
+    """Args: `meant`: path that an unknown key was probably meant for; None where that was not looked for."""
     place, tables = rejected.place, schema.tables
     is_table = str(place[0]) in tables or (len(place) == 1 and isinstance(rejected.content, Mapping))
     table, keys = (str(place[0]), place[1:]) if is_table else ("", place)
-    problem, allowed = said
+    problem, allowed = rejected.problem, rejected.allowed
+    if rejected.kind == "missing":
+        problem, allowed = "it is needed here", schema.key_at(place).takes.allowed
+    elif rejected.kind == "unknown":
+        problem, allowed = ("unknown", "") if meant is None else _unknown(rejected, schema, meant)
     value = MISSING if rejected.kind == "missing" else toml_text(rejected.content)
-    unknown_table = not keys and rejected.kind == "unknown"
     return Fault(
         file=file,
         table=table if table in tables else toml_key(table) if table else "",
         key=_key_text(keys),
-        value="" if unknown_table else value,
+        value=value if keys or rejected.kind != "unknown" else "",
         problem=problem,
         allowed=allowed,
     )
@@ -262,19 +255,11 @@ def _key_text(keys: Place) -> str:
     return text
 
 
-def _said(rejected: _Rejected, schema: Schema) -> tuple[str, str]:
-    if rejected.kind == "unknown":
-        return _unknown(rejected, schema)
-    if rejected.kind == "missing":
-        return "it is needed here", schema.key_at(rejected.place).takes.allowed
-    return rejected.problem, rejected.allowed
-
-
-def _unknown(rejected: _Rejected, schema: Schema) -> tuple[str, str]:
+def _unknown(rejected: _Rejected, schema: Schema, meant: str) -> tuple[str, str]:
+    """What is said of an unknown key or table, and the names that are known there."""
     place = rejected.place
     whole = len(place) == 1 and isinstance(rejected.content, Mapping)
     kind, known = ("table", list(schema.tables)) if whole else ("key", schema.names_at(place[:-1]))
-    meant = _meant(rejected, schema)
     table, _, key = meant.rpartition(".")
     hint = ""
     if meant and key == place[-1]:

@@ -18,7 +18,7 @@ _NARROWEST = 1 / 2000
 """Opening over depth of a chamber below which rounding costs a pressure field more than seven digits."""
 _SHALLOWEST = 1e-8
 """Depth over outer radius of a full ring; calibration goes down to a fortieth of its fill."""
-_DRAWING_ROUNDING = 1e-5
+DRAWING_ROUNDING = 1e-5
 """Relative: "1.5708 rad" is a right angle."""
 
 
@@ -88,7 +88,7 @@ def _plates_leave_room(thickness: float, inner: float, angle: float) -> Finding 
 def _chambers_fit(angle: float, chambers: int) -> Finding | None:
     """n theta <= 2 pi, within the rounding of a drawing."""
     limit = 2 * math.pi / chambers
-    if angle <= limit * (1 + _DRAWING_ROUNDING):
+    if angle <= limit * (1 + DRAWING_ROUNDING):
         return None
     return Finding(
         problem=f"{chambers} chambers of this angle do not fit into 360 deg",

@@ -1,9 +1,11 @@
-"""The package map, the links, the data files, the version and the locks say the same thing everywhere."""
+"""Package map, links, data files, version and locks agree everywhere; set-up says what is missing."""
 
 from __future__ import annotations
 
 import fnmatch
 import re
+import subprocess
+import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -166,3 +168,36 @@ def test_lock_faults_are_seen(text: str) -> None:
     assert [lock_faults(sound), pin_errors(sound, "3.12", ["NumPy>=2.0"])] == [[], []]
     pinned = "\n".join(line for line in text.splitlines() if not line.startswith("-"))
     assert lock_faults(text) + pin_errors(pinned, "3.12", ["numpy>=2.0"]) != []
+
+
+@pytest.mark.parametrize("sudo", [True, False])
+def test_the_line_to_run_says_sudo_only_where_it_exists(root: Path, tmp_path: Path, sudo: bool) -> None:
+    for name, line in (("id", "echo 1000"), *([("sudo", "exit 1")] if sudo else [])):
+        (tmp_path / name).write_text(f"#!/bin/sh\n{line}\n")
+        (tmp_path / name).chmod(0o755)
+    command = ["/bin/sh", "-c", ". tools/debian_packages.sh; debian_packages 'a thing' some-package"]
+    result = subprocess.run(
+        command, cwd=root, env={"PATH": str(tmp_path)}, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 1
+    assert "a thing is missing" in result.stdout
+    assert ("sudo" in result.stdout) == sudo
+    assert ("as root" in result.stdout) != sudo
+    assert "apt-get install -y --no-install-recommends some-package" in result.stdout
+
+
+def test_no_room_is_imported_by_its_folder_s_name(root: Path, room_order: tuple[str, ...]) -> None:
+    code = """
+import importlib, sys
+for room in sys.argv[1:]:
+    try:
+        importlib.import_module(room)
+    except ImportError as error:
+        assert f"import ringbalance.{room}, not {room}" in str(error), error
+    else:
+        raise AssertionError(room)
+"""
+    rooms = (*room_order, "scenes")
+    command = [sys.executable, "-P", "-c", f"import sys; sys.path.insert(0, {str(root)!r})\n{code}", *rooms]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr

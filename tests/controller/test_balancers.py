@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from balancer_checks import CHECKS, Check, short
 from ball_balancer.scene_keys import EXAMPLE, BallScene
@@ -13,6 +15,7 @@ import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Balancer, balancer_of
 from ringbalance.controller.compare import compare
+from ringbalance.identification.kinds.registry import template
 from ringbalance.scene.loader import bundled_scene, load_scene, scene_from
 from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.registry import balancers, register
@@ -94,3 +97,29 @@ def test_an_error_of_its_scene_names_the_key() -> None:
     wrong = EXAMPLE.replace(b'mass = "1 g"', b'mass = "1 mm"')
     with pytest.raises(rb.SceneError, match=r"\[balls\] mass"):
         scene_from(content=wrong, file="balls.toml")
+
+
+def test_the_third_balancer_is_fitted(balls: BallScene, tmp_path: Path) -> None:
+    """Trial weights are of any rotor; other data tell nothing of balls."""
+    weights = 1e-6 * np.array([0.0, 100, 100, 200, 0])
+    angles = np.radians([0.0, 0, 120, 240, 0])
+    seen = 4e-5 + 0.52 * np.exp(-1j * math.radians(172)) * weights * np.exp(1j * angles)
+    seen += 1e-8 * np.array([1, -1j, 1j, -1, 1 + 1j])
+    rows = [
+        f"{1e6 * u:g},{math.degrees(a):g},{1e6 * abs(v):.4f},{math.degrees(np.angle(v)):.4f},a,{i}"
+        for i, (u, a, v) in enumerate(zip(weights, angles, seen, strict=True))
+    ]
+    path = tmp_path / "weights.csv"
+    head, _, _ = template("trial_weight").partition("##")
+    head = head.replace('source = ""', 'source = "rig"').replace(
+        'amplitude = ""', 'amplitude = "zero_to_peak"'
+    )
+    columns = "unbalance [g*mm],angle [deg],amplitude [um],phase [deg],series,note"
+    path.write_text("\n".join([f"{head}{columns}", *rows]) + "\n", encoding="utf-8")
+    found = {each.name: each for each in rb.fit(balls, path).parameters}
+    assert list(found) == ["rotor.influence_coefficient", "rotor.lag_angle"]
+    assert found["rotor.influence_coefficient"].value == pytest.approx(0.52, rel=1e-3)
+    assert math.degrees(found["rotor.lag_angle"].value) == pytest.approx(172, abs=0.2)
+    path.write_text(template("run_up") + "90,400,10,a\n", encoding="utf-8")
+    with pytest.raises(rb.SceneError, match="tell nothing of"):
+        rb.fit(balls, path)

@@ -17,8 +17,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.verification.reference.marched import marched
-from ringbalance.verification.reference.transfers import Drive, adaptive_ode
+from ringbalance.verification.reference.transfers import Drive, adaptive_ode, marched
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 

@@ -131,7 +131,10 @@ def test_what_cannot_be_compared(driven: EccentricScene, paper_scene: Scene) -> 
     with pytest.raises(SceneError, match="never becomes steady"):
         rotor_of(replace(driven, rotor=replace(driven.rotor, damping=0.0)))
     with pytest.raises(SceneError, match="does not vibrate"):
-        rotor_of(replace(driven, imbalance=replace(driven.imbalance, mass=0.0)))
+        compare(
+            balancer_of(replace(driven, imbalance=replace(driven.imbalance, mass=0.0))),
+            balancer_of(paper_scene),
+        )
     ahead = replace(paper_scene, rotor=replace(paper_scene.rotor, lag_angle=-0.3))
     with pytest.raises(SceneError, match=r"no bearing of this kind gives a lag of -17\.19 deg"):
         moved(driven, ahead)

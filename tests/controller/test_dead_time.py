@@ -24,7 +24,7 @@ from ringbalance.controller.tuning.dead_time import (
 )
 from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.controller.tuning.result import Tuning
-from ringbalance.controller.tuning.tune import tune, tuning_document
+from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.gas_line import line_answers, line_warning, standing_amplitude
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_middle
@@ -171,7 +171,7 @@ def tuned(scene: Scene, model: BalancerModel) -> Tuning:
 
 def test_tune_recommends_what_its_runs_confirm(slow: Scene, calibrated: BalancerModel) -> None:
     found = tuned(slow, calibrated)
-    document = tuning_document(found)
+    document = found.to_dict()
     assert "gas_time_offset" in found.status
     assert document["change"] == offset_text(found.dead_times)
     assert document["gas_time_offset_s"] == list(found.dead_times) == document["dead_time_s"]
@@ -241,7 +241,7 @@ def test_what_its_runs_refute_is_not_recommended(
     limit = found.search.limit
     assert limit == 50.0 * coarse.controller.limit
     assert f"raise controller.limit to {limit * 1e6:.3g} um" in found.status
-    json.dumps(tuning_document(found), allow_nan=False)
+    json.dumps(found.to_dict(), allow_nan=False)
     assert tuned(with_settings(coarse, limit=limit), calibrated).settling is not None
     # The smallest injection moves more than the scene's limit to either side.
     assert float(np.max(vibration_rates(slow, calibrated))) * 0.06 > 2 * coarse.controller.limit

@@ -15,8 +15,8 @@ from scipy.integrate import quad
 from ringbalance.physics.gas import GasLine, flow_shape
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection import column
+from ringbalance.reduced_model.injection.column import line_rates
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.gas import line_rates
 from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage, pass_time
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime

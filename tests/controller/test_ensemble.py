@@ -1,30 +1,29 @@
-"""Ensembles against `simulate` member by member, and what a ensemble of members says."""
+"""Ensembles against `simulate` member by member, and what an ensemble of members says."""
 
 from __future__ import annotations
 
-import cmath
 import json
 import math
 import tracemalloc
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.ensemble import (
-    _NOISE,
     QUANTILES,
     Probability,
+    member_noise,
     simulate_ensemble,
     simulate_members,
 )
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.loop_records import MomentTable, pair_moment
 from ringbalance.controller.members import BLOCK, Members, MemberUncertainty
-from ringbalance.controller.rotor import Sensor
+from ringbalance.controller.rotor import Sensor, noisy_sensor
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw, PaperMoment, paper_model
@@ -45,18 +44,7 @@ def noisy(scene: Scene, *, time_limit: float = 12.0, **controller: Any) -> Scene
 
 def sensor_of(scene: Scene, *, seed: int, member: int) -> Sensor:
     """The sensor that one member sees."""
-    key = np.random.SeedSequence(entropy=seed, spawn_key=(member, _NOISE))
-    random = np.random.Generator(np.random.PCG64(key))
-
-    def measure(time: float, vibration: complex) -> Measurement:
-        a, b = random.standard_normal(2)
-        return Measurement(
-            time=time,
-            amplitude=abs(abs(vibration) + scene.sensor.amplitude_noise * float(a)),
-            phase=cmath.phase(vibration) + scene.sensor.phase_noise * float(b),
-        )
-
-    return measure
+    return noisy_sensor(sensor=scene.sensor, seed=member_noise(seed, member))
 
 
 def alone(scene: Scene, model: BalancerModel, members: Members, member: int) -> tuple[Scene, BalancerModel]:
@@ -111,7 +99,7 @@ def test_every_member_is_the_scalar_run(scene: Scene, chambers: int, noise: bool
     model = paper_model(asked)
     members = various(asked, size=size)
     residuals = members.residual_fill(asked, law=model.flow)
-    found = simulate_members(asked, model, members=members, seed=4)
+    found = simulate_members(asked, model, members=members, noise=partial(member_noise, 4))
     outcomes = []
     for member in range(size):
         own_scene, own_model = alone(asked, model, members, member)
@@ -166,7 +154,7 @@ def test_liquid_that_runs_back_is_followed(
 
     asked = noisy(scene, time_limit=10.0, proportional=0.1e6, limit=0.6e-6)
     other = replace(model, flow=replace(laws["levelling"], function=levelling))
-    found = simulate_members(asked, other, size=4, seed=9)
+    found = simulate_members(asked, other, size=4, noise=partial(member_noise, 9))
     for member in range(4):
         run = simulate(asked, other, sensor=sensor_of(asked, seed=9, member=member))
         assert found.samples[member] == len(run.samples)
@@ -196,7 +184,10 @@ def test_a_larger_ensemble_begins_with_the_smaller(scene: Scene, model: Balancer
     asked = noisy(scene, time_limit=10.0)
     uncertainty_95 = MemberUncertainty.of(asked, model)
     drawn = Members.drawn(asked, uncertainty_95=uncertainty_95, seed=1, block=0)
-    a, b = (simulate_members(asked, model, members=drawn.first(n), seed=1) for n in (7, 50))
+    a, b = (
+        simulate_members(asked, model, members=drawn.at(slice(n)), noise=partial(member_noise, 1))
+        for n in (7, 50)
+    )
     assert np.array_equal(a.settling_time, b.settling_time[:7])
     counted = simulate_ensemble(asked, model, 50, 1)
     assert counted.settled.value == pytest.approx(b.settled.mean())
@@ -300,5 +291,3 @@ def test_the_document_is_small_clean_json(scene: Scene, model: BalancerModel) ->
 def test_no_members_are_refused(scene: Scene, model: BalancerModel, n: int) -> None:
     with pytest.raises(ValueError, match="members"):
         simulate_ensemble(scene, model, n, 0)
-    with pytest.raises(ValueError, match="at most"):
-        simulate_members(scene, model, size=BLOCK + 1)

@@ -21,8 +21,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.marched import marched
-from ringbalance.verification.reference.transfers import Drive, adaptive_ode, closed_form
+from ringbalance.verification.reference.transfers import Drive, adaptive_ode, closed_form, marched
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.ensemble import simulate_members
+from ringbalance.controller.ensemble import member_noise, simulate_members
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
@@ -239,8 +240,8 @@ def test_members_that_settled_keep_their_time(scene: Scene, model: BalancerModel
     rate = factor(scene, model).rate
     for h in (0.6, 1.3, 1.8):
         asked = noisy(scene, time_limit=12.0, proportional=h / rate)
-        short = simulate_members(asked, model, size=200, seed=1)
-        long = simulate_members(doubled(asked), model, size=200, seed=1)
+        short = simulate_members(asked, model, size=200, noise=partial(member_noise, 1))
+        long = simulate_members(doubled(asked), model, size=200, noise=partial(member_noise, 1))
         assert np.array_equal(short.settling_time[short.settled], long.settling_time[short.settled])
         assert bool(np.any(short.settled)) == (h < 1.4)
 

@@ -21,16 +21,6 @@ def printed(scene: Scene, model: BalancerModel) -> str:
     return stream.getvalue()
 
 
-def test_a_run_in_words_and_tables(scene: Scene, model: BalancerModel) -> None:
-    text = printed(scene, model)
-    assert "settled" in text
-    assert "siphon" in text
-    assert "paper" in text
-    # Fill of chamber B before and after its first operation, by the closed form of Eqs. 19 and 20.
-    assert "0.25000" in text
-    assert "█" in text
-
-
 def test_a_run_without_injections_and_one_with_too_many(scene: Scene, model: BalancerModel) -> None:
     quiet = replace(scene, rotor=replace(scene.rotor, initial_amplitude=0.0))
     assert "Injections" not in printed(quiet, model)

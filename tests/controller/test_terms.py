@@ -1,4 +1,4 @@
-"""What a run leaves out is named, with an estimate by hand."""
+"""What a run leaves out is named, with an estimate by hand; runs at both ends of a range of gas lines."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ringbalance.controller.document import simulation_document
+from ringbalance.controller.document import line_runs, line_runs_table, simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.terms import run_models
 from ringbalance.reduced_model.calibration import calibrate
@@ -77,3 +77,33 @@ def test_a_run_states_a_bound_on_what_it_neglects_and_the_status_of_its_models(s
     status = simulation_document(simulate(slow, calibrated))["model_status"]
     assert status["code"] == "out_of_range"
     assert "waves" in status["text"]
+
+
+def test_a_line_that_is_not_given_is_run_at_both_ends(scene: Scene, calibrated: BalancerModel) -> None:
+    gain = 0.3 * scene.controller.proportional
+    asked = replace(
+        scene,
+        controller=replace(scene.controller, proportional=gain),
+        run=replace(scene.run, time_limit=15.0),
+    )
+    nominal = simulate(asked, calibrated)
+    runs = line_runs(nominal)
+    slow, fast = runs["slow"], runs["fast"]
+    rows = nominal.to_dict()["gas_line_runs"]
+    assert [row["end"] for row in rows] == [row[0] for row in line_runs_table(runs).rows] == [*runs]
+    assert [row["conductance_m3_per_s_Pa"] for row in rows] == pytest.approx([0.2e-8, 1e-8])
+    assert [row["valve_lag_s"] for row in rows] == pytest.approx([10e-3, 5e-3])
+    assert [row["final_amplitude_m"] for row in rows] == [slow.amplitude[-1], fast.amplitude[-1]]
+    assert set(slow.terms_modelled) == {
+        "tube inertia",
+        "gas filling",
+        "valve lag",
+        "liquid held in the tube",
+    }
+    # Late gas moves less in the same valve-open time, and the slow line is later.
+    moved = [run.injections[0].fill_before - run.injections[0].fill_after for run in (slow, fast, nominal)]
+    assert 0 < moved[0] < moved[1] < 1.1 * moved[2]
+    given = replace(asked, gas=replace(asked.gas, conductance=1e-8, critical_ratio=0.3, valve_lag=5e-3))
+    assert line_runs(simulate(given, calibrated)) == {}
+    # The fast end is the run of a scene that gives that line.
+    assert simulate(given, calibrated).amplitude[-1] == fast.amplitude[-1]

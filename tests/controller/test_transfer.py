@@ -13,13 +13,13 @@ from ringbalance import bundled_scene, load_scene
 from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.marched import marched
 from ringbalance.verification.reference.transfers import (
     Drive,
     Integrator,
     adaptive_ode,
     closed_form,
     explicit_segments,
+    marched,
 )
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
@@ -149,14 +149,6 @@ def test_the_receiving_chamber_runs_full_before_the_driven_one_is_empty(drive_by
     assert transfer.fill == pytest.approx([0.2, 0.1], abs=1e-12)
 
 
-def test_nothing_moves_with_the_gas_off(drive: Drive) -> None:
-    for integrator in (closed_form, MARCH, adaptive_ode(), explicit_segments(10)):
-        transfer = integrator(replace(drive, gas_pressure=0.0, fill=0.4), TIMES)
-        assert transfer.event is Event.BLOCKED
-        assert np.all(transfer.fill == 0.4)
-        assert not transfer.primed
-
-
 def test_a_full_tube_levels_its_pair_with_the_gas_off(drive_by: DriveBy) -> None:
     t = np.array([0.5, 2.0])
     for start in (0.1, 0.4):
@@ -165,30 +157,13 @@ def test_a_full_tube_levels_its_pair_with_the_gas_off(drive_by: DriveBy) -> None
         assert transfer.primed
 
 
-def test_an_empty_chamber_gives_nothing(drive: Drive) -> None:
-    for integrator in (closed_form, MARCH, adaptive_ode(), explicit_segments(10)):
-        transfer = integrator(replace(drive, fill=0.0), TIMES)
-        assert transfer.event is Event.EMPTY
-        assert np.all(transfer.fill == 0.0)
-
-
-def test_only_the_papers_law_has_a_closed_form(drive_by: DriveBy) -> None:
-    with pytest.raises(ValueError, match="no closed form"):
-        closed_form(drive_by("constant"), TIMES)
-
-
-@pytest.mark.parametrize("times", [[], [-1.0], [1.0, 0.5], [math.nan]])
-def test_instants_must_ascend_from_zero(drive: Drive, times: list[float]) -> None:
-    for integrator in (closed_form, MARCH, adaptive_ode(), explicit_segments(10)):
-        with pytest.raises(ValueError, match="instants"):
-            integrator(drive, np.array(times))
-
-
-def test_bad_settings_of_integrators_are_refused() -> None:
-    with pytest.raises(ValueError, match="segments"):
-        explicit_segments(0)
-    with pytest.raises(ValueError, match="tolerance"):
-        adaptive_ode(tolerance=0.0)
+@pytest.mark.parametrize("integrator", [closed_form, MARCH, adaptive_ode(), explicit_segments(10)])
+def test_nothing_moves_without_gas_or_liquid(drive: Drive, integrator: Integrator) -> None:
+    for fill, pressure, event in ((0.4, 0.0, Event.BLOCKED), (0.0, drive.gas_pressure, Event.EMPTY)):
+        transfer = integrator(replace(drive, fill=fill, gas_pressure=pressure), TIMES)
+        assert transfer.event is event
+        assert np.all(transfer.fill == fill)
+        assert not transfer.primed
 
 
 def test_explicit_segments_near_a_stall_lose_their_order(drive_by: DriveBy) -> None:

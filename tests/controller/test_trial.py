@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import pytest
-
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.built_in import Memory, Trial
 
@@ -71,12 +69,3 @@ def test_it_rests_at_the_limit_and_keeps_its_chamber() -> None:
     assert command == Command(resting=True)
     _, again = TRIAL.step(state, Measurement(time=1.0, amplitude=0.2e-6, phase=0.0))
     assert (again.valves[0].chamber, again.valves[0].duration) == (1, 0.01)
-
-
-@pytest.mark.parametrize("bad", [None, Measurement(time=1.0, amplitude=math.nan, phase=0.0)])
-def test_a_bad_sample_holds_everything(bad: Measurement | None) -> None:
-    state = tried((1e-6, 2e-6))
-    held, command = TRIAL.step(state, bad)
-    assert held is state
-    assert command.valves == ()
-    assert not command.resting

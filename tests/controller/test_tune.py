@@ -27,7 +27,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.result import Tuning
-from ringbalance.controller.tuning.tune import tune, tuning_document
+from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
@@ -164,8 +164,8 @@ def test_the_recommended_gain_settles_its_runs(found: Tuning) -> None:
 
 
 def test_the_same_scene_gives_the_same_document(scene: Scene, found: Tuning) -> None:
-    assert tuning_document(tuned(scene)) == tuning_document(found)
-    json.dumps(tuning_document(found), allow_nan=False)
+    assert tuned(scene).to_dict() == found.to_dict()
+    json.dumps(found.to_dict(), allow_nan=False)
 
 
 def test_what_runs_reach_with_a_slow_gas_line_is_within_reach(scene: Scene, found: Tuning) -> None:
@@ -209,7 +209,7 @@ def test_gas_that_drives_nothing_gives_no_gain(scene: Scene, calibrated: Balance
     answer = tune(weak, calibrated)
     assert answer.gain is None
     assert "drives no liquid" in answer.status
-    json.dumps(tuning_document(answer), allow_nan=False)
+    json.dumps(answer.to_dict(), allow_nan=False)
 
 
 def test_a_short_time_limit_leaves_quantiles_open(scene: Scene) -> None:
@@ -250,7 +250,7 @@ def test_bad_input_is_exit_code_two(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 def test_a_tuning_states_what_its_runs_leave_out(scene: Scene) -> None:
     """The liquid that each injection lifts to the crest takes most of one at the limit, so runs have it."""
-    document = tuning_document(tune(scene, calibrated_model(scene), members=8))
+    document = tune(scene, calibrated_model(scene), members=8).to_dict()
     assert document["neglected"]["terms"] == ()
     held = next(row for row in document["models_used"] if row["term"] == "liquid held in the tube")
     assert held["estimated_contribution"] > 0.5

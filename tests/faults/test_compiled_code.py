@@ -268,7 +268,9 @@ def test_a_real_run_survives_a_damaged_cache_and_ctrl_c(tmp_path: Path) -> None:
     folder = tmp_path / "cache"
     shutil.copytree(code_root(), folder / "ringbalance")
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
-    for path in folder.rglob("run_loop.measure*.nbc"):
+    damaged = list(folder.rglob("run._measure*.nbc"))
+    assert damaged
+    for path in damaged:
         path.write_bytes(b"")
     again = subprocess.run(
         [*command, str(scene), "--json"], env=environment, capture_output=True, timeout=900, check=False

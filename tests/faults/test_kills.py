@@ -126,25 +126,3 @@ def test_a_killed_run_leaves_nothing(number: int, tmp_path_factory: pytest.TempP
     assert "resource_tracker" not in told
     assert wait_until(lambda: not living(mark), limit=5), living(mark)
     assert [path.name for path in out.iterdir() if not path.name.startswith(".ringbalance-")] == ["mine"]
-
-
-def test_the_next_run_removes_what_a_killed_one_left(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    command = [sys.executable, "-c", READY, "plot", PAPER, "--out", str(out)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
-        assert wait_until(lambda: any(out.glob(".ringbalance-*/files/fields/*.vtu")), limit=60)
-        child.kill()
-    left = set(out.iterdir())
-    assert left
-    time.sleep(1.1)
-
-    def written() -> list[Path]:
-        found = out.glob(".ringbalance-*/files/fields/*.vtu")
-        # The killed one may have written both files before the signal reached it.
-        return [path for path in found if not left & set(path.parents)]
-
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
-        assert wait_until(lambda: len(written()) == 2, limit=60)
-        child.send_signal(signal.SIGTERM)
-    assert list(out.iterdir()) == []

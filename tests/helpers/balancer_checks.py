@@ -92,6 +92,12 @@ def a_run_answers_what_its_row_says(balancer: Balancer) -> None:
     assert "time_s" in columns
 
 
+def a_row_does_not_depend_on_the_trace(balancer: Balancer) -> None:
+    plain, traced = (balancer.run({}, Draws.first(2, devices=False), trace=kept) for kept in (False, True))
+    np.testing.assert_array_equal(plain.settled, traced.settled)
+    np.testing.assert_allclose(plain.settling_time, traced.settling_time, rtol=1e-4)
+
+
 def only_asked_for_runs_are_kept(balancer: Balancer) -> None:
     assert balancer.run({}, Draws.first(1, devices=False)).traced == ()
 
@@ -152,6 +158,7 @@ CHECKS: tuple[Check, ...] = (
     devices_differ,
     a_time_is_finite_where_it_settled,
     a_run_answers_what_its_row_says,
+    a_row_does_not_depend_on_the_trace,
     only_asked_for_runs_are_kept,
     its_requirements_are_judged_by_its_reach_and_its_run,
     its_own_rotor_is_the_common_one,

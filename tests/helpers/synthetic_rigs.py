@@ -17,12 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.controller.rotor import chamber_letters
-from ringbalance.identification.balancers import model_errors
 from ringbalance.identification.device import Models
-from ringbalance.identification.fitting import fit
+from ringbalance.identification.fitting import FitResult, fit
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS
-from ringbalance.identification.result import FitResult
+from ringbalance.identification.parameters import MODEL_ERRORS
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
@@ -90,7 +89,7 @@ def _drawn(scene: Scene, random: np.random.Generator) -> Scene:
     truth = scene
     for name, width in half_widths(scene).items():
         truth = shifted(scene=truth, quantity=name, change=width / NORMAL_95 * random.standard_normal())
-    for name in model_errors(scene):
+    for name in MODEL_ERRORS:
         truth = with_model_error(truth, name, float(np.clip(random.standard_normal(), *_DRAWN)))
     return truth
 

@@ -11,8 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.identification.criticism.law_comparison import NEEDED, LawComparison, summaries
-from ringbalance.identification.criticism.residual_tests import LEVEL, Criticism, LinearFit, _runs_probability
+from ringbalance.identification.criticism import (
+    LEVEL,
+    NEEDED,
+    Criticism,
+    LawComparison,
+    LinearFit,
+    _runs_probability,
+    summaries,
+)
 from ringbalance.scene.arrays import FloatArray
 
 ROWS = 60

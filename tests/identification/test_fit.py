@@ -11,14 +11,12 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student_t
 from synthetic_rigs import covered, fitted, measured, observations, rig
 
-from ringbalance.identification.balancers import model_errors
 from ringbalance.identification.device import Models
-from ringbalance.identification.fitting import fit, problem_of
+from ringbalance.identification.fitting import FitResult, fit, problem_of
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.parameters import FitError
-from ringbalance.identification.result import FitResult
+from ringbalance.identification.parameters import MODEL_ERRORS, FitError
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
@@ -75,7 +73,7 @@ def test_trial_weights_are_a_linear_regression(paper_scene: Scene) -> None:
     assert kappa.value == pytest.approx(abs(k), rel=1e-6)
     assert lag.value == pytest.approx(-np.angle(k), rel=1e-5)
     assert found.noise[0].standard_deviation == pytest.approx(noise, rel=1e-3)
-    assert found.noise[0].freedom == pytest.approx(freedom, rel=1e-3)
+    assert found.noise[0].degrees_of_freedom == pytest.approx(freedom, rel=1e-3)
     reach = student_t.ppf(0.975, freedom) * width
     assert np.array(kappa.interval) - kappa.value == pytest.approx([-reach, reach], rel=0.02)
     assert np.array(lag.interval) - lag.value == pytest.approx([-reach / abs(k), reach / abs(k)], rel=0.02)
@@ -150,7 +148,7 @@ def posterior(scene: Scene, data: Observations, result: FitResult, sd: float) ->
     """
     kind, models = KINDS["injection"], Models.of(scene)
     covariance = sd**2 * np.eye(2 * len(data))
-    for name in model_errors(scene):
+    for name in MODEL_ERRORS:
         low, high = (kind.predict(with_model_error(scene, name, n), data, models) for n in (-1, 1))
         covariance += np.outer(high - low, high - low) / 4
     precision = np.linalg.inv(covariance)

@@ -14,11 +14,9 @@ import generated_docs
 import pytest
 
 from ringbalance.cli import main
-from ringbalance.identification.balancers import informed
-from ringbalance.identification.criticism.law_comparison import LawComparison
-from ringbalance.identification.criticism.residual_tests import Criticism
-from ringbalance.identification.criticism.review import Review
+from ringbalance.identification.criticism import Criticism, LawComparison, Review
 from ringbalance.identification.kinds.registry import KINDS, template
+from ringbalance.identification.parameters import informed
 from ringbalance.identification.reading import observations_of, read_observations
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene

@@ -8,10 +8,9 @@ from pathlib import Path
 import foreign_rigs
 import pytest
 
-from ringbalance.identification.criticism.review import Review
-from ringbalance.identification.fitting import fit
+from ringbalance.identification.criticism import Review
+from ringbalance.identification.fitting import FitResult, fit
 from ringbalance.identification.reading import read_observations
-from ringbalance.identification.result import FitResult
 from ringbalance.scene import load_scene
 
 JUDGED = ("lambda_factor", "bore", "influence_coefficient", "lag_angle")

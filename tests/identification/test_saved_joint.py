@@ -14,11 +14,11 @@ from synthetic_rigs import Rig, fitted, rig
 
 from ringbalance.cli import main
 from ringbalance.controller.members import Members, MemberUncertainty
-from ringbalance.identification.balancers import changed
 from ringbalance.identification.device import Device, Models
+from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS
-from ringbalance.identification.result import FitResult
+from ringbalance.identification.parameters import changed
 from ringbalance.identification.saving import save_result
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.tube.loss import MODEL_CAUSES

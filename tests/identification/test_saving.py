@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
+from ringbalance.identification.fitting import FittedParameter
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import Profile
-from ringbalance.identification.result import FittedParameter
 from ringbalance.identification.saving import _fitted_scene, _found_from, _save_fitted
 from ringbalance.scene import SceneError, bundled_scene, load_scene
 from ringbalance.scene.describe import scene_table

@@ -16,10 +16,9 @@ import numpy as np
 import pytest
 from synthetic_rigs import observations
 
-from ringbalance.identification.fitting import fit
+from ringbalance.identification.fitting import FitResult, fit
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.result import FitResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ringbalance.mesh.bent_tube import Segment
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
-from ringbalance.verification.reference.bent_tube import BentTubeFlow, bend_shift, rotation_with_curvature
+from ringbalance.verification.reference.bent_tube import (
+    BentTubeFlow,
+    Segment,
+    bend_shift,
+    rotation_with_curvature,
+)
 
 COARSE = SectionMesh(around=2, across=2, wall_ratio=3.0)
 STRAIGHT = (Segment(length=2.0, cells=2),)

@@ -26,13 +26,6 @@ def _depth(froude: float) -> float:
     return float(draw_down_depth(flow_rate=_rate(froude), acceleration=PULL, bore=BORE))
 
 
-def test_the_depth_at_10_000_rpm_by_hand() -> None:
-    # Q = 17.3 m/s * pi/4 * (1.5 mm)^2 = 3.057e-5 m^3/s; g_c = (1047.2 1/s)^2 * 44.5 mm = 4.880e4 m/s^2;
-    # Q^2/g_c = 1.9150e-14 m^5, its fifth root 1.8048 mm, times 0.6884 = 1.2424 mm.
-    depth = draw_down_depth(flow_rate=3.057e-5, acceleration=PULL, bore=BORE)
-    assert float(depth) == pytest.approx(1.2424e-3, rel=2e-4)
-
-
 @pytest.mark.parametrize("froude", [1.5, 4.0, 20.0])
 def test_a_fast_flow_draws_gas_as_a_point_sink_does(froude: float) -> None:
     rate = _rate(froude)

@@ -21,8 +21,8 @@ from ringbalance.verification.navier_stokes.end_losses import (
     EndMesh,
     solve_end,
 )
+from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution
-from ringbalance.verification.navier_stokes.system import FlowSystem
 
 
 def _cells(end: End) -> EndMesh:

@@ -24,16 +24,11 @@ from ringbalance.physics.pressure.solve import (
 )
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.orders import field_error
-from ringbalance.verification.reference.manufactured import Manufactured
+from ringbalance.scene.models import Disc
+from ringbalance.verification.finite_elements import field_error
+from ringbalance.verification.reference.pressure import Manufactured
 
 WATER = RotatingLiquid(density=1000.0, angular_velocity=1047.2)
-
-
-@pytest.fixture(scope="module")
-def disc(paper_scene: Scene) -> Disc:
-    return paper_scene.disc
 
 
 def wavy(disc: Disc, cells: tuple[int, ...]) -> ChamberMesh:

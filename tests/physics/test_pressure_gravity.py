@@ -12,15 +12,10 @@ from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import find_surface, refined_surface, solve_with_gravity
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.rings import mutated_force
+from ringbalance.scene.models import Disc
+from ringbalance.verification.finite_elements import mutated_force
 
 G = 9.80665
-
-
-@pytest.fixture(scope="module")
-def disc(paper_scene: Scene) -> Disc:
-    return paper_scene.disc
 
 
 def across(speed: float, angle: float) -> RotatingLiquid:

@@ -13,21 +13,16 @@ from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
 from ringbalance.physics.convergence import GridVerdict
 from ringbalance.physics.pressure import solve
-from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
-from ringbalance.physics.pressure.ring_samples import QUANTITIES, liquid_integrals
+from ringbalance.physics.pressure.loads import liquid_integrals
+from ringbalance.physics.pressure.ring import QUANTITIES, RingQuantities, ring_quantities
 from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.rings import mutated_force
+from ringbalance.scene.models import Disc
+from ringbalance.verification.finite_elements import mutated_force
 
 RHO, OMEGA = 1000.0, 10_000 * np.pi / 30
 FILLS = np.linspace(0.0, 0.5, 11)
-
-
-@pytest.fixture(scope="module")
-def disc(paper_scene: Scene) -> Disc:
-    return paper_scene.disc
 
 
 @pytest.fixture(scope="module")

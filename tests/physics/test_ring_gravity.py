@@ -11,19 +11,14 @@ from scipy.optimize import brentq
 
 from ringbalance.mesh.chamber import chamber_mesh
 from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_first_moment, surface_radius
+from ringbalance.physics.pressure.loads import liquid_integrals
 from ringbalance.physics.pressure.ring import ring_quantities
-from ringbalance.physics.pressure.ring_samples import liquid_integrals
 from ringbalance.physics.pressure.solve import RotatingLiquid, solve_pressure
 from ringbalance.physics.results import StatusCode
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Disc, Scene
+from ringbalance.scene.models import Disc
 
 RHO, G = 1000.0, 9.80665
-
-
-@pytest.fixture(scope="module")
-def disc(paper_scene: Scene) -> Disc:
-    return paper_scene.disc
 
 
 def without_gravity(disc: Disc, fill: float, omega: float) -> dict[str, float]:

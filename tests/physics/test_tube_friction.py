@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,12 +10,7 @@ from fluids.friction import Churchill_1977
 
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty, turbulent_share
 
-DATA = Path(__file__).parent / "data"
-
-
-def rows(name: str) -> list[dict[str, float]]:
-    lines = [line for line in (DATA / name).read_text().splitlines() if not line.startswith("#")]
-    return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(lines)]
+Rows = Callable[[str], list[dict[str, float]]]
 
 
 @pytest.mark.parametrize("roughness", [0.0, 1e-4, 1e-3, 0.05])
@@ -28,7 +22,7 @@ def test_without_rotation_it_is_churchills_formula(roughness: float) -> None:
     )
 
 
-def test_literature_smooth_pipe_of_mckeon_et_al_2004() -> None:
+def test_literature_smooth_pipe_of_mckeon_et_al_2004(rows: Rows) -> None:
     data = [row for row in rows("mckeon2004_oregon_smooth.csv") if row["Re"] > 2000]
     re, measured = (np.array([row[key] for row in data]) for key in ("Re", "f_darcy"))
     error = np.abs(friction_factor(reynolds=re, relative_roughness=0.0) - measured)
@@ -40,7 +34,7 @@ def test_literature_smooth_pipe_of_mckeon_et_al_2004() -> None:
     assert np.max(error / half_width) > 0.5
 
 
-def test_literature_laminar_part_of_mckeon_et_al_2004_reads_high() -> None:
+def test_literature_laminar_part_of_mckeon_et_al_2004_reads_high(rows: Rows) -> None:
     data = [row for row in rows("mckeon2004_oregon_smooth.csv") if 200 < row["Re"] < 1500]
     ratio = [
         row["f_darcy"] / float(friction_factor(reynolds=row["Re"], relative_roughness=0)) for row in data
@@ -49,7 +43,7 @@ def test_literature_laminar_part_of_mckeon_et_al_2004_reads_high() -> None:
     assert max(ratio) < 1.15
 
 
-def test_literature_rough_pipes_of_nikuradse_1933() -> None:
+def test_literature_rough_pipes_of_nikuradse_1933(rows: Rows) -> None:
     for row in rows("nikuradse1933_rough.csv"):
         rough = 1 / (2 * row["R_over_ks"])
         f = float(friction_factor(reynolds=row["Re"], relative_roughness=rough))

@@ -15,9 +15,12 @@ from hypothesis import strategies as st
 
 import ringbalance
 from ringbalance.physics.tube.local_losses import bend_loss, bend_uncertainty
-from ringbalance.physics.tube.loss import TubeLoss, tube_loss
+from ringbalance.physics.tube.loss import MODEL_CAUSES, TubeLoss, model_parts, tube_loss, with_errors
+from ringbalance.physics.tube.state import TubeState, tube_state
+from ringbalance.scene.fitted import ModelError
 from ringbalance.scene.models import Bend, Liquid, Scene, Tube
 from ringbalance.scene.origins import InputUncertainty
+from ringbalance.scene.uncertain import NORMAL_95
 
 SCENE = cast("Scene", ringbalance.load_scene(ringbalance.bundled_scene("liquid_ring_paper")))
 WATER = Liquid(
@@ -290,3 +293,46 @@ def test_ranges_are_reported_wherever_a_source_ends(tube: Tube, nu: float, omega
     far = (found.flow_state == "laminar") & (re * rotation > 1e8)
     friction = found.terms["friction"] + found.terms["rotation"]
     assert np.all(found.k.uncertainty[far] > 0.2 * friction[far])
+
+
+FOUR_VELOCITIES = np.array([1.0, 3.0, 8.0, 20.0])
+
+
+def erring(scene: Scene, *errors: tuple[str, float, float]) -> tuple[Tube, TubeState]:
+    supposed = tuple(
+        ModelError.named(f"model: {cause}, {part}", size)
+        for cause, *both in errors
+        for part, size in zip(("even", "odd"), both, strict=True)
+    )
+    tube = dataclasses.replace(scene.tube, model_errors=supposed)
+    state = tube_state(scene, FOUR_VELOCITIES, tube=tube)
+    return tube, with_errors(tube=tube, state=state)
+
+
+@pytest.mark.parametrize("cause", MODEL_CAUSES)
+def test_both_parts_together_are_the_stated_uncertainty_at_every_velocity(
+    paper_scene: Scene, cause: str
+) -> None:
+    """Independent parts of one standard deviation each: e^2 = U^2/1.96^2 (cos^2 + sin^2)."""
+    tube, right = erring(paper_scene)
+    sides = [erring(paper_scene, (cause, n, 1 - n))[1].k - right.k for n in (1.0, 0.0)]
+    stated = model_parts(tube=tube, state=right)[cause] / NORMAL_95
+    assert np.hypot(*sides) == pytest.approx(stated, rel=1e-9)
+    angle = np.log(right.reynolds)
+    assert sides[0] == pytest.approx(stated * np.cos(angle), abs=1e-12)
+
+
+def test_an_error_of_bends_stays_with_the_bends(paper_scene: Scene) -> None:
+    """Of two bends alike one lies before the crest, and half of the error with it."""
+    (_, right), (_, wrong) = erring(paper_scene), erring(paper_scene, ("bends", 1.0, 0.0))
+    assert sum(wrong.bends) == pytest.approx(wrong.terms["bends"])
+    before = wrong.upstream_loss(0.5) - right.upstream_loss(0.5)
+    assert before == pytest.approx((wrong.k - right.k) / 2)
+
+
+def test_a_prescribed_loss_has_no_model_to_err(paper_scene: Scene) -> None:
+    prescribed = dataclasses.replace(
+        paper_scene, tube=dataclasses.replace(paper_scene.tube, drag_coefficient=50.0)
+    )
+    errors = [(cause, 1.0, 1.0) for cause in MODEL_CAUSES]
+    assert np.array_equal(erring(prescribed, *errors)[1].k, np.full(4, 50.0))

@@ -7,15 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from exact_chamber import ExactChamber
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.chamber.values import RingValues
-from ringbalance.scene import SceneError
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.origins import InputUncertainty
 
@@ -40,37 +38,6 @@ discs = st.builds(
 )
 
 
-class Exact:
-    """The chamber in closed form, by adaptive quadrature and root finding."""
-
-    def __init__(self, disc: Disc) -> None:
-        self.disc = disc
-
-    def half_angle(self, r: float) -> float:
-        return self.disc.central_angle / 2 - math.asin(self.disc.plate_thickness / r)
-
-    def area(self, a: float) -> float:
-        found: float = quad(
-            lambda r: 2 * r * self.half_angle(r), a, self.disc.outer_radius, epsabs=0, epsrel=1e-13
-        )[0]
-        return found
-
-    def surface(self, x: float) -> float:
-        if x == 0:
-            return self.disc.outer_radius
-        whole, low, high = self.area(self.disc.inner_radius), self.disc.inner_radius, self.disc.outer_radius
-        return float(brentq(lambda a: self.area(a) - x * whole, low, high, xtol=1e-16, rtol=1e-15))
-
-    def moment(self, x: float, density: float) -> float:
-        a, b = self.surface(x), self.disc.outer_radius
-        value = quad(lambda r: 2 * r * r * math.sin(self.half_angle(r)), a, b, epsabs=0, epsrel=1e-13)[0]
-        return float(density * self.disc.axial_width * value)
-
-    def central_lambda(self) -> float:
-        a = self.surface(self.disc.max_fill_ratio / 2)
-        return 2 * a * math.sin(self.half_angle(a)) / self.half_angle(a)
-
-
 def fast(scene: Scene, disc: Disc) -> Scene:
     """The disc at a speed at which gravity is far below 1e-6."""
     tube = dataclasses.replace(
@@ -84,7 +51,7 @@ def fast(scene: Scene, disc: Disc) -> Scene:
 @given(data=st.data())
 def test_random_discs_agree_within_1e_6_and_their_own_bars(table_1_scene: Scene, data: st.DataObject) -> None:
     scene = fast(table_1_scene, data.draw(discs))
-    found, exact = calibrate(scene), Exact(scene.disc)
+    found, exact = calibrate(scene), ExactChamber(scene.disc)
     chamber, density, omega = found.chamber, scene.liquid.density, scene.rotor.speed
     assert chamber.volume == pytest.approx(
         scene.disc.axial_width * exact.area(scene.disc.inner_radius), rel=1e-12
@@ -125,7 +92,7 @@ def test_lambda_of_the_papers_disc_is_73_mm_and_nearly_constant(
     x = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
     over = found.lambda_over_fill(fill_ratio=x)
     np.testing.assert_allclose(over, over[::-1], rtol=1e-9)
-    exact = Exact(table_1_scene.disc)
+    exact = ExactChamber(table_1_scene.disc)
     half = exact.moment(0.5, 1000.0) / (1000.0 * found.chamber.volume * 0.25)
     assert float(over[-1]) == pytest.approx(half, rel=1e-6)
 
@@ -178,13 +145,6 @@ def test_inputs_are_propagated_apart(table_1_scene: Scene) -> None:
     )
     assert some.moment_per_mass_inputs == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_array_equal(some.moment.uncertainty, none.moment.uncertainty)
-
-
-def test_too_slow_a_rotor_is_a_fault_of_the_scene(table_1_scene: Scene) -> None:
-    with pytest.raises(SceneError, match="rotor"):
-        calibrate(
-            dataclasses.replace(table_1_scene, rotor=dataclasses.replace(table_1_scene.rotor, speed=5.0))
-        )
 
 
 def test_calibration_reproduces_to_the_last_bit(

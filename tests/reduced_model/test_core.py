@@ -102,16 +102,6 @@ def test_a_full_siphon_balances_its_driving_pressure(
         assert answers.drag_coefficient[row] == pytest.approx(2 * drive / answers.velocity[row] ** 2 - 1)
 
 
-def test_blocked_designs_are_between_designs_that_flow(table_1_scene: Scene) -> None:
-    designs = Designs.of(table_1_scene, {"gas.pressure": np.array([7e5, 1e3, 7e5])})
-    answers = Answers.of(designs)
-    assert answers.regime[1] == Regime.BLOCKED
-    assert answers.velocity[1] == 0
-    assert answers.velocity[0] == answers.velocity[2] > 0
-    assert math.isnan(answers.cavitation_margin[1])
-    assert answers.stalled_fill_ratio[1] == pytest.approx(table_1_scene.disc.max_fill_ratio / 2)
-
-
 def test_without_a_crest_nothing_is_primed_and_no_correction_lasts(table_1_scene: Scene) -> None:
     plain = replace(table_1_scene, tube=replace(table_1_scene.tube, hump_radius=None))
     answers = Answers.of(Designs.of(plain, {"gas.pressure": np.array([1e5, 7e5])}))

@@ -13,13 +13,10 @@ from hypothesis import strategies as st
 from scipy.optimize import fsolve, minimize_scalar
 
 from ringbalance.physics.tube.loss import tube_loss
-from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.reduced_model.chamber.calibration import calibrate_chamber
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law
+from ringbalance.reduced_model.calibration import calibrated_model, chamber_and_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.pressure_profile import HumpProfile
-from ringbalance.reduced_model.tube.heads import TubeHeads
 from ringbalance.reduced_model.tube.path import crest_span, path_radius, share_at_radius
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import with_tolerance
@@ -44,7 +41,7 @@ def changed(scene: Scene, *, viscosity: float | None = None, **tube: Any) -> Sce
 
 
 def law_of(scene: Scene) -> CalibratedLaw:
-    return calibrated_law(scene=scene, chamber=calibrate_chamber(scene), heads=TubeHeads.of(scene))
+    return chamber_and_law(scene)[1]
 
 
 @pytest.fixture(scope="module")
@@ -96,22 +93,6 @@ def test_velocity_over_the_arc_for_each_cavity_pressure(
     assert float(flow.velocity) == pytest.approx(expected, rel=2e-7)
     middle = law.evaluate(fill_ratio=0.25, gas_pressure=0.7e6)
     assert abs(expected - float(middle.velocity)) < float(middle.uncertainty)
-
-
-def test_a_cavity_at_the_vented_chambers_pressure_costs_an_eighth(
-    point_scene: Scene, point_calibration: Calibration
-) -> None:
-    """By hand with alpha + k_up from the loss at both velocities."""
-    law = point_calibration.flow_law
-    at = {"fill_ratio": 0.25, "gas_pressure": 0.7e6}
-    gas = dataclasses.replace(law, path=dataclasses.replace(law.path, released=1.0))
-    pair = [float(each.evaluate(**at).velocity) for each in (law, gas)]
-    heads = []
-    for u in pair:
-        loss = tube_loss(point_scene, u)
-        heads.append(float(loss.state.kinetic_factor + loss.state.upstream_loss(0.5)) * DENSITY * u * u / 2)
-    assert heads[0] - heads[1] == pytest.approx(AMBIENT - VAPOUR, rel=1e-6)
-    assert pair[1] / pair[0] == pytest.approx(1 - 0.119, abs=1e-3)
 
 
 def test_the_arc_takes_44_percent_of_the_shortest_path(table_1_scene: Scene) -> None:

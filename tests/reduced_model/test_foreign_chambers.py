@@ -13,7 +13,6 @@ import pytest
 from drawn_chamber import drawing_of, loaded, msh_2
 
 import ringbalance as rb
-from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.elements import boundary_facets
@@ -232,34 +231,6 @@ def test_the_law_holds_the_head_between_its_nodes(name: str, tmp_path: Path) -> 
         off = abs(float(ends.upstream_hydrostatic) - head)
         assert off <= float(law.hydrostatic_pressure_uncertainty(x)) + _CLOSE * head, x
         assert off <= 2e-3 * head, x
-
-
-def test_under_gravity_the_head_is_the_mean_potential_of_the_surface(tmp_path: Path) -> None:
-    """|r + g/omega^2| = b at each angle of gravity: the mean of b^2 less (g/omega^2)^2 against a grid."""
-    shape, speed, fill = SHAPES["cone"], 60.0, 0.4
-    scene = scene_of(tmp_path, mesh(shape))
-    slow = replace(scene, rotor=replace(scene.rotor, speed=speed))
-    found = TiltedRing.of(slow, np.array([fill]))
-    tilt, volume = 1e3 * slow.environment.gravity / speed**2, shape.totals(0.0)[0]
-    squares = [_tilted(shape, tilt, psi, fill * volume) - tilt**2 for psi in np.arange(16) * np.pi / 8]
-    expected = slow.liquid.density * speed**2 / 2 * 1e-6 * (OUTER**2 - np.mean(squares))
-    assert np.ptp(squares) > 50.0
-    assert found.hydrostatic_pressure[0] == pytest.approx(expected, rel=_CLOSE)
-
-
-def _tilted(shape: Shape, tilt: float, psi: float, volume: float) -> float:
-    """b^2, mm^2, of the surface that holds a volume under gravity in a direction."""
-    (phi, by_angle), (z, by_width) = gauss(50), gauss(50)
-    angle, along = HALF * phi[:, None], WIDTH / 2 * z[None, :]
-    weight = HALF * WIDTH / 2 * by_angle[:, None] * by_width
-    high, low = shape.outer(angle, along), shape.inner(angle, along)
-    small, large = INNER**2 / 4, 4 * OUTER**2
-    for _ in range(60):
-        square = (small + large) / 2
-        out = np.sqrt(square - (tilt * np.sin(angle - psi)) ** 2) - tilt * np.cos(angle - psi)
-        held = (weight * (high**2 - np.minimum(np.maximum(out, low), high) ** 2) / 2).sum()
-        small, large = (square, large) if held > volume else (small, square)
-    return (small + large) / 2
 
 
 @pytest.mark.parametrize(

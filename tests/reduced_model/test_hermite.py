@@ -14,17 +14,6 @@ from ringbalance.reduced_model.tables import (
 )
 
 
-def test_quintics_are_exact() -> None:
-    def y(x: np.ndarray) -> np.ndarray:
-        return np.asarray(1 - 2 * x + 3 * x**2 - x**3 + 0.5 * x**4 - 0.25 * x**5)
-
-    table = table_from_samples(start=-1.0, stop=2.0, value=y(np.linspace(-1, 2, 9)))
-    x = np.linspace(-1, 2, 101)
-    np.testing.assert_allclose(table(x), y(x), rtol=0, atol=1e-12)
-    slope = -2 + 6 * x - 3 * x**2 + 2 * x**3 - 1.25 * x**4
-    np.testing.assert_allclose(table.with_slope(x)[1], slope, rtol=0, atol=1e-11)
-
-
 def test_error_falls_with_the_sixth_power_of_the_step() -> None:
     x = np.linspace(0, 3, 1001)
     errors = []

@@ -11,9 +11,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.estimates import injection_time
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.scene.uncertain import half_widths
 
 FACTOR = 0.93
 WIDTH = 0.02
@@ -71,9 +69,3 @@ def test_the_injection_that_decides_is_longer_by_it(paper_scene: Scene) -> None:
     plain = replace(paper_scene, controller=law_based)
     smaller = replace(plain, disc=replace(plain.disc, lambda_factor=0.5))
     assert injection_time(smaller) == pytest.approx(2 * injection_time(plain))
-
-
-def test_without_the_key_there_is_no_such_input(paper_scene: Scene) -> None:
-    assert paper_scene.disc.lambda_factor is None
-    assert paper_scene.disc.moment_factor == 1.0
-    assert "lambda_factor" not in half_widths(liquid_ring_scene(paper_scene))

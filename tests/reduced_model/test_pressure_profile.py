@@ -231,18 +231,6 @@ def test_margin_moves_with_an_input_by_what_its_half_width_says(point_scene: Sce
         assert added == pytest.approx(change, rel=0.05, abs=20)
 
 
-def test_eq_18_read_off_a_separated_siphon_falls_as_the_square_of_the_velocity(
-    point_scene: Scene, law: CalibratedLaw
-) -> None:
-    found = ApparentDrag.of(law=law, velocity=np.geomspace(0.5, 15, 20), opposite_fill_ratio=0.1)
-    excess = found.separated - found.lower_bound
-    slopes = np.diff(np.log(excess)) / np.diff(np.log(found.velocity))
-    np.testing.assert_allclose(slopes, -2.0, rtol=1e-12)
-    hump = column(point_scene, 31.5e-3, 44.5e-3)
-    head = (hump + VAPOUR - AMBIENT - float(law.hydrostatic_pressure(0.1))) / DENSITY
-    assert found.excess_head == pytest.approx(head, rel=1e-12)
-
-
 def test_what_eq_18_reads_is_what_the_law_does(law: CalibratedLaw) -> None:
     pressures, other = np.linspace(0.48e6, 1.2e6, 13), 0.1
     fills = np.array([0.2, 0.3, 0.4])

@@ -67,13 +67,6 @@ def test_the_residual_fill_rises_with_the_flow_and_vanishes_with_it(table_1_scen
     assert np.all(np.diff(fills) > 0)
 
 
-def test_a_tiny_bore_leaves_nearly_nothing(table_1_scene: Scene) -> None:
-    # Q falls by 1e4, so the depth by 1e4^0.4 = 40, and the fill of so thin a ring nearly in proportion; a
-    # sixth as much again for the layer of water, then 30 um deep, that feeds the port.
-    narrow = replace(table_1_scene, tube=replace(table_1_scene.tube, bore=1.5e-5))
-    assert _fill(narrow, 17.3) == pytest.approx(_fill(table_1_scene, 17.3) / 10**1.6, rel=0.2)
-
-
 def test_liquid_beyond_the_port_stays(table_1_scene: Scene) -> None:
     inner = replace(table_1_scene, tube=replace(table_1_scene.tube, port_radius=42e-3))
     fill = _fill(inner, 0.0)

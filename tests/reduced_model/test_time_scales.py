@@ -14,7 +14,6 @@ from ringbalance.reduced_model.estimates import (
     deciding_gas_time,
     long_start_up_loss,
     start_up_loss,
-    start_up_time,
 )
 from ringbalance.scene.models import Scene
 
@@ -41,14 +40,6 @@ def test_a_long_injection_loses_tau_ln_2() -> None:
     assert start_up_loss(start_up=tau, gas_time=long) * long == pytest.approx(tau * math.log(2), rel=1e-9)
     assert long_start_up_loss(tau) == pytest.approx(tau * math.log(2))
     assert long_start_up_loss(tau, laminar=1.0) == tau
-
-
-def test_both_forms_of_the_start_up_time_agree() -> None:
-    """2 L/((k + 1) u) is rho L u/p, because p = (k + 1) rho u^2/2."""
-    rho, length, k, pressure = 1000.0, 0.12, 3.53, 0.7e6
-    u = math.sqrt(2 * pressure / rho / (k + 1))
-    tau = start_up_time(density=rho, length=length, velocity=u, driving_pressure=pressure)
-    assert tau == pytest.approx(2 * length / ((k + 1) * u))
 
 
 def test_the_deciding_injection_is_the_one_at_the_limit(table_1_scene: Scene) -> None:

@@ -18,8 +18,6 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene import bundled_scene
 from ringbalance.scene.models import Scene
-from ringbalance.verification.extremes.design import Base, design
-from ringbalance.verification.extremes.point import Ending, Judgement
 
 SOUND_SPEED = 1482.0
 """m/s, in water at 20 degC."""
@@ -90,25 +88,3 @@ def test_a_rim_too_fast_ends_the_command_with_the_key_and_the_bound(
     assert "Traceback" not in said.err
     assert calibrated(0.999 * allowed) == 0
     assert json.loads(capsys.readouterr().out)["scene"]["name"] == document["name"]
-
-
-def judged_on_shaft(count: int, seed: int) -> list[Judgement]:
-    """Random scenes with the pressure on the shaft, those that are not refused."""
-    document = tomllib.loads(bundled_scene("liquid_ring_paper").read_text(encoding="utf-8"))
-    base, found = Base(document=document, file="disc.toml"), []
-    for point in design(count=8 * count, seed=seed):
-        one = base.judge({**point, "place": 1.0, "tolerance": max(point["tolerance"], 1e-6)})
-        assert not (one.ending is Ending.REFUSED and one.violations)
-        found += [one] * (one.ending is not Ending.REFUSED)
-        if len(found) == count:
-            break
-    return found
-
-
-def test_a_few_random_scenes_with_the_pressure_on_the_shaft_are_sound() -> None:
-    assert [one.violations for one in judged_on_shaft(4, seed=3)] == [()] * 4
-
-
-@pytest.mark.heavy
-def test_sixty_random_scenes_with_the_pressure_on_the_shaft_are_sound() -> None:
-    assert [one.violations for one in judged_on_shaft(60, seed=5)] == [()] * 60

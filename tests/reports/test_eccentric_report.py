@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from check_traces import traces, untrue
 
-from ringbalance.controller.eccentric_mass import study
+from ringbalance.controller.eccentric_mass import requirements
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports.evidence import parameters
@@ -44,7 +44,7 @@ def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> P
     with pytest.MonkeyPatch.context() as patch:
         # The claims of its paper have tests of their own, and so have the intervals of the study.
         patch.setattr(evidence_module, "load_cases", tuple)
-        patch.setattr(study, "DRAWS", 5)
+        patch.setattr(requirements, "DRAWS", 5)
         write_report(scene, out, scene_text='name = "small"\n')
     return out
 

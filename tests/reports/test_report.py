@@ -24,7 +24,7 @@ from ringbalance.reports.pages.consequences import find_consequences
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.report import Report, write_report
-from ringbalance.reports.saved import heavy_cases, saved_cases
+from ringbalance.reports.saved import heavy_cases
 from ringbalance.reports.sections import section_views
 from ringbalance.scene import Scene, SceneError, bundled_scene
 from ringbalance.scene.platform.processes import Workers
@@ -214,12 +214,6 @@ def test_a_failure_leaves_the_old_report(
     assert [path.name for path in out.iterdir()] == ["report.html"]
 
 
-def test_a_file_in_the_way_is_refused(write: Write, tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("a file")
-    with pytest.raises(OSError, match="not a folder"):
-        write(tmp_path / "out")
-
-
 def test_heavy_results_are_kept_with_their_date(second: Report) -> None:
     found = next(case for case in second.evidence["verification"] if case["id"] == "coverage")
     # The newest result on this very scene; the one on another scene is left alone.
@@ -233,12 +227,6 @@ def test_what_is_kept_is_heavy_and_dated(evidence: Record) -> None:
     assert case["date"] == evidence["times"]["date"]
     assert kept_document(evidence)["verification"] == [case]
     assert heavy_cases(kept_document(evidence)) == [case]
-
-
-def test_an_evidence_file_that_is_none_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "evidence.json").write_text("{")
-    with pytest.raises(OSError, match=r"evidence\.json is not an evidence file"):
-        saved_cases(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -279,16 +267,6 @@ def test_what_is_in_the_way_of_a_report_is_reported_before_the_work(
     with pytest.raises(OSError, match=f"{name} is a f"):
         write(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [name]
-
-
-def test_a_failure_makes_no_folder(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: Any, **__: Any) -> Record:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(report_module, "collect_evidence", fail)
-    with pytest.raises(KeyboardInterrupt):
-        write(tmp_path / "new" / "out")
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -75,26 +75,6 @@ def test_values_and_defaults() -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("plate", "message"),
-    [
-        ({}, "[plate] width is missing: every scene needs it; allowed: a length above 0"),
-        ({"width": "0 mm"}, '[plate] width = "0 mm": it must be above 0; allowed: a length above 0'),
-        ({"width": "1 mm", "kind": "flatt"}, '(did you mean "flat"?); allowed: "flat" or "bent"'),
-        (
-            {"widht": "1 mm"},
-            '[plate] widht = "1 mm": unknown key (did you mean "width"?); allowed: width, kind',
-        ),
-        ({"width": "1 mm", "holes": 3}, "[plate] holes = 3: it is not a list"),
-        ({"width": "1 mm", "holes": [{}]}, "[plate] holes[1].radius is missing: it is needed here"),
-        ({"width": "1 mm", "mass": 2}, "[plate] mass = 2: unknown key"),
-    ],
-)
-def test_errors(plate: dict[str, Any], message: str) -> None:
-    (fault,) = _read(**plate)[1]
-    assert message in str(fault)
-
-
 def test_reference() -> None:
     assert scene_reference.rows(keys_of(Plate))[1:] == [
         "| `width` | a length above 0 | **needed** | along the shaft |",
@@ -103,11 +83,6 @@ def test_reference() -> None:
         "| `depth` | a length of at least 0 | twice the width | depth |",
         "| `holes` | a list of tables | `[]` | list of { radius } |",
     ]
-
-
-def test_what_else_follows() -> None:
-    assert [name for name, key in keys_of(Plate).items() if key.uncertain] == ["width"]
-    assert list(descriptions_of(Plate)) == ["width", "rim"]
 
 
 def test_a_field_that_declares_no_values_is_refused() -> None:

@@ -103,49 +103,6 @@ def test_junk_in_place_of_values(
         _assert_sound(scene)
 
 
-@given(
-    outer=st.floats(5, 500),
-    inner=st.floats(0.1, 1.1),
-    chambers=st.sampled_from([4, 6, 8]),
-    angle=st.floats(0.3, 1.05),
-    plate=st.floats(0, 0.6),
-    hump=st.floats(0.1, 1.1),
-    length=st.floats(1, 6),
-    bore=st.floats(0.01, 0.5),
-)
-@FUZZ
-def test_plausible_discs(
-    outer: float,
-    inner: float,
-    chambers: int,
-    angle: float,
-    plate: float,
-    hump: float,
-    length: float,
-    bore: float,
-    newcomer_document: dict[str, Any],
-    as_toml: Callable[[Mapping[str, Any]], str],
-) -> None:
-    """Shares of the outer radius and of the pitch, some beyond what fits; a disc that passes is sound."""
-    disc = {
-        "outer_radius": f"{outer} mm",
-        "inner_radius": f"{inner * outer} mm",
-        "axial_width": "30 mm",
-        "central_angle": f"{angle * 360 / chambers} deg",
-        "plate_thickness": f"{plate * inner * outer} mm",
-        "chambers": chambers,
-    }
-    tube = {
-        "bore": f"{bore * outer} mm",
-        "hump_radius": f"{hump * outer} mm",
-        "length": f"{length * outer} mm",
-        "bends": [{"angle": "90 deg", "radius": f"{outer / 6} mm"}],
-    }
-    scene = _loaded(as_toml({**newcomer_document, "disc": disc, "tube": tube}).encode())
-    if scene is not None:
-        _assert_sound(scene)
-
-
 @given(changes=st.lists(st.tuples(st.integers(0, 999), st.floats(0, 3)), min_size=1, max_size=3))
 @FUZZ
 def test_scaled_values(
@@ -194,9 +151,3 @@ def test_damaged_files(at: int, deleted: int, inserted: bytes) -> None:
     scene = _loaded(whole[:place] + inserted + whole[place + deleted :])
     if scene is not None:
         _assert_sound(scene)
-
-
-@given(st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
-@FUZZ
-def test_any_bytes(content: bytes) -> None:
-    assert _loaded(content) is None

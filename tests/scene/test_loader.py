@@ -21,7 +21,6 @@ from ringbalance.scene import (
     bundled_scene,
     load_scene,
     read_scene,
-    scene_fault,
     scene_from,
     scene_table,
 )
@@ -55,17 +54,17 @@ def _message(path: Path) -> str:
     return message
 
 
-def test_no_such_file(tmp_path: Path) -> None:
-    assert _message(tmp_path / "none.toml") == f"{tmp_path / 'none.toml'}: there is no such file"
-
-
-def test_folder(tmp_path: Path) -> None:
-    assert "this is a folder" in _message(tmp_path)
-
-
-def test_unreadable(tmp_path: Path) -> None:
-    assert "cannot be read" in _message(tmp_path / ("x" * 300))
-    assert "cannot be read" in _message(tmp_path / "a\0b")
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("none.toml", "none.toml: there is no such file"),
+        (".", "this is a folder"),
+        ("x" * 300, "cannot be read"),
+        ("a\0b", "cannot be read"),
+    ],
+)
+def test_no_file(name: str, words: str, tmp_path: Path) -> None:
+    assert words in _message(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -203,11 +202,6 @@ def test_custom_liquid(extra: dict[str, str], newcomer_document: dict[str, Any],
     assert "vapour pressure not given, taken as 0 Pa" in liquid.source
 
 
-def test_only_temperature_is_the_default(newcomer_document: dict[str, Any], load: Load) -> None:
-    newcomer_document["liquid"] = {"name": "silicone oil 100 cSt"}
-    assert load(newcomer_document).liquid.temperature == 298.15
-
-
 def test_uncertainty_of_a_liquid(newcomer_document: dict[str, Any], load: Load) -> None:
     newcomer_document["uncertainty"] = {
         "density": "10 kg/m^3",
@@ -270,13 +264,6 @@ def test_table_of_a_scene(newcomer_document: dict[str, Any], load: Load) -> None
     assert rows["Connecting tube", "siphon crest radius"].value == "none: always full"
     assert rows["Liquid", "temperature"].value == "25 degC"
     assert rows["Run", "tolerance"].value == "1 %"
-
-
-def test_fault_of_a_loaded_scene() -> None:
-    scene = paper()
-    fault = scene_fault(scene, "rotor.speed", problem="too slow", allowed="above 300 rpm")
-    place = bundled_scene("liquid_ring_paper")
-    assert str(fault) == f'{place}: [rotor] speed = "10000 rpm": too slow; allowed: above 300 rpm'
 
 
 def test_a_scene_is_named_as_the_user_named_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

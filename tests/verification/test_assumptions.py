@@ -132,8 +132,7 @@ def test_widening_an_assumption_only_weakens(
         found = Found(value=value, input=known, corrected=corrected)
         found = found.moved(-factor * reach[0], factor * reach[1])
         reference = Reference(value=10.0, uncertainty=0.1)
-        judged = judge_quantity(kind="claim", metric=metric, limit=0.5, found=found, reference=reference)
-        return judged.verdict
+        return judge_quantity(kind="claim", metric=metric, limit=0.5, found=found, reference=reference)[0]
 
     assert verdict(wider) in (verdict(1.0), Verdict.INCONCLUSIVE)
     assert verdict(1.0) in (verdict(0.0), Verdict.INCONCLUSIVE)

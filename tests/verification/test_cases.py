@@ -149,14 +149,14 @@ def test_ten_times_the_range_of_what_was_assumed_only_weakens_a_verdict(
         found = quantity.found
         assert found is not None
         low, high = found.reach
-        judgement = judge_quantity(
+        verdict, _ = judge_quantity(
             kind="claim",
             metric=quantity.quantity.metric,
             limit=quantity.quantity.limit,
             found=found.moved(9 * low, 9 * high),
             reference=quantity.reference,
         )
-        judged.append(judgement.verdict)
+        judged.append(verdict)
     verdict = combine(kind="claim", verdicts=judged, roles=roles)
     assert verdict in (result.verdict, Verdict.INCONCLUSIVE)
 

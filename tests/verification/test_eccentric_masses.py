@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringbalance.verification.eccentric_scenes import driven_scene, envelope, thinned
+from ringbalance.verification.papers import envelope, thinned
 
 
 def test_a_thinned_curve_keeps_its_ends_and_its_order() -> None:
@@ -23,7 +23,3 @@ def test_an_envelope_keeps_every_peak_at_the_place_of_its_stretch() -> None:
     assert high.size == thinned(values).size
     assert np.flatnonzero(high).tolist() == [1234 * 239 // 10_000, 7777 * 239 // 10_000]
     assert high.max() == 5.0
-
-
-def test_the_scene_is_the_papers() -> None:
-    assert driven_scene().source == "eccentric_mass_paper.toml"

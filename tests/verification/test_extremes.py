@@ -45,10 +45,6 @@ def made(document: dict[str, Any], scene: Scene, **values: float) -> Scene:
     return found
 
 
-def test_a_document_survives_the_way_through_a_file(document: dict[str, Any]) -> None:
-    assert tomllib.loads(toml_bytes(document).decode()) == document
-
-
 def test_the_designed_set_is_reproducible_and_grows_at_its_end() -> None:
     assert design(count=30, seed=1) == design(count=100, seed=1)[:30]
     assert design(count=30, seed=1) != design(count=30, seed=2)
@@ -111,12 +107,9 @@ def full_vibration(scene: Scene) -> float:
     return float(scene.rotor.influence_coefficient * moment)
 
 
-@pytest.mark.parametrize("fill", [0.05, 1e-6])
-def test_the_loop_has_as_much_to_do_on_any_disc(
-    document: dict[str, Any], paper_scene: Scene, fill: float
-) -> None:
+def test_the_loop_has_as_much_to_do_on_any_disc(document: dict[str, Any], paper_scene: Scene) -> None:
     """The rotor is as light as the disc's liquid, so that limit, gain and noise mean what they meant."""
-    found = fitted_scene(document, paper_scene, fill=fill, unbalance=0.5, gain=2.0, noise=0.1)
+    found = fitted_scene(document, paper_scene, fill=1e-6, unbalance=0.5, gain=2.0, noise=0.1)
     assert full_vibration(found) == pytest.approx(full_vibration(paper_scene))
     assert found.controller.assumed_influence_coefficient == found.rotor.influence_coefficient
     assert found.rotor.initial_amplitude == pytest.approx(0.5 * full_vibration(paper_scene))
@@ -172,10 +165,6 @@ def calibration(paper_scene: Scene) -> Calibration:
 
 def faults(calibration: Calibration, **changes: Any) -> str:
     return " ".join(extremes_point._calibration_faults(replace(calibration, **changes), 0.5))
-
-
-def test_a_sound_calibration_has_no_faults(calibration: Calibration) -> None:
-    assert faults(calibration) == ""
 
 
 def test_a_head_that_falls_with_the_velocity_is_noticed(calibration: Calibration) -> None:
@@ -241,10 +230,7 @@ def test_an_interrupted_set_goes_on_where_it_stopped(
     assert base.judged(points) == whole
 
 
-@pytest.mark.parametrize(
-    "content",
-    ["", "garbage", "[1]", "[" * 100_000, "null", '{"key": 1}', '{"key": 1, "judgements": [], "digest": 1}'],
-)
+@pytest.mark.parametrize("content", ["", "[" * 100_000, '{"key": 1, "judgements": [], "digest": 1}'])
 def test_a_damaged_file_of_points_is_made_again(
     content: str, base: Base, tmp_path: Path, counting: list[Point], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -258,29 +244,19 @@ def test_a_damaged_file_of_points_is_made_again(
     assert len(counting) == CHUNK
 
 
-def test_a_changed_judgement_is_not_taken(base: Base, tmp_path: Path, counting: list[Point]) -> None:
+def test_only_judgements_of_the_same_points_scene_and_version_are_taken(
+    base: Base, tmp_path: Path, counting: list[Point], monkeypatch: pytest.MonkeyPatch
+) -> None:
     points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
     base.judged(points, kept=kept)
     kept.write_text(kept.read_text().replace('"residual": 0.0', '"residual": "x"', 1))
     base.judged(points, kept=kept)
     assert len(counting) == 2 * CHUNK
-
-
-def test_judgements_of_another_scene_are_not_taken(base: Base, tmp_path: Path, counting: list[Point]) -> None:
-    points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
-    base.judged(points, kept=kept)
-    replace(base, document={**base.document, "name": "another"}).judged(points, kept=kept)
-    assert len(counting) == 2 * CHUNK
-
-
-def test_judgements_of_another_version_are_not_taken(
-    base: Base, tmp_path: Path, counting: list[Point], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    points, kept = design(count=CHUNK, seed=1), tmp_path / "kept.json"
-    base.judged(points, kept=kept)
     monkeypatch.setattr(extremes_design, "_sources", lambda: "another version")
     base.judged(points, kept=kept)
-    assert len(counting) == 2 * CHUNK
+    assert len(counting) == 3 * CHUNK
+    replace(base, document={**base.document, "name": "another"}).judged(points, kept=kept)
+    assert len(counting) == 4 * CHUNK
 
 
 def test_a_belief_about_the_rotor_follows_the_rotor(document: dict[str, Any], paper_scene: Scene) -> None:
@@ -336,11 +312,6 @@ def test_a_stretch_tells_what_is_said_next_to_the_answers() -> None:
         (3, 4, ""),
         (5, 6, "beyond"),
     ]
-
-
-def test_an_axis_without_any_change_is_one_stretch() -> None:
-    (span,) = sweep_of("", "", "").spans()
-    assert (span.low, span.high, span.ending) == (1, 3, Ending.SOLVED)
 
 
 @pytest.mark.heavy

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.verification.orders import OrderStudy
+from ringbalance.verification.finite_elements import OrderStudy
 
 
 @given(st.floats(0.5, 5), st.floats(1e-6, 1), st.floats(1.2, 3))

@@ -15,8 +15,7 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.cases import sections as case
 from ringbalance.verification.evidence import input_uncertainty
 from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
-from ringbalance.verification.reference.gravity import exact_ring
-from ringbalance.verification.reference.manufactured import Manufactured
+from ringbalance.verification.reference.pressure import Manufactured, exact_ring
 
 
 def test_the_moment_is_that_of_a_sector_without_plates(paper_scene: Scene) -> None:
@@ -139,10 +138,3 @@ def test_input_uncertainty_of_a_product() -> None:
     # f = a b with a = 3 +- 0.1, b = 4 +- 0.2: u^2 = (4 0.1)^2 + (3 0.2)^2.
     found = input_uncertainty([(lambda a: a * 4, 3.0, 0.1), (lambda b: 3 * b, 4.0, 0.2)])
     assert found == pytest.approx(math.hypot(0.4, 0.6))
-
-
-def test_an_exact_input_is_not_evaluated() -> None:
-    def refuse(_: float) -> float:
-        raise AssertionError
-
-    assert input_uncertainty([(refuse, 1.0, 0.0)]) == 0.0

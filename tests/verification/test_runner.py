@@ -169,14 +169,6 @@ def test_results_come_in_the_order_asked_for_with_progress(paper_scene: Scene) -
     assert all(math.isfinite(result.time_s) for result in results)
 
 
-def test_an_interrupt_ends_the_run(paper_scene: Scene) -> None:
-    def interrupt(_: object) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run_cases(QUICK, scene=paper_scene, progress=interrupt)
-
-
 def test_who_waits_takes_what_nobody_has_begun_and_keeps_the_order() -> None:
     busy: Future[tuple[Any, ...]] = Future()
     busy.set_running_or_notify_cancel()

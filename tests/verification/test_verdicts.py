@@ -9,7 +9,7 @@ from ringbalance.verification.verdicts import Kind, Metric, Role, Verdict, combi
 
 
 def verdict(kind: Kind, metric: Metric, limit: float, found: Found, reference: Reference | None) -> Verdict:
-    return judge_quantity(kind=kind, metric=metric, limit=limit, found=found, reference=reference).verdict
+    return judge_quantity(kind=kind, metric=metric, limit=limit, found=found, reference=reference)[0]
 
 
 TEN = Reference(value=10.0, uncertainty=0.1)

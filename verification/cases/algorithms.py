@@ -35,7 +35,7 @@ from ringbalance.verification.loops import (
     settling,
     slowest_within,
 )
-from ringbalance.verification.paper_numbers import fig_7_readings
+from ringbalance.verification.papers import fig_7_readings
 
 _ABOUT: Final = Reference(value=40.0, uncertainty=from_rounding(10.0))
 """The paper's settling time of the trial algorithm, s."""

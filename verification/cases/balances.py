@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
 from ringbalance.mesh.chamber import FREE_SURFACE, default_cells
 from ringbalance.mesh.geometry import chamber_volume
+from ringbalance.physics.pressure.loads import liquid_integrals
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
-from ringbalance.physics.pressure.ring_samples import liquid_integrals
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Evidence, Level, Reference, as_found
-from ringbalance.verification.paper_numbers import with_plate
+from ringbalance.verification.finite_elements import found_of, mesh_table, mutated_force, ring_of
+from ringbalance.verification.papers import with_plate
 from ringbalance.verification.reference.exact_chamber import exact_totals
-from ringbalance.verification.reference.gravity import tilted_liquid
-from ringbalance.verification.rings import found_of, mesh_table, mutated_force, ring_of
+from ringbalance.verification.reference.pressure import tilted_liquid
 
 _FILL_SHARE: Final = 0.8
 
@@ -94,32 +93,27 @@ def _weight_balance(scene: Scene, fill: float, cells: tuple[int, ...]) -> float:
 _SCALARS = {"wall_pressure": "Pa", "moment": "kg m", "liquid_volume": "m^3"}
 
 
-def _exact_routes(scene: Scene) -> Mapping[str, Reference]:
-    values = exact_totals(scene)
-    values["volume"] *= scene.disc.max_fill_ratio
-    middle = Reference(value=values.pop("lambda"))
-    both = {f"{name}_{d}d": Reference(value=value) for name, value in values.items() for d in (2, 3)}
-    return both | {"lambda_2d": middle}
-
-
 def independent_routes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Wall pressure, moment, volume and lambda by three routes."""
-    flat, solid = (_ring(scene, dimension, defect) for dimension in (2, 3))
+    """Wall pressure, moment, volume and lambda by three routes: two meshes and closed forms."""
+    exact = exact_totals(scene)
+    exact["volume"] *= scene.disc.max_fill_ratio
+    reference = {"lambda_2d": Reference(value=exact.pop("lambda"))}
+    reference |= {f"{name}_{d}d": Reference(value=value) for name, value in exact.items() for d in (2, 3)}
+    rings = {dimension: _ring(scene, dimension, defect) for dimension in (2, 3)}
     found = {
         f"{name.removeprefix('liquid_')}_{d}d": found_of(ring, name, 0)
-        for d, ring in ((2, flat), (3, solid))
+        for d, ring in rings.items()
         for name in _SCALARS
     }
     centre = _ring(scene, 2, defect, share=0.5)
     found["lambda_2d"] = found_of(centre, "moment_per_volume", 0).scaled(2 / scene.liquid.density)
     moment = found["moment_2d"]
-    exact = _exact_routes(scene)
     return Evidence(
         found=found,
-        reference=exact,
-        numbers={"moment_share": abs(moment.value - exact["moment_2d"].value) / (2 * moment.numerical)},
-        convergence=tuple(mesh_table(flat, name, unit, 0) for name, unit in _SCALARS.items()),
-        status=flat.status,
+        reference=reference,
+        numbers={"moment_share": abs(moment.value - exact["moment"]) / (2 * moment.numerical)},
+        convergence=tuple(mesh_table(rings[2], name, unit, 0) for name, unit in _SCALARS.items()),
+        status=rings[2].status,
     )
 
 

@@ -28,7 +28,8 @@ from ringbalance.verification.evidence import (
     from_rounding,
     input_uncertainty,
 )
-from ringbalance.verification.paper_numbers import (
+from ringbalance.verification.finite_elements import chamber_moment, found_of, mesh_table, ring_of
+from ringbalance.verification.papers import (
     CHAMBER_MOMENT,
     CHAMBER_VOLUME,
     DENSE_DISC_MOMENT,
@@ -45,7 +46,6 @@ from ringbalance.verification.paper_numbers import (
     with_plate,
 )
 from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment
-from ringbalance.verification.rings import chamber_moment, found_of, mesh_table, ring_of
 
 _LAMBDA_DIGIT: Final = 1e-3
 _LAMBDA_UNCERTAINTY: Final = math.hypot(

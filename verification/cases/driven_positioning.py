@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Final
@@ -14,23 +15,34 @@ from ringbalance.controller.eccentric_mass.settings import DriveLaw
 from ringbalance.controller.eccentric_mass.step import friction_torque, regulator_torque
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import compiled
-from ringbalance.verification.eccentric_scenes import changed
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, as_found, figure
+from ringbalance.verification.papers import changed
 
-STEP = {"light": 4e-4, "heavy": 1e-4}
+_STEP: Final = {"light": 4e-4, "heavy": 1e-4}
 """s, of the integration, which is of first order; the effort hangs on it by a thousandth."""
-_DURATION = 3.0
+_DURATION: Final = 3.0
 """Of the move, s."""
-_MASS_RATIOS = (0.035, 0.023)
+_MASS_RATIOS: Final = (0.035, 0.023)
 """m_b/m_r of Fig. 6."""
-_WEIGHT_RATIOS = (1.0, 2.0, 3.5, 5.0)
+_WEIGHT_RATIOS: Final = (1.0, 2.0, 3.5, 5.0)
 """q/r."""
-_SPEED_RATIOS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
+_SPEED_RATIOS: Final = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
 """W over sqrt(K_B/M)."""
-_TRAVEL = (-1.0, 0.6)
+_TRAVEL: Final = (-1.0, 0.6)
 """rad, of the two masses."""
-_SHARES = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
+_SHARES: Final = {"exact": 1.0, "without": 0.0, "printed": 1.0, "short": 0.8}
 """Of the friction arm that is compensated; as printed the angle stands where the rate belongs."""
+_START: Final = -1.0
+"""rad, of a mass from its target."""
+_KNOWN: Final = 0.98
+"""Of the friction arm, what is compensated."""
+_CASES: Final = 20_000
+_SEED: Final = 20_200_627
+_INSTANTS: Final = 201
+_FASTER: Final = 2.0
+"""Pace of one mass over that of the other, where these differ."""
+_ROUND_OFF: Final = 1e-9
+"""rad."""
 
 
 def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
@@ -38,11 +50,19 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
 
     The paper's index is the integral of the regulator's torque alone.  Whirl and compensated friction are
     not in it: what the regulator has to do is the move itself and the friction that compensation leaves.
-
-
-        Growth of the effort with the speed."""
-    found = efforts(scene, step=STEP[level])
-    grown = {name: growth(effort) for name, effort in found.items()}
+    """
+    found = efforts(scene, step=_STEP[level])
+    grown = {name: growth(each) for name, each in found.items()}
+    # The first mass ratio at the third weight, near the paper's own choice.
+    shown = {name: each[0, 2] for name, each in found.items()}
+    over_speed = figure(
+        "effort of one move over the speed",
+        ("speed over natural frequency", "1", _SPEED_RATIOS),
+        Curve("compensated exactly", "N m s", shown["exact"]),
+        Curve("arm assumed a fifth too small", "N m s", shown["short"]),
+        Curve("not compensated", "N m s", shown["without"]),
+        Curve("as printed", "N m s", shown["printed"], style="paper"),
+    )
     return Evidence(
         found=as_found(exact=grown["exact" if defect is None else "without"].min()),
         numbers={
@@ -51,7 +71,24 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
             "short": grown["short"].min(),
             "as_printed": grown["printed"].min(),
         },
-        series=(_figure(found),),
+        series=(over_speed,),
+    )
+
+
+def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
+    """Growth of the same efforts with q/r and with the mass ratio."""
+    found = efforts(scene, step=_STEP[level])
+    # The largest over the smallest q/r, and the larger over the smaller mass ratio.
+    over_weight = {name: each[:, -1] / each[:, 0] for name, each in found.items()}
+    over_mass = {name: each[0] / each[1] for name, each in found.items()}
+    judged = "exact" if defect is None else "without"
+    return Evidence(
+        found=as_found(over_weight=over_weight[judged].max(), over_mass=over_mass[judged].max()),
+        numbers={
+            "weight_without": over_weight["without"].max(),
+            "mass_without": over_mass["without"].min(),
+            "mass_without_most": over_mass["without"].max(),
+        },
     )
 
 
@@ -60,18 +97,19 @@ def efforts(scene: EccentricScene, *, step: float) -> Mapping[str, FloatArray]:
 
     Returns: Of shape (mass ratios, weight ratios, speed ratios).
     """
-    return {
-        name: np.array(
-            [
-                [
-                    _over_speed(scene, mass, weight, name == "printed", share, step)
-                    for weight in _WEIGHT_RATIOS
-                ]
-                for mass in _MASS_RATIOS
-            ]
-        )
-        for name, share in _SHARES.items()
-    }
+    shape = (len(_MASS_RATIOS), len(_WEIGHT_RATIOS), len(_SPEED_RATIOS))
+    arm, found = scene.masses.friction_arm[0], {name: np.empty(shape) for name in _SHARES}
+    for i, j in np.ndindex(shape[:2]):
+        heavier = changed(scene, "masses", mass=_MASS_RATIOS[i] * scene.rotor.mass)
+        weighted = changed(heavier, "lqr", state_weight=_WEIGHT_RATIOS[j] * scene.lqr.input_weight)
+        law = DriveLaw.of(weighted)._replace(breaks_away=True, slow=0.0, near=0.0)
+        natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * _MASS_RATIOS[i])))
+        for (name, share), (k, ratio) in itertools.product(_SHARES.items(), enumerate(_SPEED_RATIOS)):
+            speed, printed = ratio * natural, name == "printed"
+            found[name][i, j, k] = _positioning_effort(
+                law, arm, share * arm, speed, *_TRAVEL, step, _DURATION, printed
+            )
+    return found
 
 
 def growth(effort: FloatArray) -> FloatArray:
@@ -133,68 +171,6 @@ def later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float,
     return 0.0 if later * rate < 0 else later
 
 
-def _over_speed(
-    scene: EccentricScene, mass_ratio: float, weight_ratio: float, printed: bool, share: float, step: float
-) -> list[float]:
-    heavier = changed(scene, "masses", mass=mass_ratio * scene.rotor.mass)
-    weighted = changed(heavier, "lqr", state_weight=weight_ratio * scene.lqr.input_weight)
-    law = DriveLaw.of(weighted)._replace(breaks_away=True, slow=0.0, near=0.0)
-    natural = math.sqrt(scene.rotor.stiffness / (scene.rotor.mass * (1 + 2 * mass_ratio)))
-    arm = scene.masses.friction_arm[0]
-    return [
-        _positioning_effort(law, arm, share * arm, ratio * natural, *_TRAVEL, step, _DURATION, printed)
-        for ratio in _SPEED_RATIOS
-    ]
-
-
-def _figure(found: Mapping[str, FloatArray]) -> Series:
-    """The first mass ratio at the third weight, near the paper's own choice."""
-    at = (0, 2)
-    return figure(
-        "effort of one move over the speed",
-        ("speed over natural frequency", "1", _SPEED_RATIOS),
-        Curve("compensated exactly", "N m s", found["exact"][at]),
-        Curve("arm assumed a fifth too small", "N m s", found["short"][at]),
-        Curve("not compensated", "N m s", found["without"][at]),
-        Curve("as printed", "N m s", found["printed"][at], style="paper"),
-    )
-
-
-def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """What positioning costs over the weights and the mass ratio, by the efforts of Fig. 6.
-
-    Growth of the effort with q/r and with the mass ratio."""
-    found = efforts(scene, step=STEP[level])
-    judged = found["exact" if defect is None else "without"]
-    without = over_mass(found["without"])
-    return Evidence(
-        found=as_found(over_weight=over_weight(judged).max(), over_mass=over_mass(judged).max()),
-        numbers={
-            "weight_without": over_weight(found["without"]).max(),
-            "mass_without": without.min(),
-            "mass_without_most": without.max(),
-        },
-    )
-
-
-def over_weight(effort: FloatArray) -> FloatArray:
-    """Effort at the largest over that at the smallest q/r, shape (mass ratios, speed ratios)."""
-    return np.asarray(effort[:, -1] / effort[:, 0], dtype=np.float64)
-
-
-def over_mass(effort: FloatArray) -> FloatArray:
-    """Effort at the larger over that at the smaller mass ratio, shape (weight ratios, speed ratios)."""
-    return np.asarray(effort[0] / effort[1], dtype=np.float64)
-
-
-_STEP: Final = {"light": 4e-4, "heavy": 1e-4}
-"""s, of the integration."""
-_START: Final = -1.0
-"""rad, from the target."""
-_KNOWN: Final = 0.98
-"""Of the friction arm, what is compensated."""
-
-
 def stability(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
     """Where a mass comes to rest under the regulator with friction, and the poles of the linear loop.
 
@@ -238,24 +214,16 @@ def _rest(law: DriveLaw, arm: float, compensated: float, speed: float, step: flo
     return abs(angle)
 
 
-_CASES: Final = 20_000
-_SEED: Final = 20_200_627
-_INSTANTS: Final = 201
-_FASTER: Final = 2.0
-"""Pace of one mass over that of the other, where these differ."""
-_ROUND_OFF: Final = 1e-9
-"""rad."""
-
-
 def collision(scene: EccentricScene, level: Level, defect: str | None = None) -> Evidence:
-    """The least distance of two masses on the way to targets that are assigned by the paper's rule.
+    """Random masses on the way to targets that are assigned by the paper's rule.
 
-    Fractions of random cases in which the masses come nearer on the way than at both ends of it."""
+    Judged is the fraction in which they come nearer on the way than at both ends of it.
+    """
     start, goal = _drawn(np.random.default_rng(_SEED))
-    printed, other = _assigned(start, goal), _assigned(start, goal)[::-1]
+    printed = _assigned(start, goal)
     fractions = {
         "printed": _nearer(start, printed, faster=1.0),
-        "other_assignment": _nearer(start, other, faster=1.0),
+        "other_assignment": _nearer(start, printed[::-1], faster=1.0),
         "unequal_pace": _nearer(start, printed, faster=_FASTER),
     }
     return Evidence(

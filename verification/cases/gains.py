@@ -27,7 +27,7 @@ from ringbalance.verification.loops import (
     settled_after,
     slowest_within,
 )
-from ringbalance.verification.paper_numbers import fig_7_readings
+from ringbalance.verification.papers import fig_7_readings
 
 _SEARCHED: Final = tuple((np.arange(2, 41) * 0.01e6).tolist())
 _ONSET: Final = (0.12e6, 0.16e6)

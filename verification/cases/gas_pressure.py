@@ -25,10 +25,10 @@ from ringbalance.verification.evidence import (
     as_found,
     figure,
 )
+from ringbalance.verification.finite_elements import found_of, ring_of
 from ringbalance.verification.loops import flow_law_of
-from ringbalance.verification.paper_numbers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE
+from ringbalance.verification.papers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE
 from ringbalance.verification.reference.exact_chamber import exact_moment, wall_pressure_of
-from ringbalance.verification.rings import found_of, ring_of
 
 _POINTS: Final = 101
 _STANDARD: Final = 1e-6

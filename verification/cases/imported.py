@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -31,10 +30,10 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, as_found, from_half_width
-from ringbalance.verification.orders import OrderStudy, order_figure, orders_found
+from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found
 from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
 from ringbalance.verification.reference.exact_chamber import exact_totals
-from ringbalance.verification.reference.manufactured import Manufactured
+from ringbalance.verification.reference.pressure import Manufactured
 
 _CELLS: Final = ((8, 32, 2), (4, 16, 1), (2, 8, 1))
 """Finest first; the arcs alone are approximated, so the cells along the angle decide."""
@@ -43,75 +42,66 @@ _ORDER: Final = 4.0
 """Of what an arc drawn by quadratic edges encloses."""
 _COARSE_TO_FINE: Final = ((2, 4, 2), (4, 8, 4), (8, 16, 8))
 _MANUFACTURED: Final = ("force_off_by_a_percent", "force_across_dropped", "surface_pressure_shifted")
+"""Mutations of the manufactured problem; the others are those of the physical one."""
+_LEVELS: Final = {"light": (3, 6, 12), "heavy": (4, 8, 16, 24)}
+"""Radial cells; half of them lie in the liquid."""
+_FILL: Final = 0.4
+_SQUARES: Final = {"light": (2, 4, 8, 16), "heavy": (2, 4, 8, 16, 32)}
+"""Cells along each side of the square that becomes the cylinder: a quarter of the facets around it."""
+_DEPTHS: Final = np.array([0.07, 0.31, 0.52, 0.77, 0.96])
+"""Of the free surface, from where it touches the cylinder to where it leaves it."""
+_TILT: Final = 0.05
+"""g/(omega^2 R2), far above that of the running disc."""
+_TURN: Final = 4
 
 
-def _imported_chamber_reference(scene: Scene) -> Mapping[str, Reference]:
+def totals(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """The built-in chamber as a mesh file would give it, against closed forms and a manufactured solution."""
+    records = [disc_chamber(scene.disc, cells) for cells in _CELLS]
+    if defect == "drawn_too_large":
+        records = [replace(one, points=one.points * 1.0001, digest=f"large {one.digest}") for one in records]
+    rows = np.transpose([_by_walls(scene, record) for record in records])
+    ring = solved_ring(
+        geometry=records[0],
+        density=scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        surface_radius=float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio)),
+    )
+    study = _in_the_whole_chamber(scene.disc, defect if defect in _MANUFACTURED else None)
     exact = exact_totals(scene)
     exact["lever"] = exact.pop("lambda")
-    return {name: Reference(value=value) for name, value in exact.items()}
-
-
-def imported_chamber(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """The built-in chamber as a mesh file would give it, against the closed forms and a manufactured
-    solution."""
-    records = [_record(scene.disc, cells, defect) for cells in _CELLS]
-    rows = np.array([_totals(scene, record) for record in records])
-    names = ("volume", "moment", "lever")
-    found = {name: _converged(rows[:, k]) for k, name in enumerate(names)}
-    pressure = _by_elements(scene, records[0])
-    orders = _manufactured(scene.disc, defect if defect in _MANUFACTURED else None)
     return Evidence(
         found={
-            **found,
-            "wall_pressure": pressure,
-            "field_order": Found(value=orders[0]),
-            "field_error": Found(value=orders[1]),
+            **{name: _converged(row) for name, row in zip(("volume", "moment", "lever"), rows, strict=True)},
+            "wall_pressure": Found(
+                value=float(ring.wall_pressure.value),
+                numerical=from_half_width(float(ring.wall_pressure.uncertainty)),
+                conclusive=ring.status.ok,
+            ),
+            **orders_found({"field": study}),
         },
-        reference=_imported_chamber_reference(scene),
+        reference={name: Reference(value=value) for name, value in exact.items()},
         numbers={"cells": float(len(records[0].cells))},
     )
 
 
-def _record(disc: Disc, cells: tuple[int, int, int], defect: str | None) -> ChamberGeometry:
-    record = disc_chamber(disc, cells)
-    if defect == "drawn_too_large":
-        return replace(record, points=record.points * 1.0001, digest=f"large {record.digest}")
-    return record
-
-
-def _totals(scene: Scene, record: ChamberGeometry) -> tuple[float, float, float]:
+def _by_walls(scene: Scene, record: ChamberGeometry) -> tuple[float, float, float]:
     """Volume, moment at the largest fill, and lambda at equal fills, by integrals over the walls."""
     disc = replace(scene.disc, geometry=record)
-    own = replace(scene, disc=disc)
     fills = np.array([disc.max_fill_ratio, disc.max_fill_ratio / 2])
-    _, moment, ratio = chamber_closed_forms(scene=own, fill_ratio=fills)
+    _, moment, ratio = chamber_closed_forms(scene=replace(scene, disc=disc), fill_ratio=fills)
     return chamber_volume(disc=disc), float(moment[0]), float(ratio[1])
 
 
-def _converged(values: np.ndarray) -> Found:
+def _converged(values: FloatArray) -> Found:
     study = gci(values=values.tolist(), sizes=_SIZES, formal_order=_ORDER)
     # What a table of integrals is good to, besides.
     width = study.uncertainty + 1e-8 * abs(float(values[0]))
     return Found(value=float(values[0]), numerical=from_half_width(width))
 
 
-def _by_elements(scene: Scene, record: ChamberGeometry) -> Found:
-    ring = solved_ring(
-        geometry=record,
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        surface_radius=float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio)),
-    )
-    pressure = ring.wall_pressure
-    return Found(
-        value=float(pressure.value),
-        numerical=from_half_width(float(pressure.uncertainty)),
-        conclusive=ring.status.ok,
-    )
-
-
-def _manufactured(disc: Disc, defect: str | None) -> tuple[float, float]:
-    """Order and finest error of the pressure in the whole chamber, its inner wall taken for the surface."""
+def _in_the_whole_chamber(disc: Disc, defect: str | None) -> OrderStudy:
+    """The manufactured pressure, the inner wall taken for the surface."""
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
     errors = []
     for cells in _COARSE_TO_FINE:
@@ -121,42 +111,36 @@ def _manufactured(disc: Disc, defect: str | None) -> tuple[float, float]:
         solution = solve_on(quadratic_basis(mesh), exact.problem(defect))
         true = exact.pressure(mesh.doflocs)
         errors.append(float(np.sqrt(np.mean((solution.values - true) ** 2) / np.mean(true**2))))
-    study = OrderStudy.of(size=[4.0, 2.0, 1.0], error=errors)
-    return study.settled_order, study.finest_error
+    return OrderStudy.of(size=[4.0, 2.0, 1.0], error=errors)
 
 
-_IMPORTED_PRESSURE_LEVELS: Final = {"light": (3, 6, 12), "heavy": (4, 8, 16, 24)}
-"""Radial cells; half of them lie in the liquid."""
-_FILL: Final = 0.4
-_OWN: Final = ("surface_off_by_a_percent", "facets_taken_for_the_wall")
-"""Mutations of the physical problem; the others are those of the manufactured one."""
-
-
-def imported_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Pressure in an imported chamber: a manufactured solution on meshes that become finer, and exact
-    loads."""
-    disc, sizes = scene.disc, _IMPORTED_PRESSURE_LEVELS[level]
-    studies = _studies(disc, sizes, None if defect in _OWN else defect)
-    rings = [_ring(scene, sizes[1], kind, defect) for kind in ("hexahedron27", "hexahedron")]
-    density, omega = scene.liquid.density, scene.rotor.speed
+def pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Pressure in an imported chamber: a manufactured solution on ever finer meshes, and exact loads."""
+    disc, sizes, omega = scene.disc, _LEVELS[level], scene.rotor.speed
+    field, wall = _studies(disc, sizes, defect if defect in _MANUFACTURED else None)
     a = float(surface_radius(disc=disc, fill_ratio=_FILL))
-    exact = hydrostatic_pressure(density=density, angular_velocity=omega, inner=a, outer=disc.outer_radius)
-    off = [abs(float(ring.wall_pressure.value) - exact) for ring in rings]
-    widths = [float(ring.wall_pressure.uncertainty) for ring in rings]
+    exact = hydrostatic_pressure(
+        density=scene.liquid.density, angular_velocity=omega, inner=a, outer=disc.outer_radius
+    )
+    cut = 1.01 * a if defect == "surface_off_by_a_percent" else a
+    curved, straight = (_ring(scene, sizes[1], kind, cut) for kind in ("hexahedron27", "hexahedron"))
+    off = [abs(float(ring.wall_pressure.value) - exact) for ring in (curved, straight)]
+    widths = [float(ring.wall_pressure.uncertainty) for ring in (curved, straight)]
     if defect == "facets_taken_for_the_wall":
         widths[1] = widths[0]
-    field, wall = studies["field"], studies["wall"]
-    found = {
-        "field_order": field.settled_order,
-        "field_error": field.finest_error,
-        "wall_error": wall.finest_error,
-        "pressure": off[0] / exact,
-        "held": max(error / width for error, width in zip(off, widths, strict=True)),
-        "loads": _balance(rings[0], omega),
-    }
+    # All forces on the walls together against the centrifugal force of the liquid.
+    total = np.sum([load.force.value for load in curved.loads.values()], axis=0)
+    centrifugal = omega**2 * curved.first_moment * np.array([1.0, 1.0, 0.0])
     return Evidence(
-        found=as_found(**found),
-        numbers={"straight": off[1] / exact, "unknowns": float(rings[0].statistics.unknowns)},
+        found=as_found(
+            field_order=field.settled_order,
+            field_error=field.finest_error,
+            wall_error=wall.finest_error,
+            pressure=off[0] / exact,
+            held=max(np.divide(off, widths)),
+            loads=np.linalg.norm(total - centrifugal) / np.linalg.norm(centrifugal),
+        ),
+        numbers={"straight": off[1] / exact, "unknowns": float(curved.statistics.unknowns)},
         series=(order_figure({"pressure field": field, "force on the outer wall": wall}),),
         convergence=(
             field.table("pressure field, relative error", 3.0),
@@ -166,54 +150,34 @@ def imported_pressure(scene: Scene, level: Level, defect: str | None = None) -> 
 
 
 @lru_cache(maxsize=8)
-def _ring(scene: Scene, size: int, kind: CellKind, defect: str | None) -> ImportedRing:
-    a = float(surface_radius(disc=scene.disc, fill_ratio=_FILL))
+def _ring(scene: Scene, size: int, kind: CellKind, a: float) -> ImportedRing:
     return solved_ring(
         geometry=disc_chamber(scene.disc, (size, 2 * size, size), kind=kind),
         density=scene.liquid.density,
         angular_velocity=scene.rotor.speed,
-        surface_radius=1.01 * a if defect == "surface_off_by_a_percent" else a,
+        surface_radius=a,
     )
 
 
-def _balance(ring: ImportedRing, omega: float) -> float:
-    """All forces on the walls together over the centrifugal force of the liquid, deviation from one."""
-    total = np.sum([load.force.value for load in ring.loads.values()], axis=0)
-    exact = omega**2 * ring.first_moment * np.array([1.0, 1.0, 0.0])
-    return float(np.linalg.norm(total - exact) / np.linalg.norm(exact))
-
-
 @lru_cache(maxsize=8)
-def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> dict[str, OrderStudy]:
+def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> tuple[OrderStudy, OrderStudy]:
+    """Of the manufactured field, root mean square, and of its force on the outer wall."""
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
-    problem, errors = exact.problem(defect), []
-    a = float(surface_radius(disc=disc, fill_ratio=_FILL))
+    surface = SurfaceLevel(constant=float(surface_radius(disc=disc, fill_ratio=_FILL)) ** 2 / 2)
+    errors = []
     for size in sizes:
         chamber = tetrahedra(disc_chamber(disc, (size, 2 * size, size)))
-        basis = quadratic_basis(scikit_fem_mesh(liquid_body(chamber, SurfaceLevel(constant=a**2 / 2))))
-        errors.append(_imported_pressure_errors(basis, exact, solve_on(basis, problem).values))
-    field, wall = zip(*errors, strict=True)
+        basis = quadratic_basis(scikit_fem_mesh(liquid_body(chamber, surface)))
+        values = solve_on(basis, exact.problem(defect)).values
+        true = exact.pressure(np.asarray(basis.global_coordinates()))
+        difference = np.asarray(basis.interpolate(values)) - true
+        field = np.sqrt(np.sum(basis.dx * difference**2) / np.sum(basis.dx * true**2))
+        wall = side(basis.mesh, "outer_wall")
+        force = np.sum(wall.weights * exact.pressure(wall.points))
+        errors.append((field, abs(np.sum(wall.weights * wall.at_points(values)) / force - 1)))
+    field, wall = np.transpose(errors).tolist()
     steps = [1 / size for size in sizes]
-    return {"field": OrderStudy.of(size=steps, error=field), "wall": OrderStudy.of(size=steps, error=wall)}
-
-
-def _imported_pressure_errors(basis: Any, exact: Manufactured, values: FloatArray) -> tuple[float, float]:
-    """Root mean square of the field's error, and the error of the force on the outer wall, relative."""
-    true = exact.pressure(np.asarray(basis.global_coordinates()))
-    difference = np.asarray(basis.interpolate(values)) - true
-    wall = side(basis.mesh, "outer_wall")
-    force = np.sum(wall.weights * exact.pressure(wall.points))
-    field = np.sqrt(np.sum(basis.dx * difference**2) / np.sum(basis.dx * true**2))
-    return float(field), abs(float(np.sum(wall.weights * wall.at_points(values)) / force) - 1)
-
-
-_ROUND_CHAMBER_LEVELS: Final = {"light": (2, 4, 8, 16), "heavy": (2, 4, 8, 16, 32)}
-"""Cells along each side of the square that becomes the cylinder: a quarter of the facets around it."""
-_DEPTHS: Final = np.array([0.07, 0.31, 0.52, 0.77, 0.96])
-"""Of the free surface, from where it touches the cylinder to where it leaves it."""
-_TILT: Final = 0.05
-"""g/(omega^2 R2), far above that of the running disc."""
-_TURN: Final = 4
+    return OrderStudy.of(size=steps, error=field), OrderStudy.of(size=steps, error=wall)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,24 +213,20 @@ def _segment(radius: FloatArray | float, chord: FloatArray) -> tuple[FloatArray,
 
 
 def round_chamber(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """A cylinder beside the shaft as an imported chamber: integrals over its walls against lenses of
-    circles."""
-    disc, cells = scene.disc, _ROUND_CHAMBER_LEVELS[level]
+    """A cylinder beside the shaft as an imported chamber: integrals over its walls against lenses."""
+    disc, cells = scene.disc, _SQUARES[level]
     curved: CellKind = "hexahedron" if defect == "middle_nodes_ignored" else "hexahedron27"
-    errors = {
-        kind: np.array([_round_chamber_errors(disc, n, kind, defect) for n in cells])
+    quadratic, straight = (
+        np.array([_round_chamber_errors(disc, n, kind, defect) for n in cells])
         for kind in (curved, "hexahedron")
-    }
+    )
     size = [1 / n for n in cells]
     studies = {
-        "round": OrderStudy.of(size=size, error=errors[curved][:, 0].tolist()),
-        "straight": OrderStudy.of(size=size, error=errors["hexahedron"][:, 0].tolist()),
+        name: OrderStudy.of(size=size, error=errors[:, 0].tolist())
+        for name, errors in (("round", quadratic), ("straight", straight))
     }
-    found = orders_found(studies)
-    found["tilted_error"] = Found(value=float(errors[curved][-1, 2]))
-    found["lever_error"] = Found(value=float(errors[curved][-1, 1]))
     return Evidence(
-        found=found,
+        found=orders_found(studies) | as_found(tilted_error=quadratic[-1, 2], lever_error=quadratic[-1, 1]),
         numbers={"facets": 4.0 * cells[-1]},
         convergence=(
             studies["round"].table("volume and moment", 4.0, geometry="quadratic"),

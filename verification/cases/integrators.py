@@ -37,14 +37,14 @@ from ringbalance.verification.evidence import (
     figure,
     from_half_width,
 )
-from ringbalance.verification.orders import OrderStudy
-from ringbalance.verification.reference.marched import marched
+from ringbalance.verification.finite_elements import OrderStudy
 from ringbalance.verification.reference.transfers import (
     Drive,
     Integrator,
     adaptive_ode,
     closed_form,
     explicit_segments,
+    marched,
     paper_drive,
 )
 

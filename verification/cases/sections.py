@@ -1,17 +1,36 @@
-"""Flow in the section of a turning tube: exact limits, a manufactured solution, decay rates along it."""
+"""Flow in the section of a turning tube: exact limits, a manufactured solution, decay rates along it.
+
+The manufactured flow on the curved half section, every term of the equation at work: in the plane
+u = d psi/dz, v = -d psi/dy with psi = sin(a y + 0.3) exp(b z)/5, so that div u = 0; along the tube
+w = 1 + cos(c y) sin(d z + 0.4)/2; p = sin(e y) cos(f z + 0.2).  The body force is what
+
+    inertia (u . grad) u + rotation C u - viscosity lap u + grad p = f
+
+asks for, with velocities given all round.
+
+How fast laminar flow in a rotating tube becomes developed is the decay along it of what disturbs it.  A small
+steady disturbance of developed flow goes as exp(lambda x/d).  With lengths over d, axial velocity over U and
+mu = lambda Re, its equations in the section are quadratic in mu, pressure and diffusion along the tube
+included:
+
+    [A0 + mu A1 + mu^2 A2] q = 0
+
+A0 is the section's own Jacobian, A1 carries with the axial velocity and couples pressure and continuity along
+the tube, A2 diffuses.  At Re = 0 velocities are over U throughout and mu is lambda itself.  Modes are those
+that are mirror images of themselves in the plane across the rotation axis.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import replace
 from functools import partial
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ringbalance.physics.results import Status, StatusCode
 from ringbalance.physics.tube.loss import developing_length
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -21,13 +40,13 @@ from ringbalance.verification.evidence import (
     Evidence,
     Level,
     Reference,
-    Series,
     Table,
     as_found,
     figure,
 )
-from ringbalance.verification.navier_stokes.linear import Factors
-from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
+from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.newton import Factors, FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.rotating_section import (
     CORIOLIS,
     SectionMesh,
@@ -36,73 +55,94 @@ from ringbalance.verification.navier_stokes.rotating_section import (
     solve_section,
     solve_section_without_inertia,
 )
-from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
-from ringbalance.verification.orders import OrderStudy, order_figure, orders_found
 
-_SERIES: Final = 9216.0
+_SLOW_SERIES: Final = 9216.0
 _INERTIA_SERIES: Final = 16515072.0
-_LIMIT: Final = 0.07863
+_FAST_LIMIT: Final = 0.07863
 _SLOW: Final = 1.0
 _SLOW_KL: Final = 20.0
-_ROTATING_SECTION_FAST: Final = (1e1, 1e2, 1e3, 1e4)
+_ROTATIONS: Final = np.array([1e1, 1e2, 1e3, 1e4])
 _FACTORS: Final = {None: 1.0, "coriolis_off_by_a_percent": 1.01, "radius_for_bore": 0.25}
-_ROTATING_SECTION_AROUND: Final = {"light": 8, "heavy": 20}
-
-
-_LIMITS = {
-    "slow": Reference(value=1.0),
-    "inertia": Reference(value=1.0),
-    "ekman": Reference(value=float(np.sqrt(10))),
+_SECTION_AROUND: Final = {"light": 8, "heavy": 20}
+_AROUND: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
+_ACROSS: Final = 1.5
+"""Cells of the ring between core and wall per cell around."""
+_WALL_RATIO: Final = 3.0
+_TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)
+"""Chosen so that no term hides behind another."""
+_SPOILED: Final = {
+    None: _TRUE,
+    "coriolis_dropped": replace(_TRUE, rotation=0.0),
+    "inertia_off_by_a_percent": replace(_TRUE, inertia=1.01 * _TRUE.inertia),
+    "viscosity_off_by_a_percent": replace(_TRUE, viscosity=1.01 * _TRUE.viscosity),
 }
-"""Exact limits."""
+_A, _B, _C, _D, _E, _F = 2.1, 1.2, 2.7, 3.1, 1.7, 1.3
+_CREEPING: Final = 2 * (4.46629832 + 1.46746761j)
+"""Per diameter: root of z (J0^2 + J1^2) = 2 J0 J1 per radius."""
+_GEOSTROPHIC: Final = 47.211
+"""lambda sqrt(R), least eigenvalue of geostrophic flow over the section's depth with Ekman friction."""
+_FAST: Final = (1e3, 1e4)
+_POINTS: Final = {
+    "light": ((20.0, 0.0), (100.0, 100.0)),
+    "heavy": ((100.0, 0.0), (20.0, 200.0), (1e3, 100.0)),
+}
+_MESHES: Final = {
+    "light": (
+        SectionMesh(around=4, across=7, wall_ratio=30.0),
+        SectionMesh(around=6, across=11, wall_ratio=50.0),
+    ),
+    "heavy": (
+        SectionMesh(around=6, across=10, wall_ratio=15.0),
+        SectionMesh(around=14, across=24, wall_ratio=200.0),
+    ),
+}
+_SHIFTS: Final = (1.0, 0.35, 0.12)
+"""Of the expected rate, about which modes are looked for."""
+_TOLERANCE: Final = 1e-8
+"""Of the eigenvalues: rates are told apart at 1e-4 of the expected one."""
+_NOT_A_MODE: Final = 0.03
+"""Times the expected rate: below, only the flow rate and the pressure level are found, at zero."""
+_LEFT: Final = 1e-6
+"""Largest relative residual of a mode."""
 
 
 def rotating_section(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """The rotating section at rest, in slow rotation and in fast rotation."""
-    around = _ROTATING_SECTION_AROUND[level]
+    around, factor = _SECTION_AROUND[level], _FACTORS[defect]
     system = SectionMesh(around=around, across=3 * around // 2, wall_ratio=15.0).system()
-    factor = _FACTORS[defect]
-    rest = _linear(system, 0.0)
-    slow = (_linear(system, factor * _SLOW) - rest) / (_SLOW**2 / _SERIES)
+    rest = _without_inertia(system, 0.0)
+    slow = (_without_inertia(system, factor * _SLOW) - rest) / (_SLOW**2 / _SLOW_SERIES)
     flow = solve_section(system=system, kl=factor * _SLOW_KL, s=0.0)
     inertia = (friction_ratio(flow) - rest) / (_SLOW_KL**2 / _INERTIA_SERIES)
-    fast = np.array([_linear(system, factor * rotation) for rotation in _ROTATING_SECTION_FAST])
-    gaps = fast / (_LIMIT * np.sqrt(_ROTATING_SECTION_FAST)) - 1
+    fast = np.array([_without_inertia(system, factor * rotation) for rotation in _ROTATIONS.tolist()])
+    limit = _FAST_LIMIT * np.sqrt(_ROTATIONS)
+    gaps = fast / limit - 1
+    shown = figure(
+        "friction over that at rest, without inertia",
+        ("rotation Reynolds number", "1", _ROTATIONS),
+        Curve("finite elements", "1", fast),
+        Curve("slow series", "1", 1 + _ROTATIONS**2 / _SLOW_SERIES, style="reference"),
+        Curve("fast limit", "1", limit, style="reference"),
+        log=True,
+    )
     return Evidence(
         found=as_found(at_rest=abs(rest - 1), slow=slow, inertia=inertia, ekman=gaps[2] / gaps[3]),
-        reference=_LIMITS,
+        # Exact limits.
+        reference={
+            "slow": Reference(value=1.0),
+            "inertia": Reference(value=1.0),
+            "ekman": Reference(value=math.sqrt(10)),
+        },
         numbers={"gap": float(gaps[-1])},
-        series=(_figure(fast),),
+        series=(shown,),
     )
 
 
-def _linear(system: FlowSystem, rotation: float) -> float:
+def _without_inertia(system: FlowSystem, rotation: float) -> float:
     flow = solve_section_without_inertia(system=system, rotation_reynolds=rotation)
     if not flow.status.ok:
         raise ValueError(flow.status.text)
     return friction_ratio(flow)
-
-
-def _figure(fast: np.ndarray) -> Series:
-    rotation = np.array(_ROTATING_SECTION_FAST)
-    return figure(
-        "friction over that at rest, without inertia",
-        ("rotation Reynolds number", "1", rotation),
-        Curve("finite elements", "1", fast),
-        Curve("slow series", "1", 1 + rotation**2 / _SERIES, style="reference"),
-        Curve("fast limit", "1", _LIMIT * np.sqrt(rotation), style="reference"),
-        log=True,
-    )
-
-
-_MANUFACTURED_FLOW_AROUND: Final = {"light": (1, 2, 4, 8), "heavy": (1, 2, 4, 8, 16)}
-_TRUE: Final = Coefficients(inertia=3.0, viscosity=0.7, rotation=5.0)
-"""Chosen so that no term hides behind another."""
-_A, _B, _C, _D, _E, _F = 2.1, 1.2, 2.7, 3.1, 1.7, 1.3
-_ACROSS: Final = 1.5
-"""Cells of the ring between core and wall per cell around."""
-_WALL_RATIO: Final = 3.0
 
 
 def velocity(places: FloatArray) -> FloatArray:
@@ -167,43 +207,24 @@ def body_force(places: FloatArray) -> FloatArray:
 
 
 def manufactured_flow(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """A manufactured flow on the curved half section of a turning tube, every term of the equation at work.
-
-    In the plane u = d psi/dz, v = -d psi/dy with psi = sin(a y + 0.3) exp(b z)/5, so that div u = 0;
-    along the tube w = 1 + cos(c y) sin(d z + 0.4)/2; p = sin(e y) cos(f z + 0.2).  The body force is what
-
-        inertia (u . grad) u + rotation C u - viscosity lap u + grad p = f
-
-    asks for, with velocities given all round.
-    """
-    used, around = _spoiled(defect), _MANUFACTURED_FLOW_AROUND[level]
-    solved = [_solve(count, used) for count in around]
+    """Orders and finest errors of the manufactured flow on ever finer meshes."""
+    around = _AROUND[level]
+    solved = [_solve(count, _SPOILED[defect]) for count in around]
     size = [around[0] / count for count in around]
     flow = OrderStudy.of(size=size, error=[_velocity_error(*pair) for pair in solved])
     stress = OrderStudy.of(size=size, error=[_pressure_error(*pair) for pair in solved])
     unknowns = [space.unknowns for space, _ in solved]
     note = f"unknowns {', '.join(map(str, unknowns))}"
+    studies = {"velocity": flow, "pressure": stress}
     return Evidence(
-        found=orders_found({"velocity": flow, "pressure": stress}),
+        found=orders_found(studies),
         numbers={"unknowns": float(unknowns[-1])},
-        series=(order_figure({"velocity": flow, "pressure": stress}),),
+        series=(order_figure(studies),),
         convergence=(
             flow.table("velocity, relative error", 3.0, geometry="quadratic", note=note),
             stress.table("pressure, relative error", 2.0, geometry="quadratic", note=note),
         ),
     )
-
-
-def _spoiled(defect: str | None) -> Coefficients:
-    changes = {
-        None: _TRUE,
-        "coriolis_dropped": replace(_TRUE, rotation=0.0),
-        "inertia_off_by_a_percent": replace(_TRUE, inertia=1.01 * _TRUE.inertia),
-        "viscosity_off_by_a_percent": replace(_TRUE, viscosity=1.01 * _TRUE.viscosity),
-    }
-    if defect not in changes:
-        raise ValueError(f"unknown defect {defect}")
-    return changes[defect]
 
 
 def _solve(around: int, coefficients: Coefficients) -> tuple[FlowSpace, FlowSolution]:
@@ -229,147 +250,87 @@ def _component(component: int, places: FloatArray) -> FloatArray:
 
 
 def _velocity_error(space: FlowSpace, solution: FlowSolution) -> float:
-    found, _ = space.at_points(solution.velocity)
-    true = velocity(space.points)
-    return float(np.sqrt(np.sum(space.weights * (found - true) ** 2) / np.sum(space.weights * true**2)))
+    return _rms(space, space.at_points(solution.velocity)[0], velocity(space.points))
 
 
 def _pressure_error(space: FlowSpace, solution: FlowSolution) -> float:
     found = solution.pressure[space.pressure.element_dofs.T] @ space.pressure_shape
-    true = pressure(space.points)
-    found, true = (field - np.sum(space.weights * field) / space.weights.sum() for field in (found, true))
+    fields = (found, pressure(space.points))
+    found, true = (field - np.sum(space.weights * field) / space.weights.sum() for field in fields)
+    return _rms(space, found, true)
+
+
+def _rms(space: FlowSpace, found: FloatArray, true: FloatArray) -> float:
     return float(np.sqrt(np.sum(space.weights * (found - true) ** 2) / np.sum(space.weights * true**2)))
 
 
-_CREEPING: Final = 2 * (4.46629832 + 1.46746761j)
-"""Per diameter: root of z (J0^2 + J1^2) = 2 J0 J1 per radius."""
-_GEOSTROPHIC: Final = 47.211
-"""lambda sqrt(R), least eigenvalue of geostrophic flow over the section's depth with Ekman friction."""
-_DEVELOPING_FLOW_FAST: Final = (1e3, 1e4)
-_POINTS: Final = {
-    "light": ((20.0, 0.0), (100.0, 100.0)),
-    "heavy": ((100.0, 0.0), (20.0, 200.0), (1e3, 100.0)),
-}
-_MESHES: Final = MappingProxyType(
-    {
-        "light": (
-            SectionMesh(around=4, across=7, wall_ratio=30.0),
-            SectionMesh(around=6, across=11, wall_ratio=50.0),
-        ),
-        "heavy": (
-            SectionMesh(around=6, across=10, wall_ratio=15.0),
-            SectionMesh(around=14, across=24, wall_ratio=200.0),
-        ),
-    }
-)
-_SPEED: Final = MappingProxyType({None: 1.0, "radius_for_bore": 1.0, "coriolis_too_weak": 0.7})
-_SHIFTS = (1.0, 0.35, 0.12)
-"""Of the expected rate, about which modes are looked for."""
-_TOLERANCE = 1e-8
-"""Of the eigenvalues: rates are told apart at 1e-4 of the expected one."""
-_NOT_A_MODE = 0.03
-"""Times the expected rate: below, only the flow rate and the pressure level are found, at zero."""
-
-
 def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Decay rates along the turning tube: creeping flow at rest, fast rotation, and the bound that k(u) uses.
-
-    How fast laminar flow in a rotating tube becomes developed is the decay along it of what disturbs it.
-    A small steady disturbance of developed flow goes as exp(lambda x/d).  With lengths over d, axial
-    velocity over U and mu = lambda Re, its equations in the section are quadratic in mu, pressure and
-    diffusion along the tube included:
-
-        [A0 + mu A1 + mu^2 A2] q = 0
-
-    A0 is the section's own Jacobian, A1 carries with the axial velocity and couples pressure and
-    continuity along the tube, A2 diffuses.  At Re = 0 velocities are over U throughout and mu is lambda
-    itself.  Modes are those that are mirror images of themselves in the plane across the rotation axis.
-    """
+    """Decay rates along the turning tube: creeping flow at rest, fast rotation, the bound that k(u) uses."""
     coarse, fine = (cells.system() for cells in _MESHES[level])
-    rates = slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12).rates
+    speed = 0.7 if defect == "coriolis_too_weak" else 1.0
+    rates = slowest_decay(system=coarse, reynolds=0.0, rotation_reynolds=0.0, count=12)
     exact = _CREEPING / (2 if defect == "radius_for_bore" else 1)
-    fast = [_scaled(fine, rotation, _SPEED[defect]) for rotation in _DEVELOPING_FLOW_FAST]
+    fast = [decay_length(fine, 0.0, speed * rotation) ** -1 * rotation**0.5 for rotation in _FAST]
     # The limit is approached as R^(-1/4), which two rates take off.
-    step = (_DEVELOPING_FLOW_FAST[1] / _DEVELOPING_FLOW_FAST[0]) ** 0.25
-    lengths = [_lengths(coarse, *point) for point in _POINTS[level]]
-    shares = [found / bound for found, bound in lengths]
+    step = (_FAST[1] / _FAST[0]) ** 0.25
+    points = _POINTS[level]
+    lengths = [decay_length(coarse, *point) for point in points]
+    bounds = [_length_bound(*point) for point in points]
+    shares = np.divide(lengths, bounds)
+    table = Table(
+        name="way on which a disturbance falls by e",
+        columns={
+            "Re": [re for re, _ in points],
+            "R": [rotation for _, rotation in points],
+            "found": lengths,
+            "bound": bounds,
+        },
+        units={"found": "d", "bound": "d"},
+    )
     return Evidence(
         found=as_found(
             creeping=np.min(np.abs(rates + exact)) / abs(exact),
             fast=(fast[1] * step - fast[0]) / (step - 1),
-            bound=max(shares),
+            bound=shares.max(),
         ),
         reference={"fast": Reference(value=_GEOSTROPHIC)},
-        numbers={"slower": fast[0], "faster": fast[1], "least": min(shares)},
-        tables=(
-            Table(
-                name="way on which a disturbance falls by e",
-                columns={
-                    "Re": [re for re, _ in _POINTS[level]],
-                    "R": [rotation for _, rotation in _POINTS[level]],
-                    "found": [found for found, _ in lengths],
-                    "bound": [bound for _, bound in lengths],
-                },
-                units={"found": "d", "bound": "d"},
-            ),
-        ),
+        numbers={"slower": fast[0], "faster": fast[1], "least": float(shares.min())},
+        tables=(table,),
     )
 
 
-def _scaled(system: FlowSystem, rotation: float, speed: float) -> float:
-    found = slowest_decay(system=system, reynolds=0.0, rotation_reynolds=speed * rotation, count=1)
-    return float(-found.rates[0].real * rotation**0.5)
+def decay_length(system: FlowSystem, reynolds: float, rotation_reynolds: float) -> float:
+    """Way on which the slowest disturbance falls by e, in diameters."""
+    rates = slowest_decay(system=system, reynolds=reynolds, rotation_reynolds=rotation_reynolds, count=1)
+    return -1 / float(rates[0].real)
 
 
-def _lengths(system: FlowSystem, reynolds: float, rotation: float) -> tuple[float, float]:
-    ratio = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation).value
-    bound = developing_length(reynolds=reynolds, rotation_reynolds=rotation, friction_ratio=ratio)
-    found = slowest_decay(system=system, reynolds=reynolds, rotation_reynolds=rotation, count=1)
-    return found.length, float(bound)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Decay:
-    """The slowest disturbances that decay downstream."""
-
-    rates: ComplexArray
-    """lambda d, slowest first, real parts negative."""
-    residual: float
-    """Largest relative residual of these modes."""
-    status: Status
-
-    @property
-    def length(self) -> float:
-        """Way on which the slowest one falls by e, in diameters."""
-        return -1 / float(self.rates[0].real)
-
-
-def slowest_decay(*, system: FlowSystem, reynolds: float, rotation_reynolds: float, count: int = 4) -> _Decay:
+def slowest_decay(
+    *, system: FlowSystem, reynolds: float, rotation_reynolds: float, count: int
+) -> ComplexArray:
     """Rates per diameter of the slowest disturbances downstream of laminar developed flow, mirror-symmetric.
 
-    Raises: ArithmeticError: the developed flow was not found.
+    Slowest first, real parts negative.
+    Raises: ArithmeticError: the developed flow or a mode of it was not found.
     Source: quadratic eigenproblem by finite elements, solved by shift and invert.
     """
     flow, matrices = _pencil(system, reynolds, rotation_reynolds)
-    scale = reynolds or 1.0
-    expected = _expected(reynolds, rotation_reynolds)
-    found, worst = [], 0.0
+    scale, expected = reynolds or 1.0, _length_bound(reynolds, rotation_reynolds)
+    found = []
     for share in _SHIFTS:
         mu, residual = _modes(matrices, -share * scale / expected, count + 4)
         rates = mu / scale
-        kept = (rates.real < 0) & (np.abs(rates) > _NOT_A_MODE / expected)
-        found.append(rates[kept])
-        worst = max(worst, float(np.max(residual[kept], initial=0.0)))
+        found.append(rates[(rates.real < 0) & (np.abs(rates) > _NOT_A_MODE / expected) & (residual < _LEFT)])
     rates = np.concatenate(found)
+    if rates.size == 0 or not flow.status.ok:
+        raise ArithmeticError("no mode found: refine the section's mesh")
     ordered = rates[np.lexsort((rates.imag, -np.round(rates.real, 6)))]
-    distinct = np.append(True, np.abs(np.diff(ordered)) > 1e-4 / expected)[: ordered.size]
-    status = Status()
-    if ordered.size == 0 or not flow.status.ok:
-        status = Status(code=StatusCode.NOT_CONVERGED, text="no mode found: refine the section's mesh")
-    return _Decay(rates=ordered[distinct][:count], residual=worst, status=status)
+    distinct = np.append(True, np.abs(np.diff(ordered)) > 1e-4 / expected)
+    return np.asarray(ordered[distinct][:count])
 
 
-def _expected(reynolds: float, rotation_reynolds: float) -> float:
+def _length_bound(reynolds: float, rotation_reynolds: float) -> float:
+    """The tube law's, in diameters."""
     ratio = rotating_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation_reynolds).value
     return float(
         developing_length(reynolds=reynolds, rotation_reynolds=rotation_reynolds, friction_ratio=ratio)
@@ -415,7 +376,7 @@ def _modes(matrices: tuple[Any, Any, Any], shift: float, count: int) -> tuple[Co
     """Eigenvalues mu next to a shift, and the relative residuals of their modes."""
     zero, one, two = matrices
     size = zero.shape[0]
-    factors = Factors.of(matrix=(zero + shift * one + shift**2 * two).tocsc(), along_diagonal=True)
+    factors = Factors.of((zero + shift * one + shift**2 * two).tocsc())
 
     def inverse(y: FloatArray) -> FloatArray:
         # (q, mu q) linearises the square; one factored matrix of the section's size serves.

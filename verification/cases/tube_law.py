@@ -35,7 +35,7 @@ from ringbalance.verification.evidence import (
     from_half_width,
 )
 from ringbalance.verification.loops import flow_law_of
-from ringbalance.verification.paper_numbers import fig_7_readings
+from ringbalance.verification.papers import fig_7_readings
 from ringbalance.verification.reference.exact_chamber import wall_pressure_of
 
 _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)

@@ -25,8 +25,9 @@ from ringbalance.verification.evidence import (
     figure,
     from_half_width,
 )
+from ringbalance.verification.finite_elements import found_of, mesh_table, ring_of
 from ringbalance.verification.loops import flow_law_of
-from ringbalance.verification.paper_numbers import (
+from ringbalance.verification.papers import (
     DENSITY,
     DEPARTURE_HIGH,
     DEPARTURE_LOW,
@@ -42,7 +43,6 @@ from ringbalance.verification.reference.exact_chamber import (
     wall_pressure_of,
     whole_ring_pressure,
 )
-from ringbalance.verification.rings import found_of, mesh_table, ring_of
 
 _SHARES: Final = np.array([0.1, 0.3, 0.5, 0.7, 0.9, 1.0])
 """Of the largest fill."""

@@ -1,9 +1,15 @@
-"""A scene at its extremes: every axis from end to end, and a designed set over all of them together."""
+"""A scene at its extremes: every axis from end to end, and a designed set over all of them together.
+
+The command `ringbalance extremes` prints the study.
+"""
 
 from __future__ import annotations
 
+import json as json_format
+import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -14,6 +20,15 @@ from ringbalance.results.numbers import number
 from ringbalance.results.result import Cells, Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.changes import document_of
+from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.loader import load_scene
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.platform.files import staged, write_whole
+from ringbalance.scene.platform.processes import checked_workers
+from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.toml import toml_text
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import AXES, Axis
 from ringbalance.verification.extremes.design import Base, Point, design
@@ -24,8 +39,12 @@ Progress = Callable[[str, int, int], None]
 """Called with what is being done, the points done of it and their number."""
 Record = dict[str, Any]
 
-SEED: Final = 1
-MOST_SHOWN: Final = 20
+_DONE: Final = 0
+_BROKEN: Final = 1
+_FILE: Final = "extremes.json"
+_KEPT: Final = "extremes-points.json"
+_SEED: Final = 1
+_MOST_SHOWN: Final = 20
 """Violations reported in full."""
 
 
@@ -114,7 +133,7 @@ def _answered(judgement: Judgement) -> bool:
     return judgement.ending not in (Ending.REFUSED, Ending.BROKEN)
 
 
-def sweeps(
+def _sweeps(
     base: Base, *, count: int, fineness: float, workers: int = 1, progress: Counting | None = None
 ) -> tuple[Sweep, ...]:
     """Every axis alone, in even steps, then halved wherever neighbours end differently.
@@ -283,13 +302,15 @@ def find_extremes(
     def told(what: str) -> Callable[[int, int], None] | None:
         return None if progress is None else lambda done, number: progress(what, done, number)
 
-    points = design(count=size.points, seed=SEED)
+    points = design(count=size.points, seed=_SEED)
     # First, so that a kept file that cannot be used is known at once.
     judgements = base.judged(points, workers=workers, progress=told("designed set"), kept=kept)
     return Extremes(
         points=points,
         judgements=judgements,
-        sweeps=sweeps(base, count=size.sweep, fineness=size.fineness, workers=workers, progress=told("axes")),
+        sweeps=_sweeps(
+            base, count=size.sweep, fineness=size.fineness, workers=workers, progress=told("axes")
+        ),
     )
 
 
@@ -310,7 +331,7 @@ def _violations(extremes: Extremes) -> list[Record]:
         {"point": dict(point), "violations": list(judgement.violations)}
         for point, judgement in places
         if judgement.violations
-    ][:MOST_SHOWN]
+    ][:_MOST_SHOWN]
 
 
 def _sweep(sweep: Sweep) -> Record:
@@ -328,3 +349,72 @@ def _sweep(sweep: Sweep) -> Record:
         "loop": [j.loop for j in sweep.judgements],
         "residual": [j.residual for j in sweep.judgements],
     }
+
+
+def extremes(
+    scene: Path,
+    *,
+    json: bool = False,
+    out: Path | None = None,
+    level: Level = "light",
+    workers: int | None = None,
+) -> int:
+    """Find the limits of validity of a scene: where results stop, what is reported beyond, and whether the
+    invariants hold inside.
+
+    Args:
+        scene: the scene file.
+        json: print one JSON document instead of tables.
+        out: also write extremes.json to this folder; after an interrupted run with the same folder the
+            designed set resumes where it stopped.
+        level: "heavy" judges thousands of points, for an hour or more.
+        workers: processes; default one for each core, at most two.
+
+    Returns:
+        Exit code: 0; 1 when an invariant was violated at some point.
+
+    Raises:
+        SceneError: a scene that cannot be used; nothing is written.
+        OSError: the folder cannot be written.
+    """
+    base = base_of(liquid_ring_scene(load_scene(scene)))
+    console = messages_console()
+    with nullcontext() if out is None else staged(out, files=(_KEPT, _FILE)) as stage:
+        with activity("extremes", "axes") as shown:
+            found = find_extremes(
+                base,
+                size=SIZES[level],
+                workers=min(2, os.cpu_count() or 1) if workers is None else checked_workers(workers),
+                progress=lambda what, done, number: shown.show(
+                    f"{what}: {done} of {number} points", done=done, total=number
+                ),
+                kept=None if out is None else out / _KEPT,
+            )
+        text = json_format.dumps(found.to_dict(), allow_nan=False)
+        if stage is not None:
+            write_whole(stage / _FILE, text + "\n")
+    if out is not None:
+        console.print(f"written to {out}", highlight=False)
+    if json:
+        print(text)
+    else:
+        results_console().print(found.rows().view(headline=False))
+    return _BROKEN if found.broken() else _DONE
+
+
+def base_of(scene: Scene) -> Base:
+    """Take a scene as the one to vary.
+
+    Raises: SceneError: its chamber is imported.
+    """
+    if scene.disc.geometry is not None:
+        fault = Fault(
+            file=scene.file,
+            table="disc",
+            key="mesh",
+            value=toml_text(scene.disc.geometry.file),
+            problem="the study takes the dimensions of a sector between plates to their extremes",
+            allowed="a scene that gives the dimensions of its chambers",
+        )
+        raise SceneError([fault])
+    return Base(document=document_of(scene), file=scene.source)

@@ -23,10 +23,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
 from ringbalance.verification.navier_stokes.meshes import Patch, patch_mesh, with_midpoints
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
-from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
 
 End = Literal["entrance", "exit"]
 
@@ -68,7 +67,7 @@ class EndMesh:
             Patch.tensor(x=outside, y=around, sides={"east": "far", "west": "wall", "north": "side"}),
             Patch.tensor(x=inside, y=core, sides={"east": "deep", "south": "axis", "north": "wall"}),
         ]
-        return patch_mesh(patches=patches, shape="quad")
+        return patch_mesh(patches)
 
     def system(self, *, end: End) -> FlowSystem:
         """Discrete equations of an end: developed flow deep in the tube, no force on the far reservoir."""

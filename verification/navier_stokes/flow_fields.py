@@ -16,16 +16,14 @@ from skfem.helpers import dot, grad
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.continuation import flow_at
 from ringbalance.verification.navier_stokes.end_losses import End, EndMesh, solve_end
-from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings
+from ringbalance.verification.navier_stokes.flow import Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, flow_at
 from ringbalance.verification.navier_stokes.rotating_section import (
     SectionMesh,
     developed_section,
     friction_ratio,
 )
-from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import Dirichlet, FlowSystem
 
 LARGEST_KL: Final = 1e6
 """R Re up to which the section is drawn; near it further steady flows appear."""

@@ -6,18 +6,16 @@ mid-nodes of a quadratic mesh and lie on the true geometry.  Patches that share 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from skfem import MeshQuad2, MeshTri2
+from skfem import MeshQuad2
 
 from ringbalance.scene.arrays import FloatArray, IntArray
-
-Curve = Callable[[FloatArray], FloatArray]
 
 # An irrational factor keeps dyadic coordinates away from the rounding boundaries of the gluing.
 _GLUE = 0.7548776662e9
@@ -92,14 +90,6 @@ def _quads(number: IntArray) -> IntArray:
     return np.stack([number[i, j].ravel() for i, j in order])
 
 
-def _triangles(number: IntArray) -> IntArray:
-    """Six nodes per triangle, two triangles per cell."""
-    q = _quads(number)
-    lower = q[[0, 1, 2, 4, 5, 8]]
-    upper = q[[0, 2, 3, 8, 6, 7]]
-    return np.concatenate([lower, upper], axis=1)
-
-
 def _side(number: IntArray, side: str) -> IntArray:
     chains = {"west": number[0], "east": number[-1], "south": number[:, 0], "north": number[:, -1]}
     return np.asarray(chains[side], dtype=np.int64)
@@ -118,16 +108,8 @@ def _named_facets(mesh: Any, nodes: FloatArray, patches: Sequence[Patch], number
     return {name: np.array(sorted(found)) for name, found in named.items()}
 
 
-def patch_mesh(*, patches: Sequence[Patch], shape: str = "quad") -> Any:
-    """Quadratic mesh of glued patches, whose nodes coincide where two touch, with named boundaries.
-
-    Args: `shape`: "quad" for nine-node quadrilaterals, "triangle" for six-node triangles.
-    Raises: ValueError: an unknown shape.
-    """
-    if shape not in ("quad", "triangle"):
-        raise ValueError(f'shape must be "quad" or "triangle", not {shape!r}')
+def patch_mesh(patches: Sequence[Patch]) -> Any:
+    """Nine-node quadrilaterals of patches, glued where nodes coincide, with named boundaries."""
     nodes, numbers = _numbered(patches)
-    cells = [(_quads if shape == "quad" else _triangles)(number) for number in numbers]
-    kind = MeshQuad2 if shape == "quad" else MeshTri2
-    mesh = kind(np.ascontiguousarray(nodes.T), np.concatenate(cells, axis=1))
+    mesh = MeshQuad2(np.ascontiguousarray(nodes.T), np.concatenate([_quads(n) for n in numbers], axis=1))
     return mesh.with_boundaries(_named_facets(mesh, nodes, patches, numbers))

@@ -22,17 +22,20 @@ import numpy as np
 from scipy import sparse
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.navier_stokes.continuation import flow_at
-from ringbalance.verification.navier_stokes.linear import Factors
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
 from ringbalance.verification.navier_stokes.meshes import (
     Patch,
     geometric_vertices,
     patch_mesh,
     with_midpoints,
 )
-from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
-from ringbalance.verification.navier_stokes.space import FlowSpace
-from ringbalance.verification.navier_stokes.system import Coefficients, Dirichlet, FlowSystem
+from ringbalance.verification.navier_stokes.newton import (
+    Factors,
+    FlowSolution,
+    NewtonSettings,
+    flow_at,
+    solve_flow,
+)
 
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""
@@ -83,7 +86,7 @@ class SectionMesh(_HalfSection):
             wall[np.abs(wall) < 1e-15] = 0.0
             sides = {"north": "wall"} | ({flat: "symmetry"} if flat else {})
             patches.append(Patch.ruled(inner=edge, outer=wall, blend=blend, sides=sides))
-        return patch_mesh(patches=patches)
+        return patch_mesh(patches)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +114,7 @@ class DuctMesh(_HalfSection):
             y=with_midpoints(vertices=z),
             sides={"west": "wall", "east": "wall", "north": "wall", "south": "symmetry"},
         )
-        return patch_mesh(patches=[patch])
+        return patch_mesh([patch])
 
 
 def _lines(points: FloatArray, count: int) -> FloatArray:
@@ -247,5 +250,4 @@ def _mass(system: FlowSystem) -> Any:
 def _factors(system: FlowSystem, coefficients: Coefficients, mass: Any, step: float) -> Factors:
     steady = system.free_part(system.linear_matrix(coefficients))
     matrix = (steady + 1.5 / step * mass[:, system.free]).tocsc()
-    quads = system.space.mesh.refdom.__name__ == "RefQuad"
-    return Factors.of(matrix=matrix, along_diagonal=quads)
+    return Factors.of(matrix)

@@ -1,5 +1,5 @@
-"""One operation of a pair under its flow law alone, in ways other than the program's own: the paper's closed
-form, Eq. 20's explicit segments and an adaptive Runge-Kutta method with events.
+"""One operation of a pair under its flow law alone: by the program's own march, the paper's closed form, Eq.
+20's explicit segments and an adaptive Runge-Kutta method with events.
 
 The driven chamber's fill ratio x obeys dx/dt = -(S/V) u(x_A, x_C, p) with x_C = total - x, which is taken in
 `Drive.opposite` and nowhere else: liquid is conserved by construction.
@@ -10,16 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from ringbalance.reduced_model.injection.dynamics import Event
+from ringbalance.reduced_model.injection.dynamics import Column, Dynamics, Event
+from ringbalance.reduced_model.injection.pair import Motion, PairState, opened, pass_time
 from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray, clipped
+from ringbalance.scene.models import Tube
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,29 +129,17 @@ class Transfer:
 
 
 Integrator = Callable[[Drive, FloatArray], Transfer]
-"""Takes a drive and ascending instants (s from the start, shape (m,), the last one the duration)."""
-
-
-def checked_instants(instants: npt.ArrayLike) -> FloatArray:
-    """Instants as an array; ValueError when there are none, or negative, descending or infinite ones."""
-    t = np.asarray(instants, dtype=np.float64)
-    # A NaN fails every comparison, an infinity stands last.
-    if t.ndim != 1 or t.size == 0 or not (t[0] >= 0 and t[-1] < np.inf and bool(np.all(t[1:] >= t[:-1]))):
-        raise ValueError("instants must be at least one finite time >= 0, in ascending order")
-    return t
+"""Takes a drive and ascending instants, s from the start, at least one; the last is the duration."""
 
 
 def closed_form(drive: Drive, instants: FloatArray) -> Transfer:
-    """Transfer with the velocity linear in time, exact to round-off.
+    """Transfer by the paper's law with the velocity linear in time, exact to round-off.
 
     u^2 = a (p + b (2x - total)) gives du/dt = -a b S/V, so
     x(t) = x0 - (S/V) (u0 t - a b (S/V) t^2/2) until the velocity is zero or a chamber empty or full.
-    Raises: ValueError: a law without a closed form, or instants that do not ascend from zero.
     Source: Eqs. 19 and 20 of the liquid-ring paper in the limit of small segments.
     """
-    if not isinstance(drive.law, PaperLaw):
-        raise ValueError(f"the law {drive.law.name!r} has no closed form")
-    t = checked_instants(instants)
+    t = np.asarray(instants, dtype=np.float64)
     u0, deceleration, end, stalls = _parabola(drive, drive.fill)
     if u0 == 0:
         return drive.still(t, flow=drive.flow(drive.fill))
@@ -172,39 +163,23 @@ def closed_form(drive: Drive, instants: FloatArray) -> Transfer:
 
 
 def _parabola(drive: Drive, fill: float) -> tuple[float, float, float, bool]:
-    law = cast(PaperLaw, drive.law)
-    return _linear_course(
-        fill,
-        law.velocity_squared_per_pressure,
-        law.pressure_per_fill_difference,
-        drive.gas_pressure,
-        drive.exchange_rate,
-        drive.total,
-        drive.lowest,
-    )
-
-
-def _linear_course(
-    fill: float,
-    squared_per_pressure: float,
-    pressure_per_fill: float,
-    gas_pressure: float,
-    exchange_rate: float,
-    total: float,
-    lowest: float,
-) -> tuple[float, float, float, bool]:
     """Path of a flow whose squared velocity is linear in the fill ratio: a parabola in time.
 
-    u^2 = a (p + b (2x - total)) gives du/dt = -a b S/V; it ends at a velocity of zero or at the lowest fill,
-    where D = (S/V) t (u0 + u_end)/2 with u_end^2 = u0^2 - 2 a b D.
+    It ends at a velocity of zero or at the lowest fill, where D = (S/V) t (u0 + u_end)/2 with
+    u_end^2 = u0^2 - 2 a b D.
     Returns: Initial velocity (m/s, zero where nothing flows), decrease (m/s^2), end (s), whether it stalls.
     """
-    squared = squared_per_pressure * (gas_pressure + pressure_per_fill * (2.0 * fill - total))
-    slowing = squared_per_pressure * pressure_per_fill * exchange_rate
-    if squared <= 0.0 or gas_pressure <= 0.0:
+    law = cast(PaperLaw, drive.law)
+    squared_per_pressure, pressure_per_fill = (
+        law.velocity_squared_per_pressure,
+        law.pressure_per_fill_difference,
+    )
+    squared = squared_per_pressure * (drive.gas_pressure + pressure_per_fill * (2.0 * fill - drive.total))
+    slowing = squared_per_pressure * pressure_per_fill * drive.exchange_rate
+    if squared <= 0.0 or drive.gas_pressure <= 0.0:
         return 0.0, slowing, 0.0, True
     u0 = math.sqrt(squared)
-    distance = (fill - lowest) / exchange_rate
+    distance = (fill - drive.lowest) / drive.exchange_rate
     left = squared - 2.0 * slowing * distance
     if left <= 0.0:
         return u0, slowing, u0 / slowing, True
@@ -228,58 +203,43 @@ def explicit_segments(segments: int) -> Integrator:
 
     Near a stall, where u goes like the square root of the distance, a segment may step over it; the law then
     answers with zero and the fill stays where it landed. Between segments fills lie on the straight line.
-    Raises: ValueError: fewer than one segment.
     Source: Eq. 20 of the liquid-ring paper.
     """
-    if segments < 1:
-        raise ValueError(f"segments must be at least 1, not {segments}")
 
-    def integrate(drive: Drive, instants: FloatArray) -> Transfer:
-        return _segments_of(drive, checked_instants(instants), segments)
+    def integrate(drive: Drive, t: FloatArray) -> Transfer:
+        before = drive.flow(drive.fill, primed=drive.primed)
+        velocity, regime = float(before.velocity), Regime(int(before.regime))
+        if velocity == 0:
+            return drive.still(t, flow=before)
+        edges = np.linspace(0.0, t[-1], segments + 1)
+        x = np.full(segments + 1, drive.fill)
+        event, event_time = Event.NONE, None
+        for i, step in enumerate(np.diff(edges)):
+            x[i + 1 :] = min(max(x[i] - velocity * drive.exchange_rate * step, drive.lowest), drive.highest)
+            end = drive.lowest if velocity > 0 else drive.highest
+            if x[i + 1] == end:
+                event = drive.boundary_event(end)
+            else:
+                velocity = float(drive.flow(x[i + 1]).velocity)
+                event = Event.STALLED if velocity == 0 else Event.NONE
+            if event is not Event.NONE:
+                event_time = float(edges[i + 1])
+                break
+        fill = np.interp(t, edges, x)
+        return drive.finished(t, fill, regime_start=regime, event=event, event_time=event_time)
 
     return integrate
-
-
-def _segments_of(drive: Drive, t: FloatArray, segments: int) -> Transfer:
-    before = drive.flow(drive.fill, primed=drive.primed)
-    velocity, regime = float(before.velocity), Regime(int(before.regime))
-    if velocity == 0:
-        return drive.still(t, flow=before)
-    edges = np.linspace(0.0, t[-1], segments + 1)
-    x = np.full(segments + 1, drive.fill)
-    event, event_time = Event.NONE, None
-    for i, step in enumerate(np.diff(edges)):
-        x[i + 1 :] = min(max(x[i] - velocity * drive.exchange_rate * step, drive.lowest), drive.highest)
-        event = _end_event(drive, float(x[i + 1]), velocity)
-        velocity = float(drive.flow(x[i + 1]).velocity) if event is Event.NONE else velocity
-        event = Event.STALLED if velocity == 0 else event
-        if event is not Event.NONE:
-            event_time = float(edges[i + 1])
-            break
-    return drive.finished(t, np.interp(t, edges, x), regime_start=regime, event=event, event_time=event_time)
-
-
-def _end_event(drive: Drive, fill: float, velocity: float) -> Event:
-    end = drive.lowest if velocity > 0 else drive.highest
-    return drive.boundary_event(end) if fill == end else Event.NONE
 
 
 def adaptive_ode(*, tolerance: float = 1e-10) -> Integrator:
     """An integrator by scipy's DOP853 with events at the ends of the range and at a stall.
 
     Args: `tolerance`: on the fill ratio; a stall is where its square root of the first velocity is left.
-    Raises: ValueError: a tolerance outside (0, 1).
     """
-    if not 0 < tolerance < 1:
-        raise ValueError(f"tolerance must lie within (0, 1), not {tolerance}")
-
-    def integrate(drive: Drive, instants: FloatArray) -> Transfer:
-        return _solve(drive, checked_instants(instants), tolerance)
-
-    return integrate
+    return partial(_solve, tolerance=tolerance)
 
 
-def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
+def _solve(drive: Drive, t: FloatArray, *, tolerance: float) -> Transfer:
     before = drive.flow(drive.fill, primed=drive.primed)
     u0, regime = float(before.velocity), Regime(int(before.regime))
     end = drive.lowest if u0 > 0 else drive.highest
@@ -287,15 +247,22 @@ def _solve(drive: Drive, t: FloatArray, tolerance: float) -> Transfer:
         return drive.still(t, flow=before)
     if t[-1] == 0 or drive.fill == end:
         event = drive.boundary_event(end) if drive.fill == end else Event.NONE
-        return _unmoved(drive, t, regime, event)
+        time = None if event is Event.NONE else 0.0
+        fill = np.full(t.shape, drive.fill)
+        return drive.finished(t, fill, regime_start=regime, event=event, event_time=time)
 
     primed = drive.primed or bool(before.primed)
-    solved = _march(drive, u0, end, float(t[-1]), tolerance, primed=primed)
+    solved = _path(drive, u0, end, float(t[-1]), tolerance, primed=primed)
     last = float(solved.t[-1])
     fill = np.asarray(solved.sol(np.minimum(t, last))[0], dtype=np.float64)
-    if solved.t_events[2].size:
+    at_end, at_stall, at_priming = (bool(times.size) for times in solved.t_events)
+    if at_priming:
         return _once_primed(drive, t, fill, float(solved.y[0, -1]), last, tolerance)
-    event = _event(drive, end, [bool(times.size) for times in solved.t_events], finished_=solved.status >= 0)
+    event = Event.STALLED if at_stall else Event.NONE
+    if solved.status < 0:
+        event = Event.UNFINISHED
+    elif at_end:
+        event = drive.boundary_event(end)
     if event in {Event.EMPTY, Event.FULL}:
         fill = np.where(t >= last, end, fill)
     return drive.finished(
@@ -313,7 +280,7 @@ def _once_primed(
 ) -> Transfer:
     """The rest of a transfer that spilled until it primed its tube."""
     rest = np.concatenate([[0.0], np.maximum(t - at, 0.0)])
-    after = _solve(replace(drive, fill=reached, primed=True), rest, tolerance)
+    after = _solve(replace(drive, fill=reached, primed=True), rest, tolerance=tolerance)
     return replace(
         after,
         instants=t,
@@ -323,7 +290,7 @@ def _once_primed(
     )
 
 
-def _march(drive: Drive, u0: float, end: float, duration: float, tolerance: float, *, primed: bool) -> Any:
+def _path(drive: Drive, u0: float, end: float, duration: float, tolerance: float, *, primed: bool) -> Any:
     def slope(_: float, x: FloatArray) -> FloatArray:
         return np.asarray(-drive.exchange_rate * drive.flow(x, primed=primed).velocity, dtype=np.float64)
 
@@ -349,19 +316,39 @@ def _march(drive: Drive, u0: float, end: float, duration: float, tolerance: floa
     )
 
 
-def _unmoved(drive: Drive, t: FloatArray, regime: Regime, event: Event) -> Transfer:
-    return drive.finished(
-        t,
-        np.full(t.shape, drive.fill),
-        regime_start=regime,
-        event=event,
-        event_time=None if event is Event.NONE else 0.0,
-    )
+def marched(tube: Tube) -> Integrator:
+    """The march that every run takes, without a term beyond the flow law; its error is that of one run."""
 
+    def integrate(drive: Drive, t: FloatArray) -> Transfer:
+        dynamics = Dynamics(
+            column=Column.of(law=drive.law, tube=tube),
+            inertia=False,
+            line=None,
+            valve_lag=0.0,
+            gas_pressure=drive.gas_pressure,
+            ambient_pressure=1e5,
+            dead_volume=0.0,
+            tube_area=drive.exchange_rate,
+            chamber_volume=1.0,
+            max_fill_ratio=drive.law.max_fill_ratio,
+        )
+        valve = opened(dynamics, chamber=0, duration=2 * float(t[-1]) + 1)
+        pair = PairState(
+            fill=drive.fill,
+            total=drive.total,
+            primed=drive.primed,
+            motion=Motion(pending=valve if drive.gas_pressure > 0 else ()),
+        )
+        path = pass_time(dynamics, pair, instants=t)
+        record = path.motion.record
+        return Transfer(
+            instants=t,
+            fill=path.fills,
+            regime_start=record.regime_start,
+            regime_end=record.regime_end,
+            event=record.event,
+            event_time=path.ended if record.event is not Event.NONE else None,
+            primed=path.primed,
+        )
 
-def _event(drive: Drive, end: float, hit: list[bool], *, finished_: bool) -> Event:
-    if not finished_:
-        return Event.UNFINISHED
-    if hit[0]:
-        return drive.boundary_event(end)
-    return Event.STALLED if hit[1] else Event.NONE
+    return integrate

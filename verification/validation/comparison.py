@@ -119,7 +119,7 @@ class Comparison:
             limit=PROMISED,
             found=Found(value=self.statistics.share_within),
             reference=None,
-        ).verdict
+        )[0]
 
     def over_reynolds(self, of: str) -> Series:
         """Predicted friction factors with their stated uncertainty, and the measured ones."""

@@ -7,7 +7,7 @@ from eccentric_runs import bundled
 
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.verification.eccentric_scenes import at_constant_speed
+from ringbalance.verification.papers import at_constant_speed
 
 
 @pytest.fixture(scope="session")

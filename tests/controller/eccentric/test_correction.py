@@ -13,7 +13,7 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
-from ringbalance.verification.eccentric_scenes import at_constant_speed, changed
+from ringbalance.verification.papers import at_constant_speed, changed
 
 BUNDLED = ("washing_machine", "eccentric_mass_paper", "driven_masses_small")
 

@@ -16,7 +16,12 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import DriveLaw
 from ringbalance.controller.eccentric_mass.step import friction_torque
 from ringbalance.controller.eccentric_mass.targets import target_angles
-from ringbalance.verification.cases.driven_balancing import BalancingFigure, motion_bound, run_up
+from ringbalance.verification.cases.driven_balancing import (
+    balanced_at_constant_speed,
+    beside_the_targets,
+    motion_bound,
+    run_up,
+)
 from ringbalance.verification.cases.driven_estimation import (
     estimate_imbalance,
     figure_four,
@@ -25,7 +30,7 @@ from ringbalance.verification.cases.driven_estimation import (
     imbalance_record,
 )
 from ringbalance.verification.cases.driven_positioning import efforts, growth, printed_compensation
-from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 
 def test_figure_four_honest_filters_need_no_seconds(paper: EccentricScene) -> None:
@@ -56,23 +61,23 @@ def test_figure_six_grows_only_with_what_compensation_leaves(paper: EccentricSce
 
 
 def test_figure_seven_balances_both_imbalances(paper: EccentricScene) -> None:
-    found = BalancingFigure.seven(paper, time_limit=20.0)
+    found = balanced_at_constant_speed(paper, time_limit=20.0)
     plant = PlantParameters.of(paper)
     expected = abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.before == pytest.approx((expected, expected))
     assert max(found.after) < 2e-3 * expected
-    for run in found.runs:
+    for run in found.runs.values():
         assert run.settled
 
 
 def test_figure_eight_is_mended_by_fine_tuning(paper: EccentricScene) -> None:
-    found = BalancingFigure.eight(paper, time_limit=200.0)
+    found = balanced_at_constant_speed(beside_the_targets(paper), time_limit=200.0)
     plant = PlantParameters.of(paper)
     # Both masses 10 degrees on turn the correction by 10 degrees: 2 sin 5 deg of the imbalance is left.
     expected = 2 * math.sin(math.radians(5)) * abs(plant.steady_whirl(100 * RPM, (0.0, math.pi)))
     assert found.positioned == pytest.approx((expected, expected), rel=0.02)
     assert max(found.after) < paper.supervisor.limit
-    for run in found.runs:
+    for run in found.runs.values():
         assert run.settled
         assert "fine tuning" in [stage.name for stage in run.stages]
 

@@ -15,9 +15,9 @@ from ringbalance.controller.eccentric_mass.imbalance_filter import (
     MassInput,
     ProcessNoise,
     WhirlModel,
+    _euler_transition,
     _process_covariance,
     correct,
-    euler_transition,
     filter_matrices,
     imbalance_deviation,
     imbalance_history,
@@ -92,7 +92,9 @@ def test_transition_is_the_matrix_exponential(model: WhirlModel, speed: float, s
     generator = whirl_generator(model=model, angular_velocity=speed)
     expected = expm(generator * step)
     np.testing.assert_allclose(whirl_transition(model, speed, step), expected, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(euler_transition(model, speed, step), np.eye(6) + generator * step, atol=1e-15)
+    np.testing.assert_allclose(
+        _euler_transition(model, speed, step), np.eye(6) + generator * step, atol=1e-15
+    )
 
 
 def test_generator_is_the_whirls_equation() -> None:
@@ -122,7 +124,7 @@ def test_eulers_step_limit_is_where_its_eigenvalues_leave_the_unit_circle(
 ) -> None:
     limit = float(model.euler_step_limit(angular_velocity=speed))
     for share, grows in ((0.999, False), (1.001, True)):
-        radius = max(abs(np.linalg.eigvals(euler_transition(model, speed, share * limit)[:4, :4])))
+        radius = max(abs(np.linalg.eigvals(_euler_transition(model, speed, share * limit)[:4, :4])))
         assert (radius > 1) == grows
 
 

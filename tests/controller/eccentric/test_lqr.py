@@ -16,7 +16,7 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, 
 from ringbalance.controller.eccentric_mass.settings import lqr_gain
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
-from ringbalance.verification.eccentric_scenes import changed
+from ringbalance.verification.papers import changed
 
 TRACKS = [TrackModel(0.0112, 0.16, 0.0414), TrackModel(0.5, 0.0, 0.1), TrackModel(0.01, 2.0, 0.03)]
 PAPER = TRACKS[0]

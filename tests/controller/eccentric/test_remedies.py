@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import random
 from dataclasses import replace
@@ -19,10 +20,11 @@ from ringbalance.controller.eccentric_mass.plan import Stage
 from ringbalance.controller.eccentric_mass.resolution import friction_floor
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.results.rows import Finding
 from ringbalance.scene import SceneError
-from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 SEEDS = range(3)
 
@@ -310,3 +312,38 @@ def test_a_stalled_drive_with_too_low_a_gain_is_not_advised_more_volts_alone(sce
     assert run.outcome == "stalled"
     for remedy in run.remedies:
         assert simulate_eccentric(cured(limited, remedy)).outcome != "stalled"
+
+
+@pytest.fixture(scope="module")
+def unlimited() -> EccentricScene:
+    """The small scene with the weight and gain of a larger machine, and without its voltage limit."""
+    strong = changed(bundled("driven_masses_small"), "lqr", state_weight=3.5)
+    fast = changed(strong, "friction_filter", speed_gain=2.0)
+    return changed(changed(fast, "motor", maximum_voltage=None), "run", time_limit=4.0)
+
+
+def test_a_diverging_run_has_finite_numbers_and_a_remedy(unlimited: EccentricScene) -> None:
+    run = simulate_eccentric(unlimited)
+    assert run.outcome == "diverged"
+    assert not run.settled
+    assert run.time[-1] < 4.0
+    json.dumps(run.to_dict(), allow_nan=False)
+    assert np.all(np.isfinite(run.amplitude))
+    mended = changed(cured(unlimited, run.remedies[0]), "run", time_limit=8.0)
+    assert all(loop.stable for loop in RecommendedGains.of(mended).loops)
+    assert simulate_eccentric(mended).settled
+
+
+def test_sampled_poles_of_the_small_scene(unlimited: EccentricScene) -> None:
+    speed = RecommendedGains.of(unlimited).speed
+    assert speed.radius == pytest.approx(1.34, abs=0.01)
+    half = changed(unlimited, "friction_filter", speed_gain=2 * speed.recommended)
+    assert RecommendedGains.of(half).speed.radius == pytest.approx(1.0)
+
+
+def test_a_run_of_too_many_steps_or_samples_is_refused_with_key_and_limit(unlimited: EccentricScene) -> None:
+    stiff = changed(changed(unlimited, "rotor", stiffness=1.26e12), "run", time_limit=30.0)
+    with pytest.raises(SceneError, match=r"\[rotor\] stiffness = .* allowed: at most .* N/m"):
+        simulate_eccentric(stiff)
+    with pytest.raises(SceneError, match="time_limit"):
+        simulate_eccentric(changed(unlimited, "run", time_limit=1e6))

@@ -15,7 +15,7 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
-from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 
 def shrunk(size: float) -> EccentricScene:

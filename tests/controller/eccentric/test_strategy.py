@@ -17,7 +17,7 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, E
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import strategy_start, strategy_step
-from ringbalance.verification.eccentric_scenes import RPM, at_constant_speed, changed
+from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 
 @pytest.fixture(scope="module")

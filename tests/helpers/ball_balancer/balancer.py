@@ -24,7 +24,6 @@ from ringbalance.controller.balancer import (
     outcomes_of,
     requirements_of,
     rotor_fault,
-    vibrating,
 )
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
 from ringbalance.results.requirements import Requirement
@@ -170,17 +169,14 @@ class BallBalancer:
     def rotor(self) -> CommonRotor:
         """The scene's."""
         rotor = self.scene.rotor
-        return vibrating(
-            self.scene,
-            CommonRotor(
-                source=self.scene.source,
-                speed=rotor.speed,
-                influence=cmath.rect(rotor.influence_coefficient, -rotor.lag_angle),
-                unbalance=cmath.rect(rotor.unbalance, rotor.phase),
-                mass=None,
-                noise=0.0,
-                limit=self.scene.vibration.limit,
-            ),
+        return CommonRotor(
+            source=self.scene.source,
+            speed=rotor.speed,
+            influence=cmath.rect(rotor.influence_coefficient, -rotor.lag_angle),
+            unbalance=cmath.rect(rotor.unbalance, rotor.phase),
+            mass=None,
+            noise=0.0,
+            limit=self.scene.vibration.limit,
         )
 
     def on_rotor(self, rotor: CommonRotor | None) -> BallBalancer:

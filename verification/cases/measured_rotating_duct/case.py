@@ -10,13 +10,13 @@ from ringbalance.physics.tube.rotation_table import laminar_ratio
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
+from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.rotating_section import (
     POISEUILLE_GRADIENT,
     DuctMesh,
     SectionMesh,
     march_section,
 )
-from ringbalance.verification.navier_stokes.system import FlowSystem
 
 _SQUARE: Final = ((0.5, 2000.0, 8e-6, 0.06), (1.0, 1000.0, 1e-5, 0.06), (1.0, 2000.0, 4e-6, 0.04))
 _FAST: Final = (3.3, 1810.0, 4e-6, 0.03)

@@ -8,51 +8,61 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from eccentric_runs import bundled
 
-from ringbalance.controller.eccentric_mass import study as study_module
+from ringbalance.controller.eccentric_mass import requirements as requirements_module
+from ringbalance.controller.eccentric_mass.requirements import DRAWS, eccentric_requirements, interval
+from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.study import DRAWS, _EccentricStudy, eccentric_study, interval
 from ringbalance.results.requirements import Requirement
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.verification.eccentric_scenes import changed
+from ringbalance.verification.papers import changed
 
 
 @pytest.fixture(scope="module")
-def study() -> _EccentricStudy:
-    return eccentric_study(replace(bundled("eccentric_mass_paper"), uncertainty=()))
+def certain(paper: EccentricScene) -> EccentricScene:
+    return replace(paper, uncertainty=())
 
 
-def test_the_locked_run_is_what_balancing_is_judged_by(study: _EccentricStudy) -> None:
-    assert study.locked.outcome.value == "locked"
-    assert study.locked.unbalanced_amplitude == study.run.unbalanced_amplitude
-    assert study.locked.worst_amplitude > study.run.worst_amplitude
-    assert json.loads(json.dumps(study.document(), allow_nan=False))["locked"]["settled"] is False
+@pytest.fixture(scope="module")
+def run(certain: EccentricScene) -> EccentricRun:
+    return simulate_eccentric(certain)
 
 
-def test_the_moment_of_both_masses_side_by_side_is_the_capacity(study: _EccentricStudy) -> None:
-    masses = study.scene.masses
+def test_the_locked_run_is_what_balancing_is_judged_by(certain: EccentricScene, run: EccentricRun) -> None:
+    locked = locked_run(certain)
+    assert locked.outcome.value == "locked"
+    assert locked.unbalanced_amplitude == run.unbalanced_amplitude
+    assert locked.worst_amplitude > run.worst_amplitude
+    assert json.loads(json.dumps(locked.to_dict(), allow_nan=False))["settled"] is False
+
+
+def test_all_is_met_and_the_capacity_is_that_of_both_masses_side_by_side(
+    certain: EccentricScene, run: EccentricRun
+) -> None:
+    masses = certain.masses
     side_by_side = math.cos(masses.arc_length / masses.guide_radius / 2)
-    row = next(row for row in study.requirements if row.quantity == "balancing moment")
+    found = {row.quantity: row for row in eccentric_requirements(certain, run)}
+    assert all(row.met for row in found.values())
+    row = found["balancing moment"]
     assert row.achieved == pytest.approx(2 * masses.mass * masses.guide_radius * side_by_side)
-    assert row.required == pytest.approx(study.scene.imbalance.mass * study.scene.imbalance.radius)
+    assert row.required == pytest.approx(certain.imbalance.mass * certain.imbalance.radius)
 
 
-def test_a_requirement_that_is_missed_says_so(study: _EccentricStudy) -> None:
-    assert all(row.met for row in study.requirements)
-    heavy = changed(study.scene, "imbalance", mass=3 * study.scene.imbalance.mass)
-    missed = {row.quantity for row in eccentric_study(heavy).requirements if not row.met}
+def test_a_requirement_that_is_missed_says_so(certain: EccentricScene) -> None:
+    heavy = rows_of(changed(certain, "imbalance", mass=3 * certain.imbalance.mass))
+    missed = {row.quantity for row in heavy.values() if not row.met}
     assert {"balancing moment", "amplitude at the end", "settling time"} <= missed
 
 
-def test_a_loop_at_its_gain_margin_is_at_the_edge(study: _EccentricStudy) -> None:
-    speed = study.tuning.gains.speed
-    edge = changed(study.scene, "friction_filter", speed_gain=speed.value * speed.gain_margin * (1 + 1e-6))
-    beyond = eccentric_study(replace(edge, run=replace(edge.run, time_limit=1.0)))
-    assert not beyond.tuning.gains.speed.stable
-    assert beyond.tuning.gains.speed.radius == pytest.approx(1.0, abs=1e-4)
-    row = next(row for row in beyond.requirements if row.quantity == "gain margin of the speed control")
-    assert not row.met
+def test_a_loop_at_its_gain_margin_is_at_the_edge(certain: EccentricScene) -> None:
+    speed = RecommendedGains.of(certain).speed
+    edge = changed(certain, "friction_filter", speed_gain=speed.value * speed.gain_margin * (1 + 1e-6))
+    beyond = RecommendedGains.of(edge).speed
+    assert not beyond.stable
+    assert beyond.radius == pytest.approx(1.0, abs=1e-4)
+    assert not rows_of(changed(edge, "run", time_limit=1.0))["gain margin of the speed control"].met
 
 
 def uncertain(
@@ -75,16 +85,16 @@ def uncertain(
 def rows_of(scene: EccentricScene, *, draws: int = DRAWS) -> dict[str, Requirement]:
     """Requirements by quantity; few drawn runs do where the runs with one input moved are looked at."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study_module, "DRAWS", draws)
-        return {row.quantity: row for row in eccentric_study(scene).requirements}
+        patch.setattr(requirements_module, "DRAWS", draws)
+        return {row.quantity: row for row in eccentric_requirements(scene, simulate_eccentric(scene))}
 
 
-def test_the_interval_of_the_capacity_follows_from_both_inputs(study: _EccentricStudy) -> None:
+def test_the_interval_of_the_capacity_follows_from_both_inputs(certain: EccentricScene) -> None:
     """The capacity is proportional to the mass of each; the need to that of the imbalance.
 
     Both are known before the run begins.
     """
-    scene = uncertain(study.scene, time_limit=0.5, masses__mass=(0.01, True), imbalance__mass=(0.009, False))
+    scene = uncertain(certain, time_limit=0.5, masses__mass=(0.01, True), imbalance__mass=(0.009, False))
     row = rows_of(scene)["balancing moment"]
     assert row.achieved is not None
     need = scene.imbalance.mass * scene.imbalance.radius
@@ -116,29 +126,29 @@ def test_95_per_cent_of_further_draws_lie_in_an_interval() -> None:
     assert np.mean(inside) == pytest.approx(0.95, abs=0.006)
 
 
-def test_an_unknown_stiffness_is_one_that_the_controller_does_not_know(study: _EccentricStudy) -> None:
+def test_an_unknown_stiffness_is_one_that_the_controller_does_not_know(certain: EccentricScene) -> None:
     """The whirl that is left is what the error of the estimated imbalance gives, D_b/D - 1 of it."""
-    plain = changed(study.scene, "supervisor", correction="trials")
+    plain = changed(certain, "supervisor", correction="trials")
     exact = rows_of(uncertain(plain))["amplitude at the end"]
     row = rows_of(uncertain(plain, rotor__stiffness=(0.003, True)), draws=5)["amplitude at the end"]
-    rotor, masses = study.scene.rotor, study.scene.masses
+    rotor, masses = certain.rotor, certain.masses
     speed, mass = rotor.speed_profile[0].speed, rotor.mass + 2 * masses.mass
     believed = rotor.stiffness - mass * speed**2 + 1j * rotor.damping * speed
     true = believed - 0.003 * rotor.stiffness
-    need = study.scene.imbalance.mass * study.scene.imbalance.radius
+    need = certain.imbalance.mass * certain.imbalance.radius
     left = abs(believed / true - 1) * need * speed**2 / abs(true)
     assert exact.achieved_interval is None
     assert row.achieved_interval is not None
     # Above the limit fine tuning would start, and the amplitude would be another.
-    assert left < study.scene.supervisor.limit
+    assert left < certain.supervisor.limit
     # Arrival leaves some micrometres more, wherever friction stops the masses.
     assert row.effects["rotor.stiffness"][0] == pytest.approx(left, abs=12e-6)
 
 
-def test_an_input_that_loses_a_result_leaves_it_open(study: _EccentricStudy) -> None:
+def test_an_input_that_loses_a_result_leaves_it_open(certain: EccentricScene) -> None:
     """An imbalance within reach, or beyond it at the upper end of its interval."""
-    row = rows_of(uncertain(study.scene, imbalance__mass=(0.5, True)))
-    reach = rows_of(uncertain(study.scene, imbalance__radius=(0.24, False)), draws=5)
+    row = rows_of(uncertain(certain, imbalance__mass=(0.5, True)))
+    reach = rows_of(uncertain(certain, imbalance__radius=(0.24, False)), draws=5)
     assert row["settling time"].verdict == "met"
     assert reach["settling time"].lost == ("imbalance.radius",)
     assert reach["settling time"].verdict == "cannot be told"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from skfem import Basis, ElementHex2, FacetBasis
 
-from ringbalance.mesh.bent_tube import Segment, SweptTube, swept_tube
 from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
+from ringbalance.verification.reference.bent_tube import Segment, SweptTube, swept_tube
 
 BEND = Segment(length=np.pi, turn=-np.pi / 2, cells=4)
 PATH = (Segment(length=1.5, cells=2, ratio=0.5), BEND, Segment(length=2.0, cells=2))

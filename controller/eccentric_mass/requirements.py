@@ -1,4 +1,4 @@
-"""One scene with eccentric masses as a report needs it: balanced and locked run, loops, requirements.
+"""What a scene demands of its eccentric masses, and what its run and its loops come to.
 
 Intervals follow from the scene's stated uncertainties and its sensors' noise: the plant is moved, not what
 the controller is configured with, which does not know what is unknown.
@@ -7,20 +7,19 @@ the controller is configured with, which does not know what is unknown.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
-from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
+from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.targets import target_angles
-from ringbalance.controller.eccentric_mass.tuning import EccentricTuning, tune_eccentric
 from ringbalance.results.requirements import AT_LEAST, AT_MOST, Interval, Requirement
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.paths import moved_at
@@ -36,47 +35,12 @@ DRAWS: Final = 39
 """Of so many: 95 % of further ones lie between least and greatest, or between an end and the second."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _EccentricStudy:
-    """What a report shows of one scene."""
-
-    scene: EccentricScene
-    run: EccentricRun
-    """As the scene says."""
-    locked: EccentricRun
-    """With the masses clamped where they start: the same rotor without balancing."""
-    tuning: EccentricTuning
-    """The loops alone, without runs."""
-    requirements: tuple[Requirement, ...]
-
-    def document(self) -> dict[str, Any]:
-        """Plain numbers in SI: both runs as `simulate --json` gives them, the loops as `tune --json` does."""
-        return {
-            "run": self.run.to_dict(),
-            "locked": self.locked.to_dict(),
-            "tuning": self.tuning.to_dict(),
-            "requirements": [row.document() for row in self.requirements],
-        }
-
-
-def eccentric_study(scene: EccentricScene) -> _EccentricStudy:
-    """Run a scene balanced and locked, and judge its loops and requirements.
+def eccentric_requirements(scene: EccentricScene, run: EccentricRun) -> tuple[Requirement, ...]:
+    """Of its run as the scene says, and of its loops.
 
     A scene that states uncertainties is run again with all inputs drawn, which gives the intervals, and with
     each input at both ends of its own, which tells what they come from.
     """
-    run = simulate_eccentric(scene)
-    return _EccentricStudy(
-        scene=scene,
-        run=run,
-        locked=locked_run(scene),
-        tuning=tune_eccentric(scene, runs=0),
-        requirements=eccentric_requirements(scene, run),
-    )
-
-
-def eccentric_requirements(scene: EccentricScene, run: EccentricRun) -> tuple[Requirement, ...]:
-    """Of its run as the scene says, with intervals, and of its loops."""
     moved, drawn = _moved_runs(scene), _drawn_runs(scene)
     rows = (_with_intervals(row, moved, drawn) for row in _of_run(scene, run))
     return (*rows, *_of_loops(RecommendedGains.of(scene)))

@@ -18,18 +18,215 @@ proportion to the prediction are ours.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.identification.criticism.misreadings import MISREADINGS, Misreading
-from ringbalance.identification.criticism.ranges import ComparedColumn
+from ringbalance.controller.rotor import chamber_letters
+from ringbalance.identification.kinds.kind import Column, Observations
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.scene.arrays import FloatArray
+
+FAR: Final = 5.0
+"""Ratio of a column's median to the nearer end of the scene's range: below the ten of the smallest mistake of
+a unit, and beyond what a test rig changes."""
+_FAR_VIBRATION: Final = 100.0
+"""The same of vibrations, which the scene seldom knows better."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparedColumn:
+    """One column of one file."""
+
+    file: str
+    column: str
+    unit: str
+    """Of the template; empty for a number without one."""
+    ratio: float
+    """Median of the column over the nearer end of the scene's range; one within it."""
+    fails: bool
+    """Whether it lies so far off that a unit is wrong, or the machine another one."""
+    text: str
+
+
+def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
+    """Columns against what the scene has."""
+    for block in problem.blocks:
+        observations = block.observations
+        ranges = block.kind.ranges(problem.scene)
+        for column in block.kind.columns:
+            values, known = observations.columns.get(column.name), ranges.get(column.name)
+            if values is None or known is None or not np.any(values):
+                continue
+            low, high = known
+            middle = float(np.median(np.abs(values[values != 0])))
+            ratio = middle / high if middle > high else middle / low if middle < low else 1.0
+            limit = _FAR_VIBRATION if column.amplitude else FAR
+            yield ComparedColumn(
+                file=observations.file,
+                column=column.name,
+                unit=column.unit,
+                ratio=ratio,
+                fails=not 1 / limit <= ratio <= limit,
+                text=_text(observations.file, column, middle, ratio),
+            )
+
+
+def _text(file: str, column: Column, middle: float, ratio: float) -> str:
+    here = f"{column.head} in {Path(file).name} is {column.written(middle)} in the middle of its values"
+    if ratio == 1.0:
+        return f"{here}, as the scene has it"
+    return f"{here}, {ratio:.2g} times the {column.written(middle / ratio)} of the scene"
+
+
+_LONGEST_TIME: Final = 10.0
+"""s, of an injection: seconds are looked for where milliseconds stand, and not hours."""
+Change = Callable[[Observations, Any], Observations | None]
+"""Takes the scene, too, which kinds of one balancer alone ask for a value of that balancer."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Misreading:
+    """One way to misread a file."""
+
+    words: str
+    change: Change
+    settings: bool
+    """Whether it changes what was set, and so what is predicted."""
+    scale: float = 1.0
+    """dy'/dy."""
+    column: str = ""
+    """That it changes, where the scene has a range of it."""
+    together: bool = True
+    """Whether all files may have been misread alike."""
+
+
+def _exchanged(observations: Observations, _: Any) -> Observations | None:
+    """Columns of before and after, with their uncertainties."""
+    if observations.kind != "injection":
+        return None
+    other = {"before": "after", "after": "before"}
+
+    def swapped(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        named = {n: n.rsplit("_", 1) for n in values}
+        return {
+            f"{named[n][0]}_{other[named[n][1]]}" if named[n][-1] in other else n: v
+            for n, v in values.items()
+        }
+
+    return replace(
+        observations,
+        columns=swapped(observations.columns),
+        uncertainty=swapped(observations.uncertainty),
+    )
+
+
+def _turned(*names: str) -> Change:
+    """Angles of these names with the other sign."""
+
+    def change(observations: Observations, _: Any) -> Observations | None:
+        chosen = {n: -v for n, v in observations.columns.items() if n.startswith(names)}
+        vibration = any(n.startswith("phase") for n in observations.columns)
+        return observations.with_columns(**chosen) if chosen and vibration else None
+
+    return change
+
+
+def _lettered(observations: Observations, scene: Any) -> Observations | None:
+    """Chambers counted against the rotation from A."""
+    if observations.kind != "injection" or scene.disc.chambers < 4:
+        return None
+    letters = chamber_letters(scene.disc.chambers)
+    count = len(letters)
+    numbers = [letters.index(letter) for letter in observations.chamber]
+    return replace(observations, chamber=np.array([letters[-i % count] for i in numbers]))
+
+
+def _amplitudes(factor: float) -> Change:
+    def change(observations: Observations, _: Any) -> Observations | None:
+        columns = {n: factor * v for n, v in observations.columns.items() if n.startswith("amplitude")}
+        widths = {n: factor * v if n in columns else v for n, v in observations.uncertainty.items()}
+        return replace(observations.with_columns(**columns), uncertainty=widths) if columns else None
+
+    return change
+
+
+def _pressures(factor: float, *, absolute: bool = False) -> Change:
+    """Of the gas, in another unit, or less that of the surroundings."""
+
+    def change(observations: Observations, scene: Any) -> Observations | None:
+        if observations.kind not in ("injection", "transfer"):
+            return None
+        gauge = factor * observations.columns["pressure"]
+        gauge = gauge - scene.gas.ambient_pressure if absolute else gauge
+        return observations.with_columns(pressure=gauge) if np.all(gauge > 0) else None
+
+    return change
+
+
+def _seconds(observations: Observations, _: Any) -> Observations | None:
+    if observations.kind not in ("injection", "transfer"):
+        return None
+    times = 1e3 * observations.columns["gas_time"]
+    return observations.with_columns(gas_time=times) if np.median(times) < _LONGEST_TIME else None
+
+
+MISREADINGS: Final[Mapping[str, _Misreading]] = {
+    "before_and_after_exchanged": _Misreading(
+        words="vibrations before and after exchanged", change=_exchanged, settings=False, together=False
+    ),
+    "phases_turned": _Misreading(
+        words="phases with the other sign, against the rotation", change=_turned("phase"), settings=False
+    ),
+    "weights_turned": _Misreading(
+        words="angles of the trial weights against the rotation", change=_turned("angle"), settings=True
+    ),
+    "chambers_turned": _Misreading(
+        words="chambers lettered against the rotation", change=_lettered, settings=True
+    ),
+    "amplitudes_halved": _Misreading(
+        words="amplitudes half as large, such as peak to peak stated as zero to peak",
+        change=_amplitudes(0.5),
+        settings=False,
+        scale=0.5,
+    ),
+    "amplitudes_doubled": _Misreading(
+        words="amplitudes twice as large, such as zero to peak stated as peak to peak",
+        change=_amplitudes(2.0),
+        settings=False,
+        scale=2.0,
+    ),
+    "pressures_tenth": _Misreading(
+        words="gas pressures a tenth as large, such as bar stated as MPa",
+        change=_pressures(0.1),
+        settings=True,
+        column="pressure",
+    ),
+    "pressures_tenfold": _Misreading(
+        words="gas pressures ten times as large, such as MPa stated as bar",
+        change=_pressures(10.0),
+        settings=True,
+        column="pressure",
+    ),
+    "pressures_absolute": _Misreading(
+        words="gas pressures as absolute ones, less that of the surroundings",
+        change=_pressures(1.0, absolute=True),
+        settings=True,
+        column="pressure",
+    ),
+    "times_in_seconds": _Misreading(
+        words="valve-open times a thousand times as long, such as seconds stated as milliseconds",
+        change=_seconds,
+        settings=True,
+        column="gas_time",
+    ),
+}
+"""By code."""
+
 
 DECISIVE: Final = math.log(1e6)
 """Gain of the log likelihood."""
@@ -98,7 +295,7 @@ def _reading(problem: Problem, code: str, chosen: Sequence[int], gain: float, *,
     return Reading(code=code, files=files, gain=gain, named=named, text=text)
 
 
-def _choices(problem: Problem, kind: Misreading) -> Iterator[tuple[int, ...]]:
+def _choices(problem: Problem, kind: _Misreading) -> Iterator[tuple[int, ...]]:
     """Places of the files that are read otherwise: each that can be, and all of them."""
     able = [i for i, b in enumerate(problem.blocks) if kind.change(b.observations, problem.scene) is not None]
     yield from ((i,) for i in able)
@@ -141,7 +338,7 @@ class _Comparison:
         )
         return cls(problem=problem, rows=rows, given=here.deviance(), pulled=pulled)
 
-    def gain(self, kind: Misreading, chosen: Sequence[int]) -> float | None:
+    def gain(self, kind: _Misreading, chosen: Sequence[int]) -> float | None:
         """Of the log likelihood, by reading some files otherwise; None where nothing can be predicted."""
         rows, jacobian = list(self.rows), 0.0
         for i in chosen:
@@ -162,7 +359,7 @@ class _Comparison:
         gain = (self.given - found) / 2 + jacobian
         return gain if math.isfinite(gain) else None
 
-    def _changed(self, kind: Misreading, rows: _Rows) -> _Rows | None:
+    def _changed(self, kind: _Misreading, rows: _Rows) -> _Rows | None:
         problem = self.problem
         observations = kind.change(rows.block.observations, problem.scene)
         if observations is None:

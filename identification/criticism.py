@@ -1,0 +1,545 @@
+"""What a fit's residuals say of its laws: whether they describe the data, and which others would not.
+
+Lack of fit: the sum of squares of residuals whose noise was stated is chi-square distributed, with the
+degrees of freedom that the parameters leave the block.  Order: signs in the order of measurement change as
+often as in random order (runs of Wald and Wolfowitz).  The p-values are corrected for the number of tests
+(Sidak).
+
+An estimated noise takes whatever the prediction leaves over, so that one which has nothing to do with the
+data leaves residuals without any pattern.  The share explained of a file is
+
+    1 - (|e|^2/(n - h))/(|P y|^2/(n - m)),
+
+y what was measured, e the residuals, h what parameters and held inputs take up of the n numbers, P the
+projection off the m columns of the null hypothesis "no effect": a mean, and unknowns that are no parameters.
+Below a half the noise is larger than the effect.  The file fails then, unless the noise is stated (the size
+of the residuals is tested against it) or twice as large as the effect that the scene predicts: of repetitions
+of one measurement, or of too weak ones, no share is to be expected.
+Source: adjusted coefficient of determination.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final, Literal
+
+import numpy as np
+from scipy.special import chdtri, ndtri
+from scipy.stats import chi2
+
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.identification.device import Device
+from ringbalance.identification.fitting import FitResult
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.identification.likelihood import Block, Problem, basis_of
+from ringbalance.identification.optimisation import Optimum
+from ringbalance.identification.readings import ComparedColumn, Reading, compared_columns, other_readings
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
+from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
+from ringbalance.scene.models import Scene
+from ringbalance.scene.paths import with_values_at
+
+LEVEL: Final = 0.05
+"""Chance that a model that is right is said to fail."""
+FEWEST: Final = 5
+"""Rows of a block that is tested."""
+_MOST_NAMED: Final = 3
+"""Findings that the sentence names."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearFit:
+    """Residuals and derivatives at the solution, each row in units of its own standard deviation."""
+
+    residuals: FloatArray
+    """(measured - predicted)/sigma, and of priors (value before - fitted)/sigma, shape (n,)."""
+    derivatives: FloatArray
+    """Of the predictions by the parameters, over sigma, shape (n, p)."""
+    block: StringArray
+    """What a row is of, such as "injection amplitude_after", shape (n,); rows of one block share a noise."""
+    data: BoolArray
+    """Whether a row is a measurement; else it is a prior."""
+    known_noise: BoolArray
+    """Whether its sigma was given; else it was estimated from the residuals of its block."""
+    order: FloatArray
+    """In which the rows of a file were measured; of priors it does not matter."""
+
+    @cached_property
+    def _basis(self) -> FloatArray:
+        """Orthonormal basis of what the parameters can do to the predictions."""
+        return basis_of(self.derivatives)
+
+    def beyond_parameters(self, rows: FloatArray) -> FloatArray:
+        """What no change of the parameters can describe of changes of the predictions, shape (n, ...)."""
+        return np.asarray(rows - self._basis @ (self._basis.T @ rows))
+
+    def freedom(self, chosen: BoolArray) -> float:
+        """Degrees of freedom that some rows have left: their number less the parameters they determine."""
+        return float(np.count_nonzero(chosen) - np.sum(self._basis[chosen] ** 2))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ResidualTest:
+    """One test of a block's residuals."""
+
+    test: Literal["size", "runs"]
+    block: str
+    p_value: float
+    """Alone."""
+    text: str
+    corrected: float = 1.0
+    """Chance that a right model has any test as clear as this one."""
+
+    @property
+    def fails(self) -> bool:
+        """Whether the model is rejected for it."""
+        return self.corrected < LEVEL
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criticism:
+    """All tests of a fit's residuals, clearest first."""
+
+    findings: tuple[_ResidualTest, ...]
+
+    @property
+    def describes(self) -> bool:
+        """Whether the fit describes the data, as far as these can tell."""
+        return not any(each.fails for each in self.findings)
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        failed = [each.text for each in self.findings if each.fails]
+        if failed:
+            more = len(failed) - _MOST_NAMED
+            rest = [f"and {more} more such findings"] if more > 0 else []
+            return "the fit does not describe the data: " + "; ".join([*failed[:_MOST_NAMED], *rest])
+        if not self.findings:
+            return "too few measurements to tell whether the fit describes them"
+        tests = f"{len(self.findings)} tests, {100 * LEVEL:g} % level"
+        return f"nothing in the residuals speaks against the fit ({tests})"
+
+    @classmethod
+    def of(cls, fit: LinearFit) -> Criticism:
+        """Test the residuals of a fit."""
+        tests = [*_sizes(fit), *_runs(fit)]
+        corrected = [
+            replace(each, corrected=-math.expm1(len(tests) * math.log1p(-min(each.p_value, 1 - 1e-12))))
+            for each in tests
+        ]
+        return cls(findings=tuple(sorted(corrected, key=lambda each: each.p_value)))
+
+
+def _blocks(fit: LinearFit) -> Iterator[tuple[str, BoolArray]]:
+    for name in dict.fromkeys(map(str, fit.block[fit.data])):
+        rows = fit.data & (fit.block == name)
+        if np.count_nonzero(rows) >= FEWEST and fit.freedom(rows) > 1:
+            yield name, rows
+
+
+def _sizes(fit: LinearFit) -> Iterator[_ResidualTest]:
+    for block, rows in _blocks(fit):
+        if bool(np.all(fit.known_noise[rows])):
+            square, freedom = float(np.sum(fit.residuals[rows] ** 2)), fit.freedom(rows)
+            times = math.sqrt(square / freedom)
+            text = f"residuals of {block} are {times:.2g} times as large as the stated noise"
+            yield _ResidualTest(test="size", block=block, p_value=float(chi2.sf(square, freedom)), text=text)
+
+
+def _runs(fit: LinearFit) -> Iterator[_ResidualTest]:
+    for block, rows in _blocks(fit):
+        signs = fit.residuals[rows][np.argsort(fit.order[rows], kind="stable")] > 0
+        plus = int(np.count_nonzero(signs))
+        if min(plus, signs.size - plus) > 1:
+            runs = 1 + int(np.count_nonzero(signs[1:] != signs[:-1]))
+            text = f"residuals of {block} keep their sign: {runs} runs in {signs.size} measurements"
+            p_value = _runs_probability(plus, signs.size - plus, runs)
+            yield _ResidualTest(test="runs", block=block, p_value=p_value, text=text)
+
+
+def _runs_probability(plus: int, minus: int, runs: int) -> float:
+    """Probability of at most so many runs among signs in random order.
+
+    Source: Wald and Wolfowitz, Ann. Math. Statist. 11 (1940) 147, recalled; the counting is elementary.
+    """
+    ways = 0
+    for count in range(2, runs + 1):
+        half = count // 2
+        if count % 2 == 0:
+            ways += 2 * math.comb(plus - 1, half - 1) * math.comb(minus - 1, half - 1)
+        else:
+            ways += math.comb(plus - 1, half) * math.comb(minus - 1, half - 1)
+            ways += math.comb(plus - 1, half - 1) * math.comb(minus - 1, half)
+    return ways / math.comb(plus + minus, plus)
+
+
+NEEDED: Final = float((ndtri(0.9) - ndtri(LEVEL / 2)) ** 2)
+"""Separation of laws that are told apart: 9 of 10 normal statistics show it at the 5 % level."""
+Outcome = Literal["other", "between", "fitted", "undecided"]
+_SAID: Final[Mapping[Outcome, str]] = {
+    "other": "the data prefer {} to the fitted law, so that the fitted values may be wrong by more than "
+    "their intervals",
+    "between": "the data lie between the fitted law and {}",
+    "fitted": "the data prefer the fitted law to {}",
+    "undecided": "these data cannot tell the fitted law from {}",
+}
+"""By outcome; with the other law, or all those of one outcome."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawComparison:
+    """The fitted law against another one."""
+
+    other: str
+    separation: float
+    """Square of what separates their predictions beyond all parameters, in variances of the data."""
+    preference: float
+    """Sum of squares of the other law's residuals, its parameters fitted too, less that of the fitted law."""
+
+    @property
+    def outcome(self) -> Outcome:
+        """Which of both the data prefer."""
+        if self.separation < NEEDED:
+            return "undecided"
+        if abs(self.preference) < float(chdtri(1, LEVEL)):
+            return "between"
+        return "fitted" if self.preference > 0 else "other"
+
+    @property
+    def text(self) -> str:
+        """What the data say."""
+        return _SAID[self.outcome].format(self.other)
+
+    @classmethod
+    def of(cls, fit: LinearFit, *, other: str, residuals: FloatArray) -> LawComparison:
+        """Compare by linear re-fits from the solution.
+
+        Args: `other`: the other law in words. `residuals`: with its predictions at the fitted parameters,
+            over sigma, shape (n,).
+        """
+        own, others = fit.beyond_parameters(fit.residuals), fit.beyond_parameters(residuals)
+        return cls(
+            other=other,
+            separation=float(np.sum((others - own) ** 2)),
+            preference=float(others @ others - own @ own),
+        )
+
+
+def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, str]]:
+    """What the data say of all of them, one sentence for each outcome, the gravest first."""
+    for outcome, sentence in _SAID.items():
+        others = [each.other for each in comparisons if each.outcome == outcome]
+        if others:
+            yield outcome, sentence.format(" or ".join(filter(None, (", ".join(others[:-1]), others[-1]))))
+
+
+LEAST_SHARE: Final = 0.5
+_HIDDEN: Final = 4.0
+"""Variance of the noise over that of the effect which the scene predicts, from which none is to be seen."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Explained:
+    """One file."""
+
+    file: str
+    share: float
+    """Of the variance, by the fit; below zero where no effect at all explains more."""
+    fails: bool
+    """Whether what was measured is mostly called noise, though the scene predicts an effect."""
+
+    @property
+    def text(self) -> str:
+        """What it means."""
+        percent = f"{100 * max(self.share, 0.0):.2g} %"
+        name = Path(self.file).name
+        return f"the fit explains {percent} of the variance of {name} and calls the rest noise"
+
+
+def _shares_explained(best: Optimum) -> Iterator[_Explained]:
+    """The share of each file whose rows leave one."""
+    problem, residuals = best.residuals.problem, best.residuals
+    scale, parts, expected = residuals.scale, best.at, problem.at(problem.start)
+    taken = residuals.leverage(best.slopes)
+    for block, rows in problem.rows:
+        null = basis_of(scale[rows, None] * _null(block))
+        left = block.measured.size - null.shape[1]
+        freedom = block.measured.size - float(np.sum(taken[rows]))
+        if left < 1 or freedom < 1:
+            continue
+        measured, effect = (
+            _square_off(null, scale[rows] * values[rows]) / left for values in (problem.measured, expected)
+        )
+        noise = float(np.sum(parts[rows] ** 2)) / freedom
+        if measured > 0:
+            share = 1 - noise / measured
+            seen = block.estimated and noise < _HIDDEN * effect
+            yield _Explained(
+                file=block.observations.file, share=share, fails=bool(seen and share < LEAST_SHARE)
+            )
+
+
+def _null(block: Block) -> FloatArray:
+    """Whitened columns of what may be without any effect: a mean of each part, and free unknowns."""
+    count = len(block.observations)
+    mean = np.kron(np.eye(block.measured.size // count), np.ones((count, 1)))
+    return np.asarray(block.whiten @ np.concatenate([mean, block.free], axis=1))
+
+
+def _square_off(null: FloatArray, values: FloatArray) -> float:
+    return float(np.sum((values - null @ (null.T @ values)) ** 2))
+
+
+_BY_LAW: Final = ("injection", "transfer", "flow")
+"""Kinds that the law of the tube's flow decides on."""
+LAMINAR: Final = "laminar flow (a loss in proportion to the velocity)"
+TURBULENT: Final = "turbulent flow (a loss in proportion to its square)"
+UNBROKEN: Final = "a column that never separates over the crest"
+BROKEN: Final = "a column that separates at ambient pressure"
+UNSPILT: Final = "a column that runs full without spilling first"
+EXPONENTS: Final[Mapping[str, float]] = MappingProxyType({LAMINAR: 1.0, TURBULENT: 2.0})
+"""Of the loss over the velocity, of those of these laws that are powers."""
+_OF_THE_CREST: Final = (UNBROKEN, BROKEN, UNSPILT)
+
+WITHOUT: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
+    {
+        "a rotor without damping": ("run_up", ("rotor.damping",)),
+        "masses without friction": ("positioning", ("masses.friction_arm[0]", "masses.friction_arm[1]")),
+        "a motor without back EMF": ("positioning", ("motor.back_emf_constant",)),
+    }
+)
+"""Of eccentric masses: the kind of data that an effect moves, and the values that are zero without it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Review:
+    """Criticism of a fit."""
+
+    criticism: Criticism
+    laws: tuple[LawComparison, ...]
+    """The fitted law against others; empty where no data depend on one."""
+    explained: tuple[_Explained, ...] = ()
+    """Of each file, what the fit explains of it."""
+    readings: tuple[Reading, ...] = ()
+    """Other readings of the files, the likeliest first."""
+    ranges: tuple[ComparedColumn, ...] = ()
+    """Columns against what the scene has."""
+
+    @property
+    def _read_wrongly(self) -> tuple[str, ...]:
+        """What speaks against the files as they stand, each in one sentence."""
+        named = [each.text for each in self.readings if each.named]
+        unexplained = [each.text for each in self.explained if each.fails]
+        return (*named, *unexplained, *(each.text for each in self.ranges if each.fails))
+
+    @property
+    def describes(self) -> bool:
+        """Whether the fit describes the data, as they are read."""
+        return self.criticism.describes and not self._read_wrongly
+
+    @property
+    def holds(self) -> bool:
+        """Whether the fit describes the data, and no other law does so better."""
+        return self.describes and all(each.outcome != "other" for each in self.laws)
+
+    @property
+    def text(self) -> str:
+        """The verdict on the fit; sound residuals say nothing of data that are read wrongly."""
+        if not self._read_wrongly:
+            return self.criticism.text
+        residuals = [] if self.criticism.describes else [self.criticism.text]
+        return "the fit does not describe the data as they are read: " + "; ".join(
+            [*self._read_wrongly, *residuals]
+        )
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """All that is to be said, the verdict on the fit first."""
+        return (self.text, *(each.text for each in self.laws))
+
+    @classmethod
+    def of(cls, result: FitResult) -> Review:
+        """Test the residuals of a fit, read its data otherwise, and compare its law with others."""
+        found, best = _at_solution(result), result.optimum
+        ranges = tuple(compared_columns(best.residuals.problem))
+        return cls(
+            criticism=Criticism.of(found.fit),
+            laws=tuple(_comparisons(result, found)),
+            explained=tuple(_shares_explained(best)),
+            readings=other_readings(best, ranges),
+            ranges=ranges,
+        )
+
+
+def _comparisons(result: FitResult, found: _AtSolution) -> Iterator[LawComparison]:
+    best = result.optimum
+    problem, scene = best.residuals.problem, best.residuals.problem.scene_at(best.t)
+    # Each yields nothing without data of the kinds that it is about.
+    for name, predicted in (*_by_other_tubes(problem, scene), *_by_other_machines(problem, scene)):
+        residuals = found.turned(best.residuals.at(best.t, predicted=predicted))
+        yield LawComparison.of(found.fit, other=name, residuals=residuals)
+
+
+def _by_other_machines(problem: Problem, scene: EccentricScene) -> Iterator[tuple[str, FloatArray]]:
+    """Without one of the effects that move the data, unless its size is fitted: then its interval tells."""
+    fitted = {parameter.name for parameter in problem.parameters}
+    kinds = {block.observations.kind for block in problem.blocks}
+    for name, (kind, paths) in WITHOUT.items():
+        if kind in kinds and not fitted & set(paths):
+            yield name, problem.predicted(with_values_at(scene, dict.fromkeys(paths, 0.0)))
+
+
+def _by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, FloatArray]]:
+    """By other laws of the tube's flow, where data depend on it."""
+    blocks = [b for b in problem.blocks if b.observations.kind in _BY_LAW]
+    if not blocks:
+        return
+    law, velocity = Device.of(scene, problem.models).law, _typical_velocity(scene, problem, blocks)
+    for name in _laws_to_compare(law):
+        models = replace(problem.models, other=partial(_other_law, name=name, velocity=velocity))
+        other = replace(problem, models=models)
+        yield (
+            name,
+            np.concatenate(
+                [b.whiten @ _predicted(b, scene, other, EXPONENTS.get(name)) for b in problem.blocks]
+            ),
+        )
+
+
+def _predicted(block: Block, scene: Scene, problem: Problem, exponent: float | None) -> FloatArray:
+    """By the other law; flow at rest follows a power of the pressure through its middle value."""
+    own = block.predicted(scene, problem.models)
+    if block.observations.kind != "flow" or exponent is None:
+        return own
+    pressure = block.observations.columns["pressure_difference"]
+    middle = int(np.argsort(pressure)[pressure.size // 2])
+    return np.asarray(own[middle] * (pressure / pressure[middle]) ** (1 / exponent))
+
+
+def _typical_velocity(scene: Scene, problem: Problem, blocks: list[Block]) -> float:
+    """At equal fills under the middle of the data's gas pressures, m/s; 1 where nothing flows there."""
+    pressures = [b.observations.columns["pressure"] for b in blocks if "pressure" in b.observations.columns]
+    pressure = float(np.median(np.concatenate(pressures))) if pressures else scene.gas.pressure
+    law, x = Device.of(scene, problem.models).law, scene.disc.initial_fill
+    flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
+    return abs(float(flow.velocity)) or 1.0
+
+
+def _power_of(law: CalibratedLaw, velocity: float, exponent: float) -> CalibratedLaw:
+    """Heads in proportion to a power of the velocity, those of the law at one velocity, m/s."""
+    heads = law.heads
+    near, far = heads.hump_head, heads.return_hump_head
+    return replace(
+        law,
+        heads=replace(
+            heads,
+            head=_straight(heads.head, velocity, exponent),
+            hump_head=None if near is None else _straight(near, velocity, exponent),
+            return_hump_head=None if far is None else _straight(far, velocity, exponent),
+        ),
+    )
+
+
+def _straight(table: HermiteTable, velocity: float, exponent: float) -> HermiteTable:
+    nodes: FloatArray = table.nodes
+    at = float(np.clip(np.log(velocity), nodes[0], nodes[-1]))
+    value = table(at) + exponent * (nodes - at)
+    return table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value)
+
+
+def _other_law(law: CalibratedLaw, *, name: str, velocity: float) -> CalibratedLaw:
+    """The other law of a name, from the fitted one; a power has the same loss at a velocity, m/s."""
+    if name in EXPONENTS:
+        return _power_of(law, velocity, EXPONENTS[name])
+    if name == UNBROKEN:
+        heads = replace(law.heads, hump_head=None, return_hump_head=None)
+        return replace(law, path=replace(law.path, hump_pressure=None), heads=heads)
+    if name == BROKEN:
+        return replace(law, path=replace(law.path, vapour_pressure=0.0, released=0.0))
+    if name == UNSPILT:
+        return replace(law, path=replace(law.path, froude_velocity=0.0))
+    raise ValueError(f"{name!r} is no other law")
+
+
+def _laws_to_compare(law: CalibratedLaw) -> tuple[str, ...]:
+    """Names of those that mean something for a law: a tube without crest has no column to break."""
+    return (*EXPONENTS, *(() if law.path.hump_pressure is None else _OF_THE_CREST))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _AtSolution:
+    """Rows are those of all files, then held inputs, then priors."""
+
+    fit: LinearFit
+    """Of a vibration the part along its predicted change, and the part across."""
+    turn: FloatArray
+    """Rotation of the rows of vibrations into these parts, shape (measured, measured)."""
+
+    def turned(self, rows: FloatArray) -> FloatArray:
+        """Rows of the fit's own order, with those of vibrations along and across."""
+        count = self.turn.shape[0]
+        return np.concatenate([self.turn @ rows[:count], rows[count:]])
+
+
+def _at_solution(result: FitResult) -> _AtSolution:
+    """The fit linearised at its optimum; what is no parameter but was fitted too counts as one."""
+    best = result.optimum
+    problem, residuals = best.residuals.problem, best.residuals
+    count, parts = problem.measured.size, best.at
+    turn = _rotation(result)
+    more = np.zeros((parts.size - residuals.base.shape[0], residuals.base.shape[1]))
+    whole = np.hstack([-best.slopes, np.concatenate([residuals.base, more])])
+    data = np.arange(parts.size) < count
+    known = np.zeros(parts.size, dtype=np.bool_)
+    known[:count] = problem.group < 0
+    blocks = np.concatenate([_titles(b.observations, b.measured.size) for b in problem.blocks])
+    rest = np.full(parts.size - count, "beforehand")
+    return _AtSolution(
+        fit=LinearFit(
+            residuals=np.concatenate([turn @ parts[:count], parts[count:]]),
+            derivatives=np.concatenate([turn @ whole[:count], whole[count:]]),
+            block=np.concatenate([blocks, rest]),
+            data=data,
+            known_noise=known,
+            order=_order(problem, parts.size),
+        ),
+        turn=turn,
+    )
+
+
+def _titles(observations: Observations, size: int) -> StringArray:
+    title = Path(observations.file).name
+    if size == len(observations):
+        return np.full(size, title)
+    parts = ("along the predicted change", "across the predicted change")
+    return np.repeat([f"{title} {part}" for part in parts], len(observations))
+
+
+def _rotation(result: FitResult) -> FloatArray:
+    """Rotates a vibration's real and imaginary part into those along its predicted change and across."""
+    problem, t = result.optimum.residuals.problem, result.optimum.t
+    predicted, turn = problem.at(t), np.eye(problem.measured.size)
+    for block, mine in problem.rows:
+        rows = len(block.observations)
+        if block.measured.size == 2 * rows:
+            along = block.observations.rows_of(predicted[mine])
+            angle = np.arctan2(along[:, 1], along[:, 0])
+            i = mine.start + np.arange(rows)
+            turn[i, i] = turn[i + rows, i + rows] = np.cos(angle)
+            turn[i, i + rows], turn[i + rows, i] = np.sin(angle), -np.sin(angle)
+    return turn
+
+
+def _order(problem: Problem, size: int) -> FloatArray:
+    """Row of its file that each residual is of; the two parts of a vibration have one."""
+    order = np.zeros(size)
+    for block, mine in problem.rows:
+        order[mine] = np.resize(np.arange(float(len(block.observations))), block.measured.size)
+    return order

@@ -1,0 +1,88 @@
+"""What the pressure in one chamber adds up to: volume, moment, wall pressure, force and torque on walls."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ringbalance.mesh.chamber import FREE_SURFACE
+from ringbalance.physics.pressure.solve import PressureSolution
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.chamber_file.record import OUTER_WALL
+
+
+@dataclass(frozen=True, kw_only=True)
+class _LiquidIntegrals:
+    """Integrals over the liquid of one chamber: totals."""
+
+    volume: float
+    """m^3."""
+    first_moment: FloatArray
+    """rho times the integral of (x, y, z), kg m, shape (3,)."""
+    wall_pressure: float
+    """Mean over the outer wall, gauge, Pa."""
+    moment_per_volume: float
+    """dU/dV' as liquid is added, kg/m^2."""
+    force: Mapping[str, FloatArray]
+    """Force of the liquid on each wall, N, shape (3,)."""
+    torque: Mapping[str, float]
+    """Its torque about the shaft, with the rotation, N m."""
+
+    @property
+    def mirrored_alike(self) -> list[float]:
+        """Volume, wall pressure, U, dU/dV' and force along x: alike in the mirror image of the chamber."""
+        force = sum(float(each[0]) for each in self.force.values())
+        moment = float(self.first_moment[0])
+        return [self.volume, self.wall_pressure, moment, self.moment_per_volume, force]
+
+
+def liquid_integrals(*, solution: PressureSolution, density: float, axial_width: float) -> _LiquidIntegrals:
+    """Integrals of a solution in three dimensions, or of one in a cross-section times the axial width.
+
+    Every cross-section is the same without axial gravity, and the integral of its pressure is the force on
+    each end.
+    Source: definitions; the shape derivative is dU/dV' = rho int x/|n.grad p| / int 1/|n.grad p| over the
+        free surface, because a raised pressure level moves the surface by dp/|n.grad p|.
+    """
+    chamber, basis, unit = solution.chamber, solution.basis, solution.chamber.length_scale
+    depth = axial_width if chamber.dimension == 2 else unit
+    forces, torques = _wall_loads(solution, depth)
+    if chamber.dimension == 2:
+        pressure = float(unit**2 * np.sum(basis.dx * basis.interpolate(solution.pressure)))
+        push = np.array([0.0, 0.0, pressure])
+        forces |= {"end_back": -push, "end_front": push}
+        torques |= {"end_back": 0.0, "end_front": 0.0}
+    places = np.asarray(basis.global_coordinates())
+    moment = density * unit**3 * depth * np.sum(basis.dx * places, axis=(1, 2))
+    wall = solution.side(OUTER_WALL)
+    return _LiquidIntegrals(
+        volume=float(unit**2 * depth * basis.dx.sum()),
+        first_moment=np.pad(moment, (0, 3 - len(moment))),
+        wall_pressure=float(np.sum(wall.weights * wall.at_points(solution.pressure)) / wall.weights.sum()),
+        moment_per_volume=_moment_per_volume(solution, density),
+        force=forces,
+        torque=torques,
+    )
+
+
+def _moment_per_volume(solution: PressureSolution, density: float) -> float:
+    surface = solution.side(FREE_SURFACE)
+    speed = surface.weights / np.abs(solution.surface_flux(surface))
+    return float(density * solution.chamber.length_scale * np.sum(speed * surface.points[0]) / speed.sum())
+
+
+def _wall_loads(solution: PressureSolution, depth: float) -> tuple[dict[str, FloatArray], dict[str, float]]:
+    unit = solution.chamber.length_scale
+    forces, torques = {}, {}
+    for name in solution.chamber.mesh.boundaries:
+        if name == FREE_SURFACE:
+            continue
+        wall = solution.side(name)
+        push = wall.at_points(solution.pressure) * wall.area
+        turn = wall.points[0] * push[1] - wall.points[1] * push[0]
+        total = unit * depth * push.sum(axis=(1, 2))
+        forces[name] = np.pad(total, (0, 3 - len(total)))
+        torques[name] = float(unit**2 * depth * turn.sum())
+    return forces, torques

@@ -1,0 +1,191 @@
+"""Finite elements that several cases share: orders of convergence, rings, mutations of the problem.
+
+An order study judges the observed order of each pair of levels together with the finest error.  A ring is
+computed once per process.  Mutations are put in from outside: the product has no parameter for them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from unittest.mock import patch
+
+import numpy as np
+from skfem import Basis
+
+from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.geometry import chamber_volume, liquid_area
+from ringbalance.physics.convergence import GridVerdict
+from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
+from ringbalance.physics.results import Estimate
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Disc, Scene
+from ringbalance.verification.evidence import Convergence, Curve, Found, Series, figure, from_half_width
+from ringbalance.verification.papers import RING_RADIUS, with_plate
+from ringbalance.verification.reference.exact_chamber import exact_moment
+
+ROUND_OFF = 1e-13
+"""Relative errors below this say nothing about the order."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrderStudy:
+    """Errors over a sequence of levels with the order that each pair of neighbours shows."""
+
+    size: tuple[float, ...]
+    """h, coarse to fine."""
+    error: tuple[float, ...]
+    """Magnitudes, of one scale for all levels."""
+    order: tuple[float, ...]
+    """Of each pair; shorter than the levels by one."""
+
+    @classmethod
+    def of(cls, *, size: Sequence[float], error: Sequence[float]) -> OrderStudy:
+        """Observed orders p = ln(e_i/e_(i+1))/ln(h_i/h_(i+1)) of relative errors, coarse to fine.
+
+        Raises: ValueError: lengths that differ, sizes that do not fall, errors that are negative, not finite
+            or at round-off, where no order can be seen.
+        """
+        h, e = np.asarray(size, dtype=np.float64), np.asarray(error, dtype=np.float64)
+        if h.shape != e.shape or h.size < 2:
+            raise ValueError("an order study needs at least two levels, with one error each")
+        if not (np.all(np.isfinite(h)) and np.all(h > 0) and np.all(np.diff(h) < 0)):
+            raise ValueError("sizes must be positive and fall from level to level")
+        if not (np.all(np.isfinite(e)) and np.all(e > ROUND_OFF)):
+            raise ValueError("errors must be finite and above round-off for an order to be seen")
+        order = np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])
+        return cls(size=tuple(h.tolist()), error=tuple(e.tolist()), order=tuple(order.tolist()))
+
+    @property
+    def finest_error(self) -> float:
+        """Error on the finest level."""
+        return self.error[-1]
+
+    @property
+    def settled_order(self) -> float:
+        """The lowest order among the two finest pairs: earlier ones are not yet asymptotic."""
+        return min(self.order[-2:])
+
+    def table(self, quantity: str, formal_order: float, *, geometry: str = "", note: str = "") -> Convergence:
+        """The errors, all relative, as a table beside the formal order."""
+        return Convergence(
+            quantity=quantity,
+            unit="1",
+            formal_order=formal_order,
+            size=self.size,
+            error=self.error,
+            observed_order=self.order,
+            geometry=geometry,
+            note=note,
+        )
+
+
+def orders_found(studies: Mapping[str, OrderStudy]) -> dict[str, Found]:
+    """The settled order and the finest error of each study as judged quantities, by its name."""
+    orders = {f"{name}_order": Found(value=study.settled_order) for name, study in studies.items()}
+    return orders | {f"{name}_error": Found(value=study.finest_error) for name, study in studies.items()}
+
+
+def refined_cells(disc: Disc, levels: Sequence[int], *, dimension: int) -> list[tuple[int, ...]]:
+    """Cells of a chamber's meshes, radial, angular and, in three dimensions, axial, for levels 1, 2, ..."""
+    radial, share = (2, 4) if dimension == 2 else (1, 8)
+    angular = default_cells(disc=disc)[1] // share
+    return [(radial * n, angular * n, n)[:dimension] for n in levels]
+
+
+def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatArray]) -> float:
+    """Root mean square over the liquid of a pressure's error, relative to that of the exact one at places."""
+    chamber = solution.chamber
+    # More points than the solve has, or its errors at these would be taken for all.
+    basis = Basis(chamber.mesh, chamber.mesh.elem(), intorder=8)
+    true = exact(chamber.length_scale * np.asarray(basis.global_coordinates()))
+    difference = np.asarray(basis.interpolate(solution.pressure)) - true
+    return float(np.sqrt(np.sum(basis.dx * difference**2) / np.sum(basis.dx * true**2)))
+
+
+def order_figure(studies: Mapping[str, OrderStudy]) -> Series:
+    """Errors of several studies on the same meshes, by the name of their curve."""
+    size = next(iter(studies.values())).size
+    curves = (Curve(name, "1", np.array(study.error)) for name, study in studies.items())
+    return figure("error against mesh size", ("relative mesh size", "1", size), *curves, log=True)
+
+
+@lru_cache(maxsize=64)
+def ring_of(scene: Scene, fills: tuple[float, ...], *, density: float | None = None) -> RingQuantities:
+    """Finite-element totals of a scene without gravity, with another density, kg/m^3, where one is given."""
+    return ring_quantities(
+        disc=scene.disc,
+        density=density or scene.liquid.density,
+        angular_velocity=scene.rotor.speed,
+        fill_ratio=fills,
+        dimension=2,
+    )
+
+
+def found_of(quantities: RingQuantities, name: str, index: int) -> Found:
+    """One total of a ring by its name and the index of its fill.
+
+    It is not conclusive where the meshes do not converge steadily.
+    """
+    estimate: Estimate = getattr(quantities, name)
+    converges = quantities.convergence[name][index].verdict in (GridVerdict.MONOTONE, GridVerdict.ROUND_OFF)
+    return Found(
+        value=float(estimate.value[index]),
+        numerical=from_half_width(float(estimate.uncertainty[index])),
+        conclusive=quantities.status.ok and converges,
+    )
+
+
+def chamber_moment(scene: Scene, *, density: float, factor: float = 1.0) -> Found:
+    """Moment of one chamber at its largest fill times a factor, kg m, by finite elements.
+
+    Its correction is the moment of a ring of the printed radius that no plates take anything from.
+    """
+    ring = ring_of(scene, (scene.disc.max_fill_ratio,), density=density)
+    found = found_of(ring, "moment", 0).scaled(factor)
+    return dataclasses.replace(found, corrected=factor * _bare_moment(scene.disc, density))
+
+
+def _bare_moment(disc: Disc, density: float) -> float:
+    bare = with_plate(disc, 0.0)
+    liquid = disc.axial_width * float(liquid_area(disc=bare, surface_radius=RING_RADIUS.value))
+    fill = liquid / chamber_volume(disc=bare)
+    return float(exact_moment(disc=bare, density=density, fill_ratio=fill))
+
+
+def mesh_table(quantities: RingQuantities, name: str, unit: str, index: int) -> Convergence:
+    """Convergence of one total of a ring over its meshes, coarse to fine."""
+    record = quantities.convergence[name][index]
+    values = quantities.mesh_values[name][::-1, index]
+    sizes = [quantities.cells[-1][0] / cells[0] for cells in reversed(quantities.cells)]
+    estimate: Estimate = getattr(quantities, name)
+    finest = float(estimate.value[index])
+    return Convergence(
+        quantity=name.replace("_", " "),
+        unit=unit,
+        formal_order=4.0,
+        size=sizes,
+        value=values.tolist(),
+        observed_order=(record.observed_order,),
+        gci=float(estimate.uncertainty[index]) / abs(finest) if finest else None,
+        geometry="quadratic",
+        note=f"{' x '.join(map(str, quantities.cells[0]))} cells on the finest mesh; {record.text}",
+    )
+
+
+@contextmanager
+def mutated_force(*, along: float = 1.0, across: float = 1.0) -> Iterator[None]:
+    """Multiply the body force of every liquid solved inside, along the chamber's middle and across it."""
+    true = RotatingLiquid.body_force
+
+    def body_force(liquid: RotatingLiquid, places: FloatArray) -> FloatArray:
+        force = true(liquid, places)
+        force[:2] *= np.array([along, across]).reshape(2, *[1] * (force.ndim - 1))
+        return force
+
+    with patch.object(RotatingLiquid, "body_force", body_force):
+        yield

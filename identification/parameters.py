@@ -336,8 +336,12 @@ class _LiquidRing(_Side):
         return shifted(scene=self.scene, quantity=name, change=change)
 
 
+_SIDES: Final[Mapping[str, type[_Side]]] = {Scene.balancer: _LiquidRing}
+"""By the name of the balancer; the others have nothing but their `Balancer`."""
+
+
 def _side(scene: SceneFile) -> _Side:
-    return _LiquidRing(scene) if scene.balancer == Scene.balancer else _Side(scene)
+    return _SIDES.get(scene.balancer, _Side)(scene)
 
 
 def models_for(scene: SceneFile) -> Models | None:

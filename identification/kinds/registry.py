@@ -24,7 +24,7 @@ KINDS: Final[Mapping[str, Kind]] = MappingProxyType({**LIQUID_RING, **ECCENTRIC_
 
 def kinds_of(balancer: str) -> tuple[str, ...]:
     """Names of the kinds that the scenes of a balancer predict; of an empty one those of test benches."""
-    own = tuple(name for name, kind in KINDS.items() if kind.balancer == balancer)
+    own = tuple(name for name, kind in KINDS.items() if balancer == kind.balancer)
     return own or tuple(name for name, kind in KINDS.items() if kind.any_rotor)
 
 

@@ -85,7 +85,7 @@ class LinearFit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ResidualTest:
+class _ResidualTest:
     """One test of a block's residuals."""
 
     test: Literal["size", "runs"]
@@ -106,7 +106,7 @@ class ResidualTest:
 class Criticism:
     """All tests of a fit's residuals, clearest first."""
 
-    findings: tuple[ResidualTest, ...]
+    findings: tuple[_ResidualTest, ...]
 
     @property
     def describes(self) -> bool:
@@ -144,16 +144,16 @@ def _blocks(fit: LinearFit) -> Iterator[tuple[str, BoolArray]]:
             yield name, rows
 
 
-def _sizes(fit: LinearFit) -> Iterator[ResidualTest]:
+def _sizes(fit: LinearFit) -> Iterator[_ResidualTest]:
     for block, rows in _blocks(fit):
         if bool(np.all(fit.known_noise[rows])):
             square, freedom = float(np.sum(fit.residuals[rows] ** 2)), fit.freedom(rows)
             times = math.sqrt(square / freedom)
             text = f"residuals of {block} are {times:.2g} times as large as the stated noise"
-            yield ResidualTest(test="size", block=block, p_value=float(chi2.sf(square, freedom)), text=text)
+            yield _ResidualTest(test="size", block=block, p_value=float(chi2.sf(square, freedom)), text=text)
 
 
-def _runs(fit: LinearFit) -> Iterator[ResidualTest]:
+def _runs(fit: LinearFit) -> Iterator[_ResidualTest]:
     for block, rows in _blocks(fit):
         signs = fit.residuals[rows][np.argsort(fit.order[rows], kind="stable")] > 0
         plus = int(np.count_nonzero(signs))
@@ -161,7 +161,7 @@ def _runs(fit: LinearFit) -> Iterator[ResidualTest]:
             runs = 1 + int(np.count_nonzero(signs[1:] != signs[:-1]))
             text = f"residuals of {block} keep their sign: {runs} runs in {signs.size} measurements"
             p_value = _runs_probability(plus, signs.size - plus, runs)
-            yield ResidualTest(test="runs", block=block, p_value=p_value, text=text)
+            yield _ResidualTest(test="runs", block=block, p_value=p_value, text=text)
 
 
 def _runs_probability(plus: int, minus: int, runs: int) -> float:
@@ -246,7 +246,7 @@ _HIDDEN: Final = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Explained:
+class _Explained:
     """One file."""
 
     file: str
@@ -263,12 +263,8 @@ class Explained:
         return f"the fit explains {percent} of the variance of {name} and calls the rest noise"
 
 
-def shares_explained(best: Optimum) -> tuple[Explained, ...]:
+def _shares_explained(best: Optimum) -> Iterator[_Explained]:
     """The share of each file whose rows leave one."""
-    return tuple(_shares(best))
-
-
-def _shares(best: Optimum) -> Iterator[Explained]:
     problem, residuals = best.residuals.problem, best.residuals
     scale, parts, expected = residuals.scale, best.at, problem.at(problem.start)
     taken = residuals.leverage(best.slopes)
@@ -285,7 +281,7 @@ def _shares(best: Optimum) -> Iterator[Explained]:
         if measured > 0:
             share = 1 - noise / measured
             seen = block.estimated and noise < _HIDDEN * effect
-            yield Explained(
+            yield _Explained(
                 file=block.observations.file, share=share, fails=bool(seen and share < LEAST_SHARE)
             )
 
@@ -329,7 +325,7 @@ class Review:
     criticism: Criticism
     laws: tuple[LawComparison, ...]
     """The fitted law against others; empty where no data depend on one."""
-    explained: tuple[Explained, ...] = ()
+    explained: tuple[_Explained, ...] = ()
     """Of each file, what the fit explains of it."""
     readings: tuple[Reading, ...] = ()
     """Other readings of the files, the likeliest first."""
@@ -372,11 +368,11 @@ class Review:
     def of(cls, result: FitResult) -> Review:
         """Test the residuals of a fit, read its data otherwise, and compare its law with others."""
         found, best = _at_solution(result), result.optimum
-        ranges = compared_columns(best.residuals.problem)
+        ranges = tuple(compared_columns(best.residuals.problem))
         return cls(
             criticism=Criticism.of(found.fit),
             laws=tuple(_comparisons(result, found)),
-            explained=shares_explained(best),
+            explained=tuple(_shares_explained(best)),
             readings=other_readings(best, ranges),
             ranges=ranges,
         )

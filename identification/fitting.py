@@ -110,7 +110,7 @@ class Noise:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FileResiduals:
+class _FileResiduals:
     """Residuals of one file over their standard deviation, one row a row of the file."""
 
     file: str
@@ -133,7 +133,7 @@ class FitResult:
     combinations: tuple[Combination, ...]
     """Products of powers of parameters that are not identified by themselves."""
     noise: tuple[Noise, ...]
-    residuals: tuple[FileResiduals, ...]
+    residuals: tuple[_FileResiduals, ...]
     held: Mapping[str, float]
     """Uncertain inputs of the scene that were not fitted, with their standard deviations, SI; their effect is
     in all intervals."""
@@ -319,7 +319,7 @@ def _noises(best: Optimum) -> tuple[Noise, ...]:
     )
 
 
-def _residuals(best: Optimum) -> tuple[FileResiduals, ...]:
+def _residuals(best: Optimum) -> tuple[_FileResiduals, ...]:
     """Normalised after what is no parameter has taken up its part."""
     problem, residuals = best.residuals.problem, best.residuals
     whole = best.at[: problem.measured.size] / np.sqrt(residuals.weights)
@@ -327,7 +327,7 @@ def _residuals(best: Optimum) -> tuple[FileResiduals, ...]:
     for block, mine in problem.rows:
         weights = block.observations.rows_of(residuals.weights[mine])
         found.append(
-            FileResiduals(
+            _FileResiduals(
                 file=block.observations.file,
                 kind=block.observations.kind,
                 lines=block.observations.lines,

@@ -53,12 +53,8 @@ class ComparedColumn:
     text: str
 
 
-def compared_columns(problem: Problem) -> tuple[ComparedColumn, ...]:
+def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
     """Columns against what the scene has."""
-    return tuple(_compared(problem))
-
-
-def _compared(problem: Problem) -> Iterator[ComparedColumn]:
     for block in problem.blocks:
         observations = block.observations
         ranges = block.kind.ranges(problem.scene)
@@ -94,7 +90,7 @@ Change = Callable[[Observations, Any], Observations | None]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Misreading:
+class _Misreading:
     """One way to misread a file."""
 
     words: str
@@ -179,50 +175,50 @@ def _seconds(observations: Observations, _: Any) -> Observations | None:
     return observations.with_columns(gas_time=times) if np.median(times) < _LONGEST_TIME else None
 
 
-MISREADINGS: Final[Mapping[str, Misreading]] = {
-    "before_and_after_exchanged": Misreading(
+MISREADINGS: Final[Mapping[str, _Misreading]] = {
+    "before_and_after_exchanged": _Misreading(
         words="vibrations before and after exchanged", change=_exchanged, settings=False, together=False
     ),
-    "phases_turned": Misreading(
+    "phases_turned": _Misreading(
         words="phases with the other sign, against the rotation", change=_turned("phase"), settings=False
     ),
-    "weights_turned": Misreading(
+    "weights_turned": _Misreading(
         words="angles of the trial weights against the rotation", change=_turned("angle"), settings=True
     ),
-    "chambers_turned": Misreading(
+    "chambers_turned": _Misreading(
         words="chambers lettered against the rotation", change=_lettered, settings=True
     ),
-    "amplitudes_halved": Misreading(
+    "amplitudes_halved": _Misreading(
         words="amplitudes half as large, such as peak to peak stated as zero to peak",
         change=_amplitudes(0.5),
         settings=False,
         scale=0.5,
     ),
-    "amplitudes_doubled": Misreading(
+    "amplitudes_doubled": _Misreading(
         words="amplitudes twice as large, such as zero to peak stated as peak to peak",
         change=_amplitudes(2.0),
         settings=False,
         scale=2.0,
     ),
-    "pressures_tenth": Misreading(
+    "pressures_tenth": _Misreading(
         words="gas pressures a tenth as large, such as bar stated as MPa",
         change=_pressures(0.1),
         settings=True,
         column="pressure",
     ),
-    "pressures_tenfold": Misreading(
+    "pressures_tenfold": _Misreading(
         words="gas pressures ten times as large, such as MPa stated as bar",
         change=_pressures(10.0),
         settings=True,
         column="pressure",
     ),
-    "pressures_absolute": Misreading(
+    "pressures_absolute": _Misreading(
         words="gas pressures as absolute ones, less that of the surroundings",
         change=_pressures(1.0, absolute=True),
         settings=True,
         column="pressure",
     ),
-    "times_in_seconds": Misreading(
+    "times_in_seconds": _Misreading(
         words="valve-open times a thousand times as long, such as seconds stated as milliseconds",
         change=_seconds,
         settings=True,
@@ -299,7 +295,7 @@ def _reading(problem: Problem, code: str, chosen: Sequence[int], gain: float, *,
     return Reading(code=code, files=files, gain=gain, named=named, text=text)
 
 
-def _choices(problem: Problem, kind: Misreading) -> Iterator[tuple[int, ...]]:
+def _choices(problem: Problem, kind: _Misreading) -> Iterator[tuple[int, ...]]:
     """Places of the files that are read otherwise: each that can be, and all of them."""
     able = [i for i, b in enumerate(problem.blocks) if kind.change(b.observations, problem.scene) is not None]
     yield from ((i,) for i in able)
@@ -342,7 +338,7 @@ class _Comparison:
         )
         return cls(problem=problem, rows=rows, given=here.deviance(), pulled=pulled)
 
-    def gain(self, kind: Misreading, chosen: Sequence[int]) -> float | None:
+    def gain(self, kind: _Misreading, chosen: Sequence[int]) -> float | None:
         """Of the log likelihood, by reading some files otherwise; None where nothing can be predicted."""
         rows, jacobian = list(self.rows), 0.0
         for i in chosen:
@@ -363,7 +359,7 @@ class _Comparison:
         gain = (self.given - found) / 2 + jacobian
         return gain if math.isfinite(gain) else None
 
-    def _changed(self, kind: Misreading, rows: _Rows) -> _Rows | None:
+    def _changed(self, kind: _Misreading, rows: _Rows) -> _Rows | None:
         problem = self.problem
         observations = kind.change(rows.block.observations, problem.scene)
         if observations is None:

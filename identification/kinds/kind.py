@@ -117,7 +117,7 @@ class Observations:
     def __len__(self) -> int:
         return int(self.lines.size)
 
-    def where(self, chosen: BoolArray) -> Observations:
+    def where(self, chosen: BoolArray | IntArray) -> Observations:
         """Some of the rows."""
         return replace(
             self,

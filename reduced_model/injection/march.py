@@ -52,6 +52,8 @@ _ROUND_OFF: Final = 1e-12
 _BISECTIONS: Final = 40
 _SECANTS: Final = 12
 """Of these, that may be guided: a smooth event takes five."""
+_REST_EVENT: Final = 0.01
+"""Of the instant of an event in a step at rest, which may be long, over the error allowed to a step."""
 _NOTHING_MOVED: Final = 1e-13
 """Fill ratio below which a start has come to nothing but round-off."""
 _LITTLE_MOVED: Final = 1e-9
@@ -193,7 +195,7 @@ def _step(
     if moves and motion.noted < count and notes[0, motion.noted] < motion.now + h:
         rates_at_end(plant, motion, w)
         while motion.noted < count and notes[0, motion.noted] < motion.now + h:
-            between(motion, h, (notes[0, motion.noted] - motion.now) / h, w)
+            between(plant, motion, h, (notes[0, motion.noted] - motion.now) / h, w)
             notes[row, motion.noted] = shown(plant, motion, w[BETWEEN, X])
             motion.noted += 1
     y = motion.state
@@ -221,20 +223,20 @@ def _step(
 def _cut(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
     """End the step just taken at the first event. Returns: its length then, s."""
     rates_at_end(plant, motion, w)
-    part = _event_part(plant, motion, h, w)
+    near = plant.relative_error * (_REST_EVENT if motion.direction == 0 else 1.0)
+    part = _event_part(plant, motion, h, near, w)
     if part < 1.0:
         shorten(plant, motion, h, part, w)
     return h * part
 
 
 @in_place
-def _event_part(plant: Record, motion: Record, h: float, w: FloatArray) -> float:
-    """Part of the step just taken after which the first event lies, late by the error of a step at most.
+def _event_part(plant: Record, motion: Record, h: float, near: float, w: FloatArray) -> float:
+    """Part of the step just taken after which the first event lies, at most `near` late.
 
     By the secant through how far both ends are `beyond` it, which halves the weight of an end that stays
     (the Illinois rule); by halves where that has no sign change or takes long.
     """
-    near = plant.relative_error
     low, high, what, stays = 0.0, 1.0, heading(plant, motion, _at(w, END)), 0
     before = beyond(plant, motion, now(motion), what)
     after = beyond(plant, motion, _at(w, END), what)
@@ -243,7 +245,7 @@ def _event_part(plant: Record, motion: Record, h: float, w: FloatArray) -> float
         middle = low + (high - low) * (before / (before - after) if guided else 0.5)
         # Never nearer to an end than that: so a root close to it is soon between two close ends.
         middle = min(max(middle, low + near / 2.0), high - near / 2.0)
-        between(motion, h, middle, w)
+        between(plant, motion, h, middle, w)
         found = beyond(plant, motion, _at(w, BETWEEN), what)
         if changes(plant, motion, _at(w, BETWEEN)):
             high, after, before, stays = middle, found, before * (0.5 if stays < 0 else 1.0), -1

@@ -18,10 +18,12 @@ from ringbalance.reduced_model.injection.column import (
     gas_volume,
     hydrostatic,
     line_rates,
+    near_end,
     steady,
     tabled,
 )
 from ringbalance.reduced_model.injection.dynamics import WORK, P, Record, U, X
+from ringbalance.reduced_model.injection.gas_at_rest import rest_after
 from ringbalance.reduced_model.injection.lift import lift_rates, lift_speed
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import in_place, inlined
@@ -45,6 +47,8 @@ _E: Final = np.array([0.2815431932141155, 0.07276199124934920, 0.108219620149531
 """Weights of the stages in what the method of order 3 would change there."""
 _SHORTEST_STEP: Final = 1e-15
 """s, below which no error is looked at."""
+_REST_STEP: Final = 0.25
+"""In units of a gas's time constant, while both gases change."""
 _SLOW: Final = 30.0
 """m/s, below which a velocity's error is not relative: a column keeps it for some 10 ms, in which a
 ten-thousandth of that moves less than 1e-6 of a chamber's liquid."""
@@ -283,9 +287,17 @@ def _error(plant: Record, y: FloatArray, w: FloatArray) -> float:
     return worst
 
 
+@inlined
+def _in_closed_form(plant: Record, motion: Record) -> bool:
+    """Whether isothermal gases alone change, while the liquid rests."""
+    return bool(motion.direction == 0 and plant.line and plant.heat_capacity_ratio == 1.0)
+
+
 @in_place
 def take(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
     """One accepted step that does not pass `left`, s, into row `END`. Returns: its length, s."""
+    if _in_closed_form(plant, motion):
+        return _rest(plant, motion, left, w)
     _linearize(plant, motion, w)
     while True:
         motion.steps += 1
@@ -302,18 +314,36 @@ def take(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
 
 
 @in_place
+def _rest(plant: Record, motion: Record, left: float, w: FloatArray) -> float:
+    """A step with the liquid at rest, in closed form.
+
+    While both gases change their difference may have an extreme, so the step is then a short one.
+    """
+    y, h = motion.state, left
+    if not (near_end(plant, motion, 0) or near_end(plant, motion, 1)):
+        fastest = min(gas_volume(plant, y[X]), gas_volume(plant, plant.total - y[X]))
+        h = min(left, _REST_STEP * fastest / plant.passing)
+    motion.steps += 1
+    rest_after(plant, motion, h, w, END)
+    return float(h)
+
+
+@in_place
 def shorten(plant: Record, motion: Record, h: float, part: float, w: FloatArray) -> None:
     """End the step of length h just taken after a part of it, with what lies `between`."""
-    if plant.inertia and motion.direction != 0:
-        between(motion, h, part, w)
+    if (plant.inertia and motion.direction != 0) or _in_closed_form(plant, motion):
+        between(plant, motion, h, part, w)
         _copy(w, BETWEEN, END)
     else:
         _rosenbrock(plant, motion, h * part, w)
 
 
 @in_place
-def between(motion: Record, h: float, part: float, w: FloatArray) -> None:
+def between(plant: Record, motion: Record, h: float, part: float, w: FloatArray) -> None:
     """State after a part of the step into row `BETWEEN`, cubic by the rates at both ends (row `_RATE`)."""
+    if _in_closed_form(plant, motion):
+        rest_after(plant, motion, h * part, w, BETWEEN)
+        return
     for i in range(8):
         rise = w[END, i] - motion.state[i]
         d0, d1 = h * w[_FIRST_RATE, i], h * w[_RATE, i]

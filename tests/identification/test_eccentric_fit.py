@@ -118,7 +118,7 @@ def test_the_second_mass_moves_as_the_first_one_would_in_its_place(scene: Eccent
         ),
     )
     data = positioning(one, 4)
-    second = replace(data, columns=dict(data.columns) | {"moved_mass": np.full(30, 2.0)})
+    second = data.with_columns(moved_mass=np.full(30, 2.0))
     predict = KINDS["positioning"].predict
     assert predict(other, second, None) == pytest.approx(predict(one, data, None), rel=1e-12)
     arms = {"masses.friction_arm[0]", "masses.friction_arm[1]"}
@@ -132,15 +132,7 @@ def test_the_second_mass_moves_as_the_first_one_would_in_its_place(scene: Eccent
 def test_the_next_speed_narrows_as_expected(scene: EccentricScene) -> None:
     """A run-up with the offered speed as one more row of known noise, against the gain expected of it."""
     width = {"amplitude": np.full(24, 1.96 * NOISE)}
-    data = replace(run_up(scene, 6), uncertainty=width)
-    few = replace(
-        data,
-        lines=data.lines[:4],
-        series=data.series[:4],
-        chamber=data.chamber[:4],
-        columns={name: values[:4] for name, values in data.columns.items()},
-        uncertainty={name: values[:4] for name, values in width.items()},
-    )
+    few = replace(run_up(scene, 6), uncertainty=width).where(np.arange(4))
     first = fit(scene, data=[few], parameters=["rotor.damping"])
     told = next_measurement(first, "rotor.damping")
     offered = _offered_rows(first.scene, "run_up", few)

@@ -21,68 +21,29 @@ from ringbalance.scene.models import Scene
 PAPER: Final = str(bundled_scene("liquid_ring_paper"))
 ONE_IN: Final = 20
 """Of the refused files, those that go through the whole command."""
+# fmt: off
 CELLS: Final = (
-    *(
-        "",
-        " ",
-        "nan",
-        "inf",
-        "-inf",
-        "1,5",
-        "1.234,5",
-        "1e999",
-        "-1",
-        "1e-320",
-        "0",
-        "x",
-        "--",
-        "1 mm",
-        "5 %",
-    ),
-    *("１", "1_000", "0x10", "TRUE", "#N/A", "#DIV/0!", "12.03.2026", "µ", "°", "\x00", "\x1b[31m", "\u2028"),
-    *("A", "a", "Z", "1;2", '"', '""', "'", "9" * 400, "=A1+B1", "\ufeff", "−1", "½"),
+    "", " ", "nan", "inf", "-inf", "1,5", "1.234,5", "1e999", "-1", "1e-320", "0", "x", "--", "1 mm", "5 %",
+    "１", "1_000", "0x10", "TRUE", "#N/A", "#DIV/0!", "12.03.2026", "µ", "°", "\x00", "\x1b[31m", "\u2028",
+    "A", "a", "Z", "1;2", '"', '""', "'", "9" * 400, "=A1+B1", "\ufeff", "−1", "½",
 )
 HEADS: Final = (
-    *(
-        "",
-        "amplitude",
-        "amplitude [um]",
-        "amplitude [furlong]",
-        "phase [K]",
-        "x [",
-        "x []",
-        "[um]",
-        "x [[um]]",
-    ),
-    *("Amplitude [um]", "series", "note", "chamber", "uncertainty", "uncertainty_amplitude [um]", "µ [µm]"),
-    *("speed [1]", "volume [ml]", "mass [g]", "fill_ratio [%]", "amplitude (um)"),
+    "", "amplitude", "amplitude [um]", "amplitude [furlong]", "phase [K]", "x [", "x []", "[um]",
+    "x [[um]]", "Amplitude [um]", "series", "note", "chamber", "uncertainty", "uncertainty_amplitude [um]",
+    "µ [µm]", "speed [1]", "volume [ml]", "mass [g]", "fill_ratio [%]", "amplitude (um)",
 )
 HEADERS: Final = (
-    *(
-        '# kind = "flow"',
-        "# kind = 3",
-        '# kind = "rain"',
-        "# kind",
-        "#",
-        "# [uncertainty]",
-        "# = 3",
-        "# a.b.c = 1",
-    ),
-    *(
-        '# amplitude = "rms"',
-        "# amplitude = true",
-        "# uncertainty = -1",
-        "# uncertainty = nan",
-        "# source = []",
-    ),
-    *(
-        "# uncertainty = { amplitude = 1 }",
-        '# uncertainty = { phase = "1 deg" }',
-        "# uncertainty = 1979-05-27",
-    ),
-    *('# uncertainty = { "a\\nb" = "1 um" }', "# source = '''", '# "\\u001b" = 1', "# x = " + "[" * 400),
-    *("# uncertainty = 1e-400", "# uncertainty = 99999999999999999999", "# kind = { }", "sep=;", "sep=|"),
+    '# kind = "flow"', "# kind = 3", '# kind = "rain"', "# kind", "#", "# [uncertainty]", "# = 3",
+    "# a.b.c = 1", '# amplitude = "rms"', "# amplitude = true", "# uncertainty = -1", "# uncertainty = nan",
+    "# source = []", "# uncertainty = { amplitude = 1 }", '# uncertainty = { phase = "1 deg" }',
+    "# uncertainty = 1979-05-27", '# uncertainty = { "a\\nb" = "1 um" }', "# source = '''",
+    '# "\\u001b" = 1', "# x = " + "[" * 400, "# uncertainty = 1e-400",
+    "# uncertainty = 99999999999999999999", "# kind = { }", "sep=;", "sep=|",
 )
+SIGNS: Final = (
+    (",", ";"), (",", "\t"), (",", "|"), (".", ","), ("\n", "\r\n"), ("\n", "\r"), ("\n", "\n\n"), ('"', "'"),
+)
+# fmt: on
 
 
 def lines_changed(text: str, change: Callable[[list[str]], None]) -> str:
@@ -127,19 +88,7 @@ def moved_line(draw: random.Random, text: str) -> str:
 
 def other_signs(draw: random.Random, text: str) -> str:
     """Separators, line ends and points as other machines write them."""
-    old, new = draw.choice(
-        [
-            (",", ";"),
-            (",", "\t"),
-            (",", "|"),
-            (".", ","),
-            ("\n", "\r\n"),
-            ("\n", "\r"),
-            ("\n", "\n\n"),
-            ('"', "'"),
-        ]
-    )
-    return text.replace(old, new)
+    return text.replace(*draw.choice(SIGNS))
 
 
 def random_characters(draw: random.Random, text: str) -> str:

@@ -104,22 +104,10 @@ def test_a_disc_with_another_law_is_found_out(
     assert law.text.startswith("the data prefer laminar flow")
 
 
-def some(observations: Observations, rows: list[int], **columns: FloatArray) -> Observations:
-    """A few rows of a file, with other values of some columns."""
-    return replace(
-        observations,
-        lines=observations.lines[rows],
-        series=observations.series[rows],
-        chamber=observations.chamber[rows],
-        columns={name: values[rows] for name, values in observations.columns.items()} | columns,
-        uncertainty={name: values[rows] for name, values in observations.uncertainty.items()},
-    )
-
-
 @pytest.fixture(scope="module")
 def four(paper_scene: Scene, true: Scene) -> tuple[Observations, FitResult, NextMeasurement]:
     """Four measurements, the bore fitted to them, and what a further one is expected to give."""
-    data = some(transfers(true, Models.of(paper_scene), seed=0, share=0.02), [0, 6, 13, 19])
+    data = transfers(true, Models.of(paper_scene), seed=0, share=0.02).where(np.array([0, 6, 13, 19]))
     first = fit(paper_scene, data=[data], parameters=["bore"])
     return data, first, next_measurement(first, "bore")
 
@@ -137,7 +125,7 @@ def test_the_expected_gain_is_that_of_fits_made_again(
     offered = _offered_rows(best.residuals.problem.scene_at(best.t), "transfer", data)
     chosen = next(g for g in told.gains if g.candidate == _words_of(offered, row))
     volume = KINDS["transfer"].predict(first.scene, offered, Models.of(paper_scene))
-    more = replace(some(offered, [row], volume=volume[[row]]), file="more.csv")
+    more = replace(offered.with_columns(volume=volume).where(np.array([row])), file="more.csv")
     again = fit(paper_scene, data=[data, more], parameters=["bore"])
     widths = [r.parameters[0].profile.high - r.parameters[0].profile.low for r in (first, again)]
     assert widths[1] / widths[0] == pytest.approx(chosen.ratio, rel=0.05)

@@ -75,7 +75,7 @@ def collect_evidence(
     ids = [case.id for case in load_cases() if level == "heavy" or case.paper != DRIVEN]
     # Before the cases, the last of which this process takes when it has nothing else to do.
     apart = begun(scene, level, pool)
-    with cases_of_report(ids, scene=scene, level=level, pool=pool) as judged_cases:
+    with _cases_of_report(ids, scene=scene, level=level, pool=pool) as judged_cases:
         tell("pressure field")
         pressure = _pressure(scene)
         tell("calibration")
@@ -152,7 +152,7 @@ def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
 
 
 @contextmanager
-def cases_of_report(
+def _cases_of_report(
     ids: Sequence[str], *, scene: Scene, level: Level, pool: Workers | None = None
 ) -> Iterator[Callable[[Progress], tuple[list[Record], dict[str, str]]]]:
     """Start the cases of a report that no earlier one has kept; they run beside the body.
@@ -273,7 +273,7 @@ def collect_run(
     """
     tell = progress or (lambda _: None)
     ids = [case.id for case in load_cases() if case.paper == scene.balancer]
-    with cases_of_report(ids, scene=paper_scene(), level=level, pool=pool) as judged_cases:
+    with _cases_of_report(ids, scene=paper_scene(), level=level, pool=pool) as judged_cases:
         tell("run")
         study = _STUDIES.get(scene.balancer, _plain_study)(scene)
         verification, kept = judged_cases(tell)

@@ -176,10 +176,10 @@ class Drawing:
 
     def standalone(self) -> str:
         """The figure as a file of its own, in the colours of a light page."""
-        return as_file(self.svg, *self.size)
+        return _as_file(self.svg, *self.size)
 
 
-def as_file(body: str, width: float, height: float) -> str:
+def _as_file(body: str, width: float, height: float) -> str:
     """An SVG file of svg elements; word processors, LaTeX and printers know neither variables nor schemes.
 
     Args: `width`, `height`: pt.
@@ -450,4 +450,4 @@ def sheet(drawings: Sequence[Drawing]) -> str:
         told = f'role="img" aria-label="{drawing.name.replace("-", " ")}"'
         placed.append(drawing.svg.replace("<svg ", place, 1).replace('aria-hidden="true"', told, 1))
         x, row = x + width + _MARGIN, max(row, height)
-    return as_file("\n".join(placed), edge + _MARGIN, y + row + _MARGIN)
+    return _as_file("\n".join(placed), edge + _MARGIN, y + row + _MARGIN)

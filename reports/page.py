@@ -92,7 +92,7 @@ def _as_known(row: Record) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PageContent:
+class _PageContent:
     """Everything that the templates need."""
 
     context: Record
@@ -112,7 +112,7 @@ def page_content(
     pictures: Mapping[str, bytes] | None = None,
     views_of: Callable[[list[Record]], Record] = case_views,
     sections_by: Callable[[Record], Mapping[str, Record | None]] = section_views,
-) -> PageContent:
+) -> _PageContent:
     """Turn the evidence into texts, tables and figures.
 
     Args: `pictures`: PNG bytes by the file names that the evidence lists; a picture that is missing is left
@@ -125,7 +125,7 @@ def page_content(
         cases = summary.claims(evidence, paper=balancer)
         claims = [{**case_view(case), "elsewhere": False} for case in cases]
         context = {**_frame(evidence, sections), "claims": claims}
-        return PageContent(context=context, drawings=tuple(drawings_in([sections, claims])))
+        return _PageContent(context=context, drawings=tuple(drawings_in([sections, claims])))
     sections = viewed(evidence, sections_by(evidence))
     views = views_of(evidence["verification"])
     claims = [
@@ -144,7 +144,7 @@ def page_content(
     }
     own = [[case["order_plot"], *case["drawings"]] for case in (*claims, *checks)]
     drawings = drawings_in([sections, *own])
-    return PageContent(context=context, drawings=tuple(drawings))
+    return _PageContent(context=context, drawings=tuple(drawings))
 
 
 def _frame(evidence: Record, sections: list[Record]) -> Record:
@@ -227,7 +227,7 @@ def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> 
     return render_pages(page_content(evidence, pictures=pictures))
 
 
-def render_pages(content: PageContent, *, documents: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
+def render_pages(content: _PageContent, *, documents: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
     """Fills the template, once for each document."""
     return {file: _page(content, file) for file in documents}
 
@@ -258,7 +258,7 @@ def _environment() -> jinja2.Environment:
     return environment
 
 
-def _page(content: PageContent, file: str) -> str:
+def _page(content: _PageContent, file: str) -> str:
     document = DOCUMENTS[file]
     page = (
         _environment()

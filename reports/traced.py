@@ -143,7 +143,7 @@ class Count(int):
         return number
 
 
-class Items(Sequence[Any]):
+class _Items(Sequence[Any]):
     """A list of the evidence; of cases, the place is by `id`."""
 
     def __init__(self, values: Sequence[Any], path: str) -> None:
@@ -186,7 +186,7 @@ def placed(value: Any, path: str = "") -> Any:
     if isinstance(value, Mapping):
         return Part(value, path)
     if isinstance(value, list | tuple):
-        return Items(value, path)
+        return _Items(value, path)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return value
     return Number(value, path) if isinstance(value, float) else Count(value, path)
@@ -242,7 +242,7 @@ class Column:
     texts: list[str]
 
 
-def column(values: Items, digits: int = 6) -> Column:
+def column(values: _Items, digits: int = 6) -> Column:
     """A column of the evidence in the unit that suits its largest value, which has so many digits."""
     numbers_of = list(values)
     display = numbers.display_unit(unit_of(numbers_of[0].path), *numbers_of)
@@ -300,7 +300,7 @@ def known_width(value: float | None, width: float | None, *, stated: bool) -> fl
     return None if value is None or total is None or total < EXACT * abs(value) else total
 
 
-def part_of(part: float, budget: Mapping[str, Any], total: float | None) -> str:
+def _part_of(part: float, budget: Mapping[str, Any], total: float | None) -> str:
     """A part of an uncertainty to the place of the second digit of the total, in the value's unit.
 
     One that is smaller than that is so named.
@@ -331,7 +331,7 @@ def finished(value: object) -> object:
 
 _FORMS: Final[tuple[Form, ...]] = ("given", "percent", "change", "fixed")
 FILTERS: Final = MappingProxyType(
-    {"q": printed, "part_of": part_of, "column": column, "span": span}
+    {"q": printed, "part_of": _part_of, "column": column, "span": span}
     | {form: partial(printed, form=form) for form in _FORMS}
 )
 """Filters of the templates: each formats, and traces what it prints."""

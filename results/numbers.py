@@ -187,7 +187,7 @@ def with_unit(text: str, unit: str) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DisplayUnit:
+class _DisplayUnit:
     """A unit that values are shown in: shown value = SI value * factor."""
 
     symbol: str
@@ -221,15 +221,15 @@ SCALES: Final[dict[str, tuple[_Scale, ...]]] = {
 """By SI unit: symbol, factor, and the smallest magnitude (SI) from which the symbol is used."""
 
 
-def display_unit(unit: str, *values: float | None) -> DisplayUnit:
+def display_unit(unit: str, *values: float | None) -> _DisplayUnit:
     """The unit that suits the largest of some SI values; for zero, and where none is known, the SI unit."""
     scales = SCALES.get(unit, ((unit, 1.0),))
-    units = [DisplayUnit(symbol=s, factor=f, start=start[0] if start else 0.0) for s, f, *start in scales]
+    units = [_DisplayUnit(symbol=s, factor=f, start=start[0] if start else 0.0) for s, f, *start in scales]
     largest = max((abs(value) for value in values if value is not None), default=0.0)
     # 0.1 MPa may arrive as 99 999.999 999: the last bits must not choose the unit.
     fitting = [display for display in units if display.start <= largest * (1 + 1e-9)]
     if not largest and len(units) > 1:
-        return DisplayUnit(symbol=unit.replace("^3", "³").replace(" ", THIN_SPACE), factor=1.0)
+        return _DisplayUnit(symbol=unit.replace("^3", "³").replace(" ", THIN_SPACE), factor=1.0)
     return fitting[-1]
 
 

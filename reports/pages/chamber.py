@@ -120,8 +120,11 @@ def _waves(scene: Scene) -> Record:
     imported = scene.disc.geometry is not None
     # A peak is narrower than the distance of even points.
     peaks = [x * side for _, x in met for side in (0.96, 0.99, 1.0, 1.01, 1.04) if x * side <= largest]
-    even = np.linspace(0.02, 1.0, _CUT_POINTS if imported else _POINTS) * largest
-    shown = even if imported else np.unique([*even, *peaks])
+    if imported:
+        # Denser where the ring is thin, for there the frequencies rise fastest.
+        shown = (0.02 + 0.98 * np.linspace(0, 1, _CUT_POINTS) ** 2) * largest
+    else:
+        shown = np.unique([*(np.linspace(0.02, 1.0, _POINTS) * largest), *peaks])
     fills = np.append(shown, scene.disc.initial_fill)
     modes = sloshing_modes(disc=scene.disc, fill_ratio=fills[:-1], modes=_MODES, cells=_COARSE)
     answer = sloshing_response(

@@ -30,7 +30,7 @@ CURVE_FACTORS: Final[FloatArray] = np.geomspace(0.25, 4.0, 21)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class GainCurve:
+class _GainCurve:
     """Where overshoot and instability start, in controller.proportional, as one quantity varies."""
 
     values: FloatArray
@@ -60,7 +60,7 @@ class LoopGain:
     """h = Kc slope: share of the residual that an operation takes away."""
     lag_margin: float
     """Error of the assumed lag angle at which the residual no longer falls, acos(h/2), rad; 0 if h >= 2."""
-    over_drag: GainCurve
+    over_drag: _GainCurve
 
     @property
     def overshoot_gain(self) -> float:
@@ -102,7 +102,7 @@ def loop_gain(scene: Scene, model: BalancerModel) -> LoopGain | None:
         gain=scene.controller.proportional,
         per_operation=h,
         lag_margin=math.acos(min(h / 2, 1.0)),
-        over_drag=GainCurve(
+        over_drag=_GainCurve(
             values=k * CURVE_FACTORS,
             overshoot_gain=1 / (slope * slowed),
             instability_gain=2 / (slope * slowed),

@@ -43,7 +43,7 @@ _FILLS: Final = {
 }
 
 
-class ShownField(Protocol):
+class _ShownField(Protocol):
     """Pressure of the liquid in one chamber, gravity left out, as a report shows it."""
 
     @property
@@ -193,7 +193,7 @@ def _imported_field(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: floa
     return ImportedField(fill_ratio=fill_ratio, surface_radius=radius, mesh=mesh, solution=solution)
 
 
-def shown_field(scene: Scene, *, fill_ratio: float) -> ShownField:
+def shown_field(scene: Scene, *, fill_ratio: float) -> _ShownField:
     """Of a sector between plates, or of an imported chamber. Args: `fill_ratio`: x, within (0, 1)."""
     if scene.disc.geometry is None:
         return chamber_field(scene, fill_ratio=fill_ratio)

@@ -222,7 +222,7 @@ def problem_of(
         scene=scene,
         models=models_for(scene),
         parameters=parameters_for(scene, names),
-        blocks=tuple(Block.of(each) for each in data),
+        blocks=tuple(Block(observations=each) for each in data),
     )
 
 

@@ -44,12 +44,11 @@ class Block:
     """One file of measurements, its errors made independent."""
 
     observations: Observations
-    kind: Kind
 
-    @classmethod
-    def of(cls, observations: Observations) -> Block:
-        """A data set by the kind that it names."""
-        return cls(observations=observations, kind=KINDS[observations.kind])
+    @property
+    def kind(self) -> Kind:
+        """Looked up, for its functions cannot be pickled."""
+        return KINDS[self.observations.kind]
 
     @cached_property
     def measured(self) -> FloatArray:

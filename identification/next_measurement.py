@@ -87,7 +87,7 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
         _offered_rows(scene, kind, measured[kind].observations if kind in measured else None)
         for kind in kinds_of(scene.balancer)
     ]
-    asked = replace(problem, blocks=tuple(Block.of(each) for each in offered if len(each)))
+    asked = replace(problem, blocks=tuple(Block(observations=each) for each in offered if len(each)))
     changed = [(problem.scene, both_sides(problem.scene, n, sd)[1]) for n, sd in result.held.items()]
     by_parameters, by_held = asked.quick_slopes(t), asked.held_effects(t, changed)
     for block, mine in asked.rows:

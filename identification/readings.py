@@ -364,7 +364,7 @@ class _Comparison:
         observations = kind.change(rows.block.observations, problem.scene)
         if observations is None:
             return None
-        block = Block.of(observations)
+        block = Block(observations=observations)
         if not kind.settings:
             return replace(rows, block=block)
         alone = replace(problem, blocks=(block,))

@@ -186,7 +186,8 @@ def _to_avoid(ratios: FloatArray, fills: FloatArray, met: Sequence[int], *, impo
         for mode, row in enumerate(ratios, start=1)
         if (mode in met or (row[0] < high and row[-1] > low)) and (imported or mode % 2)
     ]
-    ends = {mode: np.interp(_MEETING, ratios[mode - 1], fills) for mode in within}
+    # On a thin ring the square of a frequency grows with the depth, so a straight line meets it best.
+    ends = {mode: np.interp(np.square(_MEETING), ratios[mode - 1] ** 2, fills) for mode in within}
     return [{"mode": mode, "from_fill_ratio": a, "to_fill_ratio": b} for mode, (a, b) in ends.items()]
 
 

@@ -18,7 +18,7 @@ from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.figure import Drawing
 from ringbalance.reports.page import render
 from ringbalance.reports.pages import drag_coefficient as fifty
-from ringbalance.reports.pages import eccentric, tube
+from ringbalance.reports.pages import eccentric, plain, tube
 from ringbalance.reports.pages import paper_figures as paper_again
 from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.section import Section, Work
@@ -35,7 +35,7 @@ Record = dict[str, Any]
 def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
     folder = files("ringbalance.reports").joinpath("templates")
     present = {item.name for item in folder.iterdir() if item.name.endswith(".html")}
-    assert present == {section.file for section in (*SECTIONS, *eccentric.SECTIONS)} | {
+    assert present == {section.file for section in (*SECTIONS, *eccentric.SECTIONS, *plain.SECTIONS)} | {
         "report.html",
         "macros.html",
     }

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from ringbalance.cli import main
 from ringbalance.scene import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
@@ -101,7 +102,7 @@ _VESSEL = (
 
 def _judged(path: Path, rows: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
     path.write_text(_VESSEL + rows, encoding="utf-8")
-    code = verify(data=path, json=True)
+    code = main(["verify", "--data", str(path), "--json"])
     printed = capsys.readouterr()
     return code, printed.out, printed.err
 
@@ -130,7 +131,7 @@ def test_a_file_of_measurements_is_predicted_and_judged(
     ("rows", "named"),
     [
         ("10,900,100,800,293,51,1,a\n" * 2, "between start_pressure and far_pressure"),
-        ("10,300,100,800,293,0,1,a\n" * 2, '"volume" must be positive'),
+        ("10,300,100,800,293,0,1,a\n" * 2, '"volume [ml]" = "0": it is not above zero'),
         ("10,300,100,800,293,51,1,a\n", "1 point"),
         ("10,300,100,800,293,51,x,a\n" * 2, 'line 6, column "conductance [l/(s*bar)]"'),
     ],

@@ -6,6 +6,7 @@ Beside it the moment of a pair of chambers, from the same chamber.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -63,6 +64,11 @@ class CalibratedLaw:
 
     The velocity is continuous in fills and pressure, except where the physics jumps: when a column separates
     at rest, and when a chamber's liquid leaves the port open.
+
+    `table()` holds `log_velocity` (ln m/s), `log_head`, `log_hump_head` and `log_return_hump_head`
+    (ln m^2/s^2; the last two only with a crest), `fill_ratio`, `hydrostatic_pressure` (Pa), and, of shape
+    (1,), `density`, `port_pressure`, `hump_pressure` (only with a crest), `vapour_pressure` (gauge, Pa), and
+    `released` and `froude_velocity` (m/s) of `TubePath`.
     """
 
     name: str
@@ -170,6 +176,31 @@ class CalibratedLaw:
         )
         sides = [variant._directed(asked, reverse=reverse) for variant in self.variants]
         return flow.widened(sides[::2], sides[1::2])
+
+    def table(self) -> Mapping[str, FloatArray]:
+        heads = {
+            "log_head": self.heads.head,
+            "log_hump_head": self.heads.hump_head,
+            "log_return_hump_head": self.heads.return_hump_head,
+        }
+        scalars = (
+            "density",
+            "port_pressure",
+            "hump_pressure",
+            "vapour_pressure",
+            "released",
+            "froude_velocity",
+        )
+        values = {name: getattr(self.path, name) for name in scalars}
+        return (
+            {"log_velocity": self.heads.head.nodes}
+            | {name: table.value.copy() for name, table in heads.items() if table is not None}
+            | {
+                "fill_ratio": self.hydrostatic_pressure.nodes,
+                "hydrostatic_pressure": self.hydrostatic_pressure.value.copy(),
+            }
+            | {name: np.array([value]) for name, value in values.items() if value is not None}
+        )
 
     def cavity_margin(
         self, *, fills: tuple[float, float], gas_pressure: float, reverse: bool

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -247,6 +248,10 @@ class CompleteLaw(FlowLaw, Protocol):
     @property
     def density(self) -> float:
         """rho, kg/m^3."""
+        ...
+
+    def table(self) -> Mapping[str, FloatArray]:
+        """Plain arrays for code of one's own, named in the implementing law's docstring."""
         ...
 
     def save(self, path: Path | str) -> Path:

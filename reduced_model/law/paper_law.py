@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,6 +57,9 @@ class PaperLaw:
     has the column part with the gas off.  That takes a crest which holds the liquid: from a chamber whose
     level is beyond `return_pressure` the same equation, reversed, lets it run back.  The paper states no
     uncertainty, so none is returned.  Between events du/dt = -2 omega^2 S/((k+1) B theta).
+
+    `table()` holds `velocity_squared_per_pressure` 2/(rho (k+1)), m^3/kg, and `pressure_per_fill_difference`
+    rho omega^2 V/(B theta), Pa: u^2 = the first times (p0 + the second times (x_A - x_C)).
     """
 
     density: float
@@ -141,6 +145,10 @@ class PaperLaw:
             return np.zeros_like(asked.primed)
         level = self.pressure_per_fill_difference * asked.opposite_fill_ratio
         return np.asarray(level - self.return_pressure > asked.gas_pressure)
+
+    def table(self) -> Mapping[str, FloatArray]:
+        names = ("velocity_squared_per_pressure", "pressure_per_fill_difference")
+        return {name: np.array([getattr(self, name)]) for name in names}
 
     def save(self, path: Path | str) -> Path:
         return save_record(path=Path(path), record=self)

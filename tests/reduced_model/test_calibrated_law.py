@@ -241,6 +241,15 @@ def test_pressures_on_the_shaft_are_those_on_the_liquid_times_the_columns_ratio(
     np.testing.assert_allclose(flows[0].velocity, flows[1].velocity, rtol=1e-9)
 
 
+def test_table_inverts_to_the_law(law: CalibratedLaw) -> None:
+    table = law.table()
+    x, p = 0.2, 1.5e6
+    level = np.interp([x, 0.5 - x], table["fill_ratio"], table["hydrostatic_pressure"])
+    head = (p + level[0] - level[1]) / table["density"][0]
+    u = np.exp(np.interp(np.log(head), table["log_head"], table["log_velocity"]))
+    assert u == pytest.approx(float(law.evaluate(fill_ratio=x, gas_pressure=p).velocity), rel=1e-4)
+
+
 def test_uncertainty_of_a_turbulent_siphon_is_half_that_of_k_plus_1(
     law: CalibratedLaw, point_scene: Scene
 ) -> None:

@@ -39,6 +39,14 @@ def test_law_is_blocked_below_stall_and_with_the_gas_off(table_1_scene: Scene) -
     assert 0 < flow.velocity[1] < 1e-3
 
 
+def test_table_reproduces_the_law(table_1_scene: Scene) -> None:
+    table = paper_law(table_1_scene).table()
+    level = table["pressure_per_fill_difference"] * (0.3 - 0.1)
+    squared = float((table["velocity_squared_per_pressure"] * (0.9e6 + level))[0])
+    flow = paper_law(table_1_scene).evaluate(fill_ratio=0.3, opposite_fill_ratio=0.1, gas_pressure=0.9e6)
+    assert float(flow.velocity) == pytest.approx(squared**0.5, rel=1e-15)
+
+
 def test_scene_fixes_prescribed_k(table_1_scene: Scene) -> None:
     tube = dataclasses.replace(table_1_scene.tube, drag_coefficient=20.0)
     assert paper_law(dataclasses.replace(table_1_scene, tube=tube)).drag_coefficient == 20.0

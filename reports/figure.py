@@ -202,6 +202,7 @@ _LEFT: Final = 0.66
 _RIGHT: Final = 0.14
 _BOTTOM: Final = 0.42
 _TOP: Final = 0.1
+_POINTS, _MARGIN = 72, 18.0
 _LEGEND_ROW: Final = 0.175
 _DECADE: Final = 8.0
 """Range of a logarithmic axis up to which ticks at 1, 2 and 5 would be too few."""
@@ -432,10 +433,6 @@ def legend_above(axes: Axes, *, columns: int) -> None:
     top = _TOP + _LEGEND_ROW * rows + (_TOP_AXIS if axes.child_axes else 0.0)
     box, height = axes.get_position(), figure.get_figheight()
     axes.set_position((box.x0, box.y0, box.width, 1 - (_BOTTOM + top) / height))
-
-
-_POINTS: Final = 72
-_MARGIN: Final = 18.0
 
 
 def sheet(drawings: Sequence[Drawing]) -> str:

@@ -3,7 +3,7 @@
     python tools/long_functions.py PATH...
 
 A body is counted without its docstring.  Over 35 lines is a question, printed; over 80 lines, and a file of
-more than 450 lines, is refused with exit code 1.
+more than 485 lines, is refused with exit code 1.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 
 QUESTION = 35
 REFUSE = 80
-LONGEST_FILE = 450
+LONGEST_FILE = 485
 
 
 def body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:

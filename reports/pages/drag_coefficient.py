@@ -31,7 +31,8 @@ from ringbalance.reports.figure import (
     level,
     logarithmic,
 )
-from ringbalance.reports.pages.drag_map import ApparentDrag, DragMap, DragPoint, LiquidVerdicts
+from ringbalance.reports.pages.drag_map import ApparentDrag, DragMap, LiquidVerdicts
+from ringbalance.reports.pages.drag_point import DragPoint
 from ringbalance.reports.prose import typeset
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.numbers import number, short

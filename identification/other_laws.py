@@ -1,0 +1,126 @@
+"""What other laws predict for the same data: other machines, laminar or turbulent tubes, no siphon crest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.identification.device import Device
+from ringbalance.identification.likelihood import Block, Problem
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.models import Scene
+from ringbalance.scene.paths import with_values_at
+
+_BY_LAW: Final = ("injection", "transfer", "flow")
+"""Kinds that the law of the tube's flow decides on."""
+LAMINAR: Final = "laminar flow (a loss in proportion to the velocity)"
+TURBULENT: Final = "turbulent flow (a loss in proportion to its square)"
+UNBROKEN: Final = "a column that never separates over the crest"
+BROKEN: Final = "a column that separates at ambient pressure"
+UNSPILT: Final = "a column that runs full without spilling first"
+EXPONENTS: Final[Mapping[str, float]] = MappingProxyType({LAMINAR: 1.0, TURBULENT: 2.0})
+"""Of the loss over the velocity, of those of these laws that are powers."""
+_OF_THE_CREST: Final = (UNBROKEN, BROKEN, UNSPILT)
+
+WITHOUT: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
+    {
+        "a rotor without damping": ("run_up", ("rotor.damping",)),
+        "masses without friction": ("positioning", ("masses.friction_arm[0]", "masses.friction_arm[1]")),
+        "a motor without back EMF": ("positioning", ("motor.back_emf_constant",)),
+    }
+)
+"""Of eccentric masses: the kind of data that an effect moves, and the values that are zero without it."""
+
+
+def by_other_machines(problem: Problem, scene: EccentricScene) -> Iterator[tuple[str, FloatArray]]:
+    """Without one of the effects that move the data, unless its size is fitted: then its interval tells."""
+    fitted = {parameter.name for parameter in problem.parameters}
+    kinds = {block.observations.kind for block in problem.blocks}
+    for name, (kind, paths) in WITHOUT.items():
+        if kind in kinds and not fitted & set(paths):
+            yield name, problem.predicted(with_values_at(scene, dict.fromkeys(paths, 0.0)))
+
+
+def by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, FloatArray]]:
+    """By other laws of the tube's flow, where data depend on it."""
+    blocks = [b for b in problem.blocks if b.observations.kind in _BY_LAW]
+    if not blocks:
+        return
+    law, velocity = Device.of(scene, problem.models).law, _typical_velocity(scene, problem, blocks)
+    for name in _laws_to_compare(law):
+        models = replace(problem.models, other=partial(_other_law, name=name, velocity=velocity))
+        other = replace(problem, models=models)
+        yield (
+            name,
+            np.concatenate(
+                [b.whiten @ _predicted(b, scene, other, EXPONENTS.get(name)) for b in problem.blocks]
+            ),
+        )
+
+
+def _predicted(block: Block, scene: Scene, problem: Problem, exponent: float | None) -> FloatArray:
+    """By the other law; flow at rest follows a power of the pressure through its middle value."""
+    own = block.predicted(scene, problem.models)
+    if block.observations.kind != "flow" or exponent is None:
+        return own
+    pressure = block.observations.columns["pressure_difference"]
+    middle = int(np.argsort(pressure)[pressure.size // 2])
+    return np.asarray(own[middle] * (pressure / pressure[middle]) ** (1 / exponent))
+
+
+def _typical_velocity(scene: Scene, problem: Problem, blocks: list[Block]) -> float:
+    """At equal fills under the middle of the data's gas pressures, m/s; 1 where nothing flows there."""
+    pressures = [b.observations.columns["pressure"] for b in blocks if "pressure" in b.observations.columns]
+    pressure = float(np.median(np.concatenate(pressures))) if pressures else scene.gas.pressure
+    law, x = Device.of(scene, problem.models).law, scene.disc.initial_fill
+    flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
+    return abs(float(flow.velocity)) or 1.0
+
+
+def power_of(law: CalibratedLaw, velocity: float, exponent: float) -> CalibratedLaw:
+    """Heads in proportion to a power of the velocity, those of the law at one velocity, m/s."""
+    heads = law.heads
+    near, far = heads.hump_head, heads.return_hump_head
+    return replace(
+        law,
+        heads=replace(
+            heads,
+            head=_straight(heads.head, velocity, exponent),
+            hump_head=None if near is None else _straight(near, velocity, exponent),
+            return_hump_head=None if far is None else _straight(far, velocity, exponent),
+        ),
+    )
+
+
+def _straight(table: HermiteTable, velocity: float, exponent: float) -> HermiteTable:
+    nodes: FloatArray = table.nodes
+    at = float(np.clip(np.log(velocity), nodes[0], nodes[-1]))
+    value = table(at) + exponent * (nodes - at)
+    return table_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=value)
+
+
+def _other_law(law: CalibratedLaw, *, name: str, velocity: float) -> CalibratedLaw:
+    """The other law of a name, from the fitted one; a power has the same loss at a velocity, m/s."""
+    if name in EXPONENTS:
+        return power_of(law, velocity, EXPONENTS[name])
+    if name == UNBROKEN:
+        heads = replace(law.heads, hump_head=None, return_hump_head=None)
+        return replace(law, path=replace(law.path, hump_pressure=None), heads=heads)
+    if name == BROKEN:
+        return replace(law, path=replace(law.path, vapour_pressure=0.0, released=0.0))
+    if name == UNSPILT:
+        return replace(law, path=replace(law.path, froude_velocity=0.0))
+    raise ValueError(f"{name!r} is no other law")
+
+
+def _laws_to_compare(law: CalibratedLaw) -> tuple[str, ...]:
+    """Names of those that mean something for a law: a tube without crest has no column to break."""
+    return (*EXPONENTS, *(() if law.path.hump_pressure is None else _OF_THE_CREST))

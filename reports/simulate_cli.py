@@ -55,7 +55,7 @@ def simulate(
     check_output("--plot", plot, ".svg")
     told = _with_seed(with_tolerance(load_scene(scene), tolerance=tolerance, models=models), seed)
     balancer = balancer_under(law, told)
-    # The first run on a machine compiles for about half a minute; later ones take the code that is kept.
+    # The first run on a machine compiles for ten to twenty seconds; later ones take the code that is kept.
     with activity("simulate", "closed loop (the first run compiles) ...") as shown:
         run = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown)).traced[0].run
         document = run.to_dict() if json else {}

@@ -39,6 +39,12 @@ def test_law_is_blocked_below_stall_and_with_the_gas_off(table_1_scene: Scene) -
     assert 0 < flow.velocity[1] < 1e-3
 
 
+def test_answers_have_the_shape_of_all_arguments_together(table_1_scene: Scene) -> None:
+    """Of `primed`, too, on which this law does not depend."""
+    flow = paper_law(table_1_scene).evaluate(fill_ratio=0.2, gas_pressure=0.7e6, primed=[False, True])
+    assert {np.shape(values) for values in vars(flow).values()} == {(2,)}
+
+
 def test_table_reproduces_the_law(table_1_scene: Scene) -> None:
     table = paper_law(table_1_scene).table()
     level = table["pressure_per_fill_difference"] * (0.3 - 0.1)

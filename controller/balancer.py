@@ -413,7 +413,7 @@ def settles_within(time: float, *, stated: bool) -> Demand:
 
 
 def one_by_one(balancer: Balancer, settings: Sequence[Settings], draws: Draws) -> tuple[Outcomes, ...]:
-    """`Balancer.run_all` of a balancer that makes its devices anew for every setting."""
+    """`Balancer.run_all` of a balancer that makes its devices for every setting again."""
     return tuple(balancer.run(each, draws) for each in settings)
 
 

@@ -1,4 +1,4 @@
-"""Devices that a liquid ring's scene may be: every uncertain input drawn, and the law made anew for each."""
+"""Devices that a liquid ring's scene may be: every uncertain input drawn, and the law made for each."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Spread:
     directions: FloatArray
     """Of inputs that were fitted together, SI, shape (quantities, directions)."""
     loss: float
-    """Of the tube's head by models alone, relative; of a law that is not made anew that of its velocity."""
+    """Of the tube's head by models alone, relative; of a law that is not remade that of its velocity."""
     cavity: bool
     """Whether the pressure of a cavity lies anywhere between the vapour's and the gas's."""
     remade: bool
@@ -206,7 +206,7 @@ def _states(scene: Scene, name: str) -> bool:
 
 
 def _loss(scene: Scene, model: BalancerModel, *, remade: bool) -> float:
-    """Relative uncertainty of the head by models alone; of a law that is not made anew of its velocity."""
+    """Relative uncertainty of the head by models alone; of a law that is not remade of its velocity."""
     law, fill = model.flow, scene.disc.initial_fill
     if isinstance(law, PaperLaw):
         stated = any(each.quantity == "drag_coefficient" for each in scene.uncertainty)

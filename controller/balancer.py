@@ -14,6 +14,7 @@ from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
+from ringbalance.controller.trials import Trials
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
 from ringbalance.results.result import Rows
@@ -285,6 +286,10 @@ class Balancer(Protocol):
 
     def demands(self) -> tuple[Demand, ...]:
         """What is asked of every device: first that it settles in time, then what else the scene states."""
+        ...
+
+    def trials(self) -> tuple[Trials, ...]:
+        """Settings to try, of the scene's kind of controller first; empty: there are none."""
         ...
 
     def remedies(self) -> tuple[Remedy, ...]:

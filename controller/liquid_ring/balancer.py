@@ -32,10 +32,12 @@ from ringbalance.controller.balancer import (
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
 from ringbalance.controller.liquid_ring.devices import Spread
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns, run_noise
+from ringbalance.controller.liquid_ring.trials import trials
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
+from ringbalance.controller.trials import Trials
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.search import recommended
@@ -167,15 +169,32 @@ class LiquidRingBalancer:
         )
         return settles, moment
 
+    def trials(self) -> tuple[Trials, ...]:
+        """Gain, integral time and a common offset of the valve-open times, and the gas pressure."""
+        return trials(self.scene, self.model, limit=self.limit)
+
     def remedies(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
         return ()
+
+    @property
+    def limit(self) -> float:
+        """Amplitude that may remain, m: the residual required, or what the grade leaves, else the
+        controller's limit.
+
+        Source: ISO 21940-11:2016 for the grade, U = G m/w.
+        """
+        wanted, rotor = self.scene.requirement, self.scene.rotor
+        asked = [] if wanted.residual is None else [wanted.residual]
+        if wanted.grade is not None and rotor.mass is not None:
+            asked.append(wanted.grade * rotor.mass / rotor.speed * rotor.influence_coefficient)
+        return min(asked, default=self.scene.controller.limit)
 
     @cached_property
     def _drawn_runs(self) -> DrawnRuns:
         remade = self.flow_law is None or self.flow_law == CALIBRATED
         spread = Spread.of(self.scene, self.model, remade=remade)
-        return DrawnRuns(scene=self.scene, model=self.model, spread=spread, limit=self.scene.controller.limit)
+        return DrawnRuns(scene=self.scene, model=self.model, spread=spread, limit=self.limit)
 
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> TracedRun:
         drawn: dict[str, Any] = {"controller": self.controller}

@@ -32,6 +32,7 @@ from ringbalance.controller.balancer import (
     rotor_fault,
     settles_within,
 )
+from ringbalance.controller.trials import Trials, scaled
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
 from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
@@ -193,6 +194,11 @@ class BallBalancer:
     def demands(self) -> tuple[Demand, ...]:
         """Within the time limit."""
         return (settles_within(self.span(), stated=False),)
+
+    def trials(self) -> tuple[Trials, ...]:
+        """The drag between its bounds."""
+        drag = {each.path: each.value for each in self.settings()}
+        return (scaled("drag", drag, tuple(np.geomspace(1 / 30, 30, 9).tolist()), first=(0, 2, 4, 6, 8)),)
 
     def remedies(self) -> tuple[Remedy, ...]:
         """More oil."""

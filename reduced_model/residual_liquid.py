@@ -33,9 +33,10 @@ _GENTLE: Final = 0.1
 _SAME_FILL: Final = 1e-8
 """Error of a fill, of which the last step leaves a hundredth."""
 _ROUNDING: Final = 1e-12
-_SCAN: Final = 17
-_REFINEMENTS: Final = 6
-"""Of a scan, each to a sixteenth: 1e-8 of a fill is left."""
+_SCANS: Final = {1: (257, 2), 64: (65, 3)}
+"""Places of a scan and number of finer ones, of at most so many rows; few calls cost least where rows are few."""
+_LAST_SCAN: Final = 17, 6
+"""Of more rows. 1e-8 of a fill is left each time."""
 Drawn = Callable[[IntArray, FloatArray], FloatArray]
 """Fill down to which the flow at a fill draws gas, of some rows."""
 
@@ -107,8 +108,10 @@ def first_stalled(
     Args: `moves`: of some rows, whether liquid moves at fills of shape (k, rows).
     """
 
+    places, refinements = next((s for most, s in _SCANS.items() if start.size <= most), _LAST_SCAN)
+
     def scan(rows: IntArray, start: FloatArray, end: FloatArray) -> BoolArray:
-        return moves(rows, start + np.linspace(0.0, 1.0, _SCAN)[:, None] * (end - start))
+        return moves(rows, start + np.linspace(0.0, 1.0, places)[:, None] * (end - start))
 
     moved = scan(np.arange(start.size), start, end)
     stops, first = ~moved.all(axis=0), np.argmin(moved, axis=0)
@@ -117,11 +120,11 @@ def first_stalled(
     if rows.size == 0:
         return stalled
     start, end, first = start[rows], end[rows], first[rows]
-    for _ in range(_REFINEMENTS):
-        step = (end - start) / (_SCAN - 1)
+    for _ in range(refinements):
+        step = (end - start) / (places - 1)
         start, end = start + (first - 1) * step, start + first * step
         first = np.argmin(scan(rows, start, end), axis=0)
-        first = np.where(first == 0, _SCAN - 1, first)
+        first = np.where(first == 0, places - 1, first)
     stalled[rows] = end
     return stalled
 

@@ -32,6 +32,8 @@ class Trials:
     axes: tuple[Axis, ...]
     settings: Callable[[Point], Mapping[str, Any] | None]
     """At a point, by path, SI, rounded as a scene file has them; None: there is none."""
+    stated: bool = True
+    """Whether the scene states settings of its own that can be judged."""
     along: Axis | None = None
     """What is chosen only where the others do not suffice, or on request, and is answered for at every level,
     such as the supply's pressure; a point without it is at the scene's."""

@@ -34,7 +34,7 @@ RELATIVE_ERROR: Final = 1e-4
 within 3e-5 without inertia."""
 MOST_SAMPLES: Final = 100_000
 """Of one run without a trace."""
-_HOPELESS: Final = 2.0
+_OUT_OF_REACH: Final = 2.0
 """Times the limit that remain with the liquid at its best, from which on a run is not carried out: none
 settles, and each would take its whole time limit."""
 _NOISE: Final = 3
@@ -99,7 +99,7 @@ class DrawnRuns:
         moments = MomentTable.of(model=device.model, total=2 * device.scene.disc.initial_fill)
         for _, some in _grouped(asked, lambda each: each.scene.gas.pressure):
             under = _Under.of(device.under(some[0].scene, of=self.scene), device, modelled=self.terms)
-            if under.unreachable > _HOPELESS * self.limit:
+            if under.unreachable > _OUT_OF_REACH * self.limit:
                 yield from ((each.place, _Ended.at_best(under, limit=self.limit)) for each in some)
                 continue
             for settings, alike in _grouped(

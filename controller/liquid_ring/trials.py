@@ -9,9 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.liquid_ring.loop_factor import vibration_rates
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.trials import Axis, Point, Trials, rounded
-from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
@@ -79,8 +79,10 @@ def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials,
             pressure = point.get(PRESSURE, scene.gas.pressure)
             return _settings(scene, kind, point, loop(pressure), limit=limit)
 
-        return Trials(kind=kind, axes=_OWN[kind], settings=settings, along=_pressures(scene))
+        return Trials(kind=kind, axes=_OWN[kind], settings=settings, stated=stated, along=_pressures(scene))
 
+    gain = scene.origin_of("controller.proportional")
+    stated = gain != "default" or scene.controller.kind != "target_vector"
     kind = scene.controller.kind
     return tuple(of(each) for each in (kind, *_INSTEAD[kind]))
 

@@ -213,7 +213,7 @@ class _Recommendation(Protocol):
 
     @property
     def succeeded(self) -> bool:
-        """Whether 95 % of the runs settle."""
+        """Whether what the scene requires is met."""
         ...
 
     def rows(self) -> Rows:
@@ -319,8 +319,14 @@ class Balancer(Protocol):
         """With the settings that its formulas recommend, and those that this changed, SI; no run is made."""
         ...
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> _Recommendation:
-        """Settings, judged by runs over the draws."""
+    def recommend(
+        self, *, pressure: bool = False, progress: Callable[[str], None] | None = None
+    ) -> _Recommendation:
+        """Settings, judged by runs over the draws.
+
+        Args: `pressure`: whether what `Trials.along` names, such as the supply's pressure, is searched even
+            where the scene's own suffices.
+        """
         ...
 
     def quantities(self) -> tuple[Quantity, ...]:

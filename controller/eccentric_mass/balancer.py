@@ -198,7 +198,12 @@ class EccentricMassBalancer:
         scene, changes = advised(self.scene)
         return EccentricMassBalancer(scene), changes
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> EccentricTuning:
+    def recommend(
+        self,
+        *,
+        pressure: bool = False,  # noqa: ARG002
+        progress: Callable[[str], None] | None = None,
+    ) -> EccentricTuning:
         """See `Balancer`."""
         return tune_eccentric(self.scene, told=progress)
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from ringbalance.controller.balancer import FURTHER, Settings
 from ringbalance.controller.judging.judge import Judgement
+from ringbalance.controller.judging.search import Along
+from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.results.numbers import given, percent
 from ringbalance.results.requirements import MET, MISSED, OPEN
 from ringbalance.results.result import Rows, Table
@@ -15,10 +17,6 @@ from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.paths import raw_value_at
-
-if TYPE_CHECKING:
-    from ringbalance.controller.judging.search import Along
-    from ringbalance.controller.judging.tuning import Tuning
 
 LONGER: Final = 300.0
 """s, for which devices under the recommended settings are watched once more."""

@@ -251,7 +251,12 @@ class BallBalancer:
         """No formula recommends anything."""
         return self, {}
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> BallTuning:
+    def recommend(
+        self,
+        *,
+        pressure: bool = False,  # noqa: ARG002
+        progress: Callable[[str], None] | None = None,
+    ) -> BallTuning:
         """The drag of five between its bounds that settles most devices."""
         (drag,) = self.settings()
         found = []

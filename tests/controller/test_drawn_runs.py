@@ -12,7 +12,10 @@ from ringbalance.controller.balancer import Draws, Outcomes, balancer_of
 from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.liquid_ring.devices import Spread, devices
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow
 from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reduced_model.residual_liquid import ResidualLiquid, residual_fill_ratio
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import half_widths, nominal_value
 
@@ -106,3 +109,21 @@ def test_the_papers_pressure_is_too_high_for_its_disc(balancer: LiquidRingBalanc
     # More than half settle, so the median's bound lies above it.
     value, bound = own.settling_time(0.5) or (math.nan, math.nan)
     assert value < bound
+
+
+def test_static_intervals_are_those_of_the_draws(paper_scene: Scene, calibrated: BalancerModel) -> None:
+    made = devices(paper_scene, calibrated, Spread.of(paper_scene, calibrated), range(128), seed=0)
+    drawn = [made(place) for place in range(128)]
+
+    def flow(scene: Scene, model: BalancerModel) -> Flow:
+        return model.flow.evaluate(
+            fill_ratio=scene.disc.initial_fill, gas_pressure=scene.gas.pressure, primed=True
+        )
+
+    here = flow(paper_scene, calibrated)
+    velocities = [float(flow(each.scene, each.model).velocity) for each in drawn]
+    # To a fifth: by linear propagation the cavity's pressure, any between two bounds, counts as one of them.
+    assert 1.96 * np.std(velocities) == pytest.approx(float(here.uncertainty), rel=0.2)
+    fills = [residual_fill_ratio(each.scene, law=each.model.flow) for each in drawn]
+    static = ResidualLiquid.of(paper_scene, law=calibrate(paper_scene).flow_law)
+    assert 1.96 * np.std(fills) == pytest.approx(static.fill_ratio_uncertainty, rel=0.2)

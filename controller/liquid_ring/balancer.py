@@ -30,8 +30,10 @@ from ringbalance.controller.balancer import (
     settles_within,
 )
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
+from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.liquid_ring.devices import Spread
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns, run_noise
+from ringbalance.controller.liquid_ring.remedies import drawn_input, remedies_of, valves_of
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
 from ringbalance.controller.simulation import Simulation
@@ -52,6 +54,8 @@ from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.paths import with_values_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
 
@@ -169,7 +173,19 @@ class LiquidRingBalancer:
 
     def remedies(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
-        return ()
+        return remedies_of(self.scene, self.model)
+
+    def choices(self) -> tuple[Remedy, ...]:
+        """Valves; see `Balancer`."""
+        return valves_of(self.scene)
+
+    def drawn_input(self, name: str) -> DrawnInput:
+        """See `Balancer`."""
+        return drawn_input(name)
+
+    def on_scene(self, scene: SceneFile) -> LiquidRingBalancer:
+        """See `Balancer`."""
+        return replace(self, scene=liquid_ring_scene(scene))
 
     @cached_property
     def _drawn_runs(self) -> DrawnRuns:

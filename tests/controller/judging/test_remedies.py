@@ -97,7 +97,7 @@ def test_the_best_two_go_together_where_neither_meets(paper_scene: Scene) -> Non
     rows = tried(paper_scene, bore(0.7), limit(1.6))
     assert [row.code for row in rows] == ["limit+bore", "limit", "bore"]
     assert rows[0].met
-    assert rows[0].changes == limit(1.6).changes | bore(0.7).changes
+    assert rows[0].changes == {**limit(1.6).changes, **bore(0.7).changes}
     document = rows[0].document()
     assert document["verdict"] == "met"
     assert document["half_settle_s"] == 1.0

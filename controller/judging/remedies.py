@@ -24,8 +24,8 @@ Search = Callable[[Balancer], Settings]
 """The best settings of a balancer."""
 Told = Callable[[str], None]
 _FIRST: Final = 16
-"""Devices after which a remedy that is hopeless is left."""
-_HOPELESS: Final = 0.5
+"""Devices after which a remedy with too few that meet is left."""
+_TOO_FEW: Final = 0.5
 """Fraction of the devices, as a share of the one asked for, below which it is."""
 _MOST: Final = 256
 """Devices that judge a remedy."""
@@ -129,8 +129,8 @@ class _Trial:
             self.told(f"trying {', '.join(each.name or each.code for each in remedies)}")
             settings = self.search(changed)
             first = judged_all(changed, [settings], first=_FIRST, most=_FIRST)[0]
-            hopeless = first.verdict == MISSED and first.fraction.value < _HOPELESS * first.asked
-            judgement = first if hopeless else judged(changed, settings, most=_MOST)
+            too_few = first.verdict == MISSED and first.fraction.value < _TOO_FEW * first.asked
+            judgement = first if too_few else judged(changed, settings, most=_MOST)
         except SceneError:
             return None
         return Tried(remedies=tuple(remedies), judgement=judgement, size=_size(self.balancer, changes))

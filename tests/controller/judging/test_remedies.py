@@ -104,7 +104,7 @@ def test_the_best_two_go_together_where_neither_meets(paper_scene: Scene) -> Non
 
 
 def test_what_makes_it_worse_is_not_carried_on(paper_scene: Scene) -> None:
-    """A bore of four times the scene's leaves 1/8 of the devices: hopeless after 16."""
+    """A bore of four times the scene's leaves 1/8 of the devices: too few after 16."""
     rows = tried(paper_scene, bore(4.0), bore(8.0), Remedy(code="refused", changes={"tube.bore": -1.0}))
     assert [row.judgement.fraction.of for row in rows] == [16]
     assert rows[0].judgement.fraction.value == pytest.approx(1 / 8, abs=0.2)

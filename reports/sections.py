@@ -16,6 +16,7 @@ from typing import Any, Final
 from ringbalance.reports.figure import Drawing
 from ringbalance.reports.pages import (
     chamber,
+    consequences,
     drag_coefficient,
     eccentric,
     first_page,
@@ -55,7 +56,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     drag_coefficient.SECTION,
     loop.INJECTIONS,
     paper_figures.SECTION,
-    loop.CONSEQUENCES,
+    consequences.SECTION,
     Section(name="cases", title="Claims: evidence and doubts"),
     eccentric.SECOND_BALANCER,
     Section(name="numerics", title="Numerical verification"),

@@ -106,6 +106,12 @@ def elsewhere(case: Record, evidence: Record) -> bool:
     return bool(judged) and judged != evidence["scene"]["values_sha256"]
 
 
+def is_papers(evidence: Record) -> bool:
+    """Whether the scene is the one that its paper's claims are judged on."""
+    cases = claims(evidence, paper=evidence.get("balancer", "liquid_ring"))
+    return bool(cases) and not any(elsewhere(case, evidence) for case in cases)
+
+
 def judged_sentences(evidence: Record) -> list[str]:
     """For what fraction of devices the scene's settings work, and what was recommended."""
     found = evidence.get("summary") or {}

@@ -133,8 +133,8 @@ def _view(found: Record, evidence: Record) -> Record:
 
 def _question(evidence: Record) -> Record:
     """Verdicts on what the study of the paper's disc asks, by case; empty for any other disc."""
-    cases = {case["id"]: case for case in summary.claims(evidence) if not summary.elsewhere(case, evidence)}
-    if not cases.keys() >= set(_QUESTION):
+    cases = {case["id"]: case for case in summary.claims(evidence)}
+    if not summary.is_papers(evidence) or not cases.keys() >= set(_QUESTION):
         return {}
     return {name: cases[name]["verdict"] for name in _QUESTION}
 

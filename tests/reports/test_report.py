@@ -265,33 +265,20 @@ def test_what_is_in_the_way_of_a_report_is_reported_before_the_work(
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
-@pytest.mark.parametrize(
-    ("failed", "settled", "code"),
-    [
-        (False, (True, True), 0),
-        (False, (False, True), 0),
-        (False, (False, False), 1),
-        (True, (True, True), 1),
-    ],
-)
+@pytest.mark.parametrize(("failed", "code"), [(False, 0), (True, 1)])
 def test_exit_codes(
     whole: Record,
     failed: bool,
-    settled: tuple[bool, bool],
     code: int,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    runs = whole["closed_loop"]
-    loops = {law: runs[law] | {"settled": ok} for law, ok in zip(runs, settled, strict=True)}
     cases = [
         case | {"verdict": "failed"} if failed and case["kind"] == "code_verification" else case
         for case in whole["verification"]
     ]
-    finished = Report(
-        page=tmp_path / "report.html", evidence=whole | {"closed_loop": loops, "verification": cases}
-    )
+    finished = Report(page=tmp_path / "report.html", evidence=whole | {"verification": cases})
     monkeypatch.setattr(cli, "write_report", lambda *_, **__: finished)
     assert cli.report(bundled_scene("liquid_ring_paper"), out=tmp_path) == code
     told = capsys.readouterr()

@@ -10,16 +10,21 @@ import numpy as np
 
 from ringbalance.controller.balancer import FURTHER, Balancer, Outcomes
 from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all
+from ringbalance.controller.judging.ranking import ranked
+from ringbalance.controller.judging.remedies import tried_remedies
+from ringbalance.controller.judging.search import Along, searched
+from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.reports.section import Record
 from ringbalance.results.proportion import Proportion
+from ringbalance.results.requirements import MET
 from ringbalance.scene.describe import usual_unit
+from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import unit_factor
 
 LONGER: Final = 300.0
 """s, for which runs are watched again, to show what longer watching changes."""
-_LONGER_DRAWS: Final = 128
 HALF, MOST = 0.5, 0.9
 """Fractions of all devices whose settling times are told."""
 _POINTS: Final = 50
@@ -29,13 +34,52 @@ _BAND: Final = (0.025, 0.5, 0.975)
 _DIGITS: Final = 4
 
 
-def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS, longer: bool = True) -> Record:
-    """The scene's own settings over drawn devices, and what longer watching makes of them."""
-    (own,) = judged_all(balancer, [{}], first=first, most=most)
-    if not longer:
-        return judgement_record(own)
-    (again,) = judged_all(balancer, [{}], first=first, most=min(_LONGER_DRAWS, most), further=LONGER)
-    return judgement_record(own) | {"longer": _watched(again, LONGER)}
+def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Record:
+    """The scene's own settings over drawn devices."""
+    return judgement_record(judged_all(balancer, [{}], first=first, most=most)[0])
+
+
+def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
+    """The scene's own settings beside the recommended ones, both watched longer too, and what else to do."""
+    best, own = tuning.recommended, tuning.own
+    stated = own is not None
+    (longer,) = judged_all(balancer, [{}], first=BLOCK, most=BLOCK, further=LONGER) if stated else (None,)
+    recommended = judgement_record(best) | {"longer": _watched(tuning.longer, LONGER)}
+    given = None if own is None or longer is None else judgement_record(own)
+    return {
+        "own": given and {**given, "longer": longer and _watched(longer, LONGER)},
+        "recommended": recommended if own is None or best.settings else None,
+        "along": {
+            "path": tuning.along_name,
+            "levels": [_level(each) for each in tuning.along],
+        },
+        **_advice(balancer, tuning),
+    }
+
+
+def _advice(balancer: Balancer, tuning: Tuning) -> Record:
+    """Remedies and measurements where too few devices meet what is asked, and what can be bought."""
+    best = tuning.recommended
+    if best.verdict == MET:
+        return {"remedies": [], "measures": []}
+    remedies = tried_remedies(balancer, best, search=searched)
+    return {
+        "remedies": [each.document() for each in remedies],
+        "measures": [each.document() for each in ranked(balancer, best).findings()],
+    }
+
+
+def _level(each: Along) -> Record:
+    """Of the axis on which the scene's gas pressure lies."""
+    found = each.judgement
+    return {
+        "value": each.level,
+        "fraction": found.fraction.document(),
+        "verdict": found.verdict,
+        "half_s": _time(found, HALF),
+        "most_s": _time(found, MOST),
+        "usable_moment_kg_m": np.nanquantile(found.outcomes.usable_moment, _BAND).tolist(),
+    }
 
 
 def judgement_record(judgement: Judgement) -> Record:

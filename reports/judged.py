@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from itertools import product
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import FURTHER, Balancer, Outcomes
+from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all
 from ringbalance.controller.judging.ranking import ranked
-from ringbalance.controller.judging.remedies import tried_remedies
+from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import Along, searched
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.reports.section import Record
 from ringbalance.results.proportion import Proportion
 from ringbalance.results.requirements import MET
+from ringbalance.results.rows import Finding
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import SceneFile
@@ -27,6 +29,8 @@ LONGER: Final = 300.0
 """s, for which runs are watched again, to show what longer watching changes."""
 HALF, MOST = 0.5, 0.9
 """Fractions of all devices whose settling times are told."""
+_COARSE: Final = 16
+"""Devices on which settings for what can be bought are chosen."""
 _POINTS: Final = 50
 """Most entries of a curve."""
 _BAND: Final = (0.025, 0.5, 0.975)
@@ -59,14 +63,32 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
 
 def _advice(balancer: Balancer, tuning: Tuning) -> Record:
     """Remedies and measurements where too few devices meet what is asked, and what can be bought."""
-    best = tuning.recommended
+    best, own = tuning.recommended, tuning.own
     if best.verdict == MET:
-        return {"remedies": [], "measures": []}
+        enough = own is not None and own.verdict == MET
+        measures = () if enough else (Finding(code="nothing_to_measure"),)
+        return {"remedies": [], "measures": [each.document() for each in measures]}
     remedies = tried_remedies(balancer, best, search=searched)
     return {
         "remedies": [each.document() for each in remedies],
         "measures": [each.document() for each in ranked(balancer, best).findings()],
     }
+
+
+def choice_records(balancer: Balancer) -> list[Record]:
+    """What can be bought for a scene that leaves it open, and what each makes of it."""
+    return [each.document() for each in tried_choices(balancer, search=_coarsely)]
+
+
+def _coarsely(balancer: Balancer) -> Settings:
+    """The best of the settings that a search begins with: enough to tell what can be bought apart."""
+    trials, *_ = balancer.trials()
+    names = [axis.name for axis in trials.axes]
+    levels = [[axis.levels[at] for at in axis.first] for axis in trials.axes]
+    points = [dict(zip(names, point, strict=True)) for point in product(*levels)]
+    settings = [found for each in points if (found := trials.settings(each)) is not None]
+    ran = zip(settings, balancer.run_all(settings, Draws.first(_COARSE)), strict=True)
+    return max(ran, key=lambda each: np.count_nonzero(each[1].settled), default=({}, None))[0]
 
 
 def _level(each: Along) -> Record:

@@ -7,12 +7,19 @@ from typing import Final
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.judging.tuning_rows import setting_text
+from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.liquid_ring.devices import ASSUMED_INFLUENCE
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reports import summary
 from ringbalance.reports.figure import Drawing
-from ringbalance.reports.judged import judgement_record, settings_rows, settings_text, tuning_record
+from ringbalance.reports.judged import (
+    choice_records,
+    judgement_record,
+    settings_rows,
+    settings_text,
+    tuning_record,
+)
 from ringbalance.reports.pages.pressure_figure import pressure_figure
 from ringbalance.reports.prose import key_words, named_with_origin, resting
 from ringbalance.reports.section import Record, Section, Work
@@ -79,13 +86,14 @@ _NEEDED: Final = "needed_moment"
 
 
 def _collect(work: Work) -> Record:
-    scene, balancer = work.scene, balancer_of(work.scene)
+    scene, balancer = work.scene, LiquidRingBalancer(work.scene)
     tuning = balancer.recommend(pressure=True)
     chosen = liquid_ring_scene(tuning.scene)
     return {
         "limit_m": scene.controller.limit,
         "valve_given": scene.gas.conductance is not None,
         **tuning_record(balancer, tuning),
+        "choices": choice_records(balancer.on_scene(tuning.recommended_scene)),
         "settings": list(settings_rows(chosen, SETTINGS)),
         "gas_pressure_Pa": scene.gas.pressure,
         "recommended_pressure_Pa": chosen.gas.pressure,

@@ -15,7 +15,7 @@ from ringbalance.scene.arrays import FloatArray
 
 _SHADES: Final = {MET: 0.28, OPEN: 0.1}
 """Opacity of the ground by what is known of the fraction there."""
-_LEFT, _WIDTH = 0.13, 0.84
+_LEFT, _WIDTH = 0.17, 0.8
 _BOXES: Final = ((0.62, 0.29), (0.355, 0.22), (0.09, 0.22))
 """Bottom and height of the panels."""
 _MEGA, _TO_G_MM = 1e-6, 1e6

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Protocol, Self
 
 import numpy as np
@@ -26,6 +26,12 @@ from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered
 from ringbalance.scene.units import DIMENSIONS
 
+FURTHER: Final = 60.0
+"""s, for which a run that has held its limit is watched."""
+REQUIRED_FRACTION: Final = 0.9
+"""Of the devices, that must meet every demand where a scene states none."""
+Settings = Mapping[str, Any]
+"""Values of a controller's or designer's choice by path in a scene file, SI; those of text as they are."""
 Progress = Callable[[float, float], None]
 """Called with the simulated time and the time limit, s."""
 
@@ -57,7 +63,10 @@ class Setting:
 
 @dataclass(frozen=True, kw_only=True)
 class Draws:
-    """Which devices a balancer is run as; a number is the same device and noise in every block."""
+    """Which devices a balancer is run as; a number is the same device and noise under every setting.
+
+    `ringbalance.scene.draws` says where in its distribution each input of a numbered device lies.
+    """
 
     numbers: tuple[int, ...]
     devices: bool = True
@@ -67,6 +76,11 @@ class Draws:
     def first(cls, count: int, *, devices: bool = True) -> Draws:
         """The first `count` of them."""
         return cls(numbers=tuple(range(count)), devices=devices)
+
+    @classmethod
+    def block(cls, start: int, count: int) -> Draws:
+        """Devices `start` to `start + count - 1`."""
+        return cls(numbers=tuple(range(start, start + count)))
 
 
 AS_GIVEN: Final = Draws.first(1, devices=False)
@@ -104,6 +118,12 @@ class TracedRun:
     """That it took, J."""
     worst_amplitude: float
     """Largest while balancing, m zero-to-peak."""
+    ended: str
+    """Code of the finding that says how."""
+    usable_moment: float
+    """Largest unbalance that the device cancels where its own lies, kg m."""
+    unbalance: float
+    """Of its rotor, kg m."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,7 +135,71 @@ class Outcomes:
     """s, from the start of balancing; infinite where not settled."""
     final_amplitude: FloatArray
     """m zero-to-peak."""
+    energy: FloatArray
+    """That each took, J."""
+    usable_moment: FloatArray
+    """Largest unbalance that the device cancels where its own lies, kg m."""
+    unbalance: FloatArray
+    """Of the device's rotor, kg m."""
+    ended: tuple[str, ...]
+    """What stopped each: code of the finding that says so."""
+    numbers: tuple[int, ...] = ()
+    """Of the draws."""
+    inputs: Mapping[str, FloatArray] = field(default_factory=dict)
+    """Place of every drawn input in its distribution, in (0, 1); empty where no device is drawn."""
+    clipped: Mapping[str, int] = field(default_factory=dict)
+    """Number of devices by input that cannot have it as drawn."""
     traced: tuple[TracedRun, ...] = ()
+
+    def joined(self, more: Outcomes) -> Outcomes:
+        """These draws and further ones."""
+        arrays = ("settled", "settling_time", "final_amplitude", "energy", "usable_moment", "unbalance")
+        both = {name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in arrays}
+        return Outcomes(
+            **both,
+            ended=self.ended + more.ended,
+            numbers=self.numbers + more.numbers,
+            inputs={
+                name: np.concatenate([places, more.inputs[name]]) for name, places in self.inputs.items()
+            },
+            clipped={
+                name: self.clipped.get(name, 0) + more.clipped.get(name, 0)
+                for name in {**self.clipped, **more.clipped}
+            },
+            traced=self.traced + more.traced,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demand:
+    """One thing that is asked of every device, as a function of how its run ended."""
+
+    code: str
+    """Of the finding that says it, such as "settling_time"."""
+    outcome: str
+    """Name of the number of `Outcomes` that it is about."""
+    sense: str
+    """`AT_LEAST` or `AT_MOST`."""
+    required: float
+    """SI."""
+    unit: str
+    stated: bool
+    """Whether the scene states it; else what every run is asked for."""
+
+    def met(self, outcomes: Outcomes) -> BoolArray:
+        """By each device."""
+        reached = getattr(outcomes, self.outcome)
+        return np.asarray(reached >= self.required if self.sense == AT_LEAST else reached <= self.required)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Remedy:
+    """A change of the scene that may mend what its devices do not meet."""
+
+    code: str
+    """Of the sentence that names it, such as "bore"."""
+    changes: Settings
+    """By path, SI, as `SceneFile.with_values` takes them."""
 
 
 class _Recommendation(Protocol):
@@ -174,7 +258,7 @@ class Balancer(Protocol):
 
     def run(
         self,
-        settings: Mapping[str, float],
+        settings: Settings,
         draws: Draws,
         *,
         trace: bool = False,
@@ -184,6 +268,27 @@ class Balancer(Protocol):
 
         `trace`: whether the runs themselves are kept; what they come to is the same.
         """
+        ...
+
+    def run_all(
+        self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
+    ) -> tuple[Outcomes, ...]:
+        """The same for several settings, without traces: a device is made once for all of them.
+
+        Args: `further`: s, for which a run is watched after it has held its limit.
+        """
+        ...
+
+    def asked_fraction(self) -> float:
+        """Fraction of the devices that must meet every demand."""
+        ...
+
+    def demands(self) -> tuple[Demand, ...]:
+        """What is asked of every device: first that it settles in time, then what else the scene states."""
+        ...
+
+    def remedies(self) -> tuple[Remedy, ...]:
+        """Changes of the scene to try where too few devices meet its demands, each by itself."""
         ...
 
     def rotor(self) -> CommonRotor:
@@ -295,6 +400,23 @@ def inputs_of(scene: SceneFile, width: Callable[[str, float], float] | None = No
     return tuple(found)
 
 
+def settles_within(time: float, *, stated: bool) -> Demand:
+    """That a device settles within a time, s."""
+    return Demand(
+        code="settling_time",
+        outcome="settling_time",
+        sense=AT_MOST,
+        required=time,
+        unit="s",
+        stated=stated,
+    )
+
+
+def one_by_one(balancer: Balancer, settings: Sequence[Settings], draws: Draws) -> tuple[Outcomes, ...]:
+    """`Balancer.run_all` of a balancer that makes its devices for every setting again."""
+    return tuple(balancer.run(each, draws) for each in settings)
+
+
 def outcomes_of(runs: Sequence[TracedRun], *, trace: bool) -> Outcomes:
     """Of runs one by one. Args: `trace`: whether they are kept."""
     times = [math.inf if each.settling_time is None else each.settling_time for each in runs]
@@ -302,6 +424,10 @@ def outcomes_of(runs: Sequence[TracedRun], *, trace: bool) -> Outcomes:
         settled=np.isfinite(times),
         settling_time=np.array(times),
         final_amplitude=np.array([each.final_amplitude for each in runs]),
+        energy=np.array([each.energy for each in runs]),
+        usable_moment=np.array([each.usable_moment for each in runs]),
+        unbalance=np.array([each.unbalance for each in runs]),
+        ended=tuple(each.ended for each in runs),
         traced=tuple(runs) if trace else (),
     )
 

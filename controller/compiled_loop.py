@@ -20,6 +20,7 @@ from ringbalance.controller.compiled_stretch import (
     look,
     move,
     note_stretch,
+    time_left,
     vibration,
 )
 from ringbalance.controller.loop_records import (
@@ -121,7 +122,7 @@ def _begin(loop: Record, plant: Record, run: Record, motions: Record, instants: 
     run.vibration = vibration(loop, run)
     run.amplitude = abs(run.vibration)
     run.initial_amplitude, run.first_seen, run.last_seen = run.amplitude, math.nan, math.nan
-    run.last_phase, run.held_since = math.nan, math.inf
+    run.last_phase, run.held_since, run.held = math.nan, math.inf, math.inf
     run.since = 0.0 if run.amplitude <= loop.limit else math.inf
     keep_instant(loop, run, instants, 0.0)
 
@@ -184,10 +185,8 @@ def _watch(loop: Record, run: Record) -> None:
 @in_place
 def _cause(loop: Record, plant: Record, run: Record, motions: Record) -> int:
     """Why the loop stops cycling, if it does."""
-    held = run.time - run.since >= loop.hold_time * (1.0 - 1e-9) and run.cut == 0 and run.drains == 0
-    if held and run.held_since == math.inf:
-        run.held_since = run.since
-    if held and run.stays > 0 and loop.to_time_limit == 0:
+    _hold(loop, run)
+    if run.settled > 0 and loop.to_time_limit == 0:
         return HELD
     above_first = run.last_seen - run.first_seen > loop.noise_floor
     if run.rises > loop.rises_tolerated or (run.rises == loop.rises_tolerated and above_first):
@@ -197,7 +196,27 @@ def _cause(loop: Record, plant: Record, run: Record, motions: Record) -> int:
     ends = run.cut == 0 and loop.to_time_limit == 0 and run.resting > 0 and loop.exact > 0
     if ends and _rests(loop, plant, run, motions):
         return AT_REST
-    return TIME if loop.time_limit <= run.time else NONE
+    return TIME if time_left(loop, run) <= 0.0 else NONE
+
+
+@in_place
+def _hold(loop: Record, run: Record) -> None:
+    """Whether the run has settled: within the limit for the hold time, then but for few samples further.
+
+    A hold that is lost is forgotten, and the next one is looked for.
+    """
+    if run.settled > 0:
+        return
+    if run.held_since == math.inf:
+        held = run.time - run.since >= loop.hold_time * (1.0 - 1e-9) and run.cut == 0 and run.drains == 0
+        if held and run.since <= loop.time_limit:
+            run.held_since, run.held, run.above = run.since, run.time, 0.0
+    elif run.amplitude > loop.limit:
+        run.above += 1.0
+        if run.above > loop.allowed:
+            run.held_since, run.held = math.inf, math.inf
+            run.lost += 1
+    run.settled = 1 if run.time >= run.held + loop.further * (1.0 - 1e-9) else 0
 
 
 @in_place
@@ -229,14 +248,14 @@ def _act(
         note_stretch(loop, run, notes[1], run.off_points, start + run.on, instants)
         look(loop, plant, run, motions)
     else:
-        run.on, run.off = 0.0, min(loop.period, loop.time_limit - start)
+        run.on, run.off = 0.0, max(min(loop.period, time_left(loop, run)), 0.0)
         for k in range(1, TAIL_POINTS + 1):
             keep_instant(loop, run, instants, start + run.off * k / TAIL_POINTS)
     run.time = start + run.on + run.off
     run.cut = 1 if run.off < loop.period else run.cut
     if left > 0:
         run.operated = 1
-        moved = keep_injections(loop, run, motions, start, injections)
+        moved = keep_injections(loop, plant, run, motions, start, injections)
         run.idle = 0 if moved or abs(run.vibration - before) > loop.limit else run.idle + 1
     elif commanded > 0:
         run.idle += 1

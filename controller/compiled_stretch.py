@@ -24,9 +24,17 @@ def vibration(loop: Record, run: Record) -> complex:
 
 
 @in_place
+def time_left(loop: Record, run: Record) -> float:
+    """Until the run ends undecided, s: one within its limit in time is watched until it has settled."""
+    watched = min(run.since, run.held_since) <= loop.time_limit and run.settled == 0
+    more = loop.hold_time + loop.further + 2.0 * loop.period if watched else 0.0
+    return float(loop.time_limit + more - run.time)
+
+
+@in_place
 def limit_to_time(loop: Record, run: Record) -> int:
     """Cut what is asked to the time left. Returns: the number of valves."""
-    half, left, count = loop.chambers // 2, loop.time_limit - run.time, 0
+    half, left, count = loop.chambers // 2, time_left(loop, run), 0
     for i in range(half):
         if run.asked[i] > 0.0:
             if count == 0:
@@ -132,7 +140,7 @@ def _pass(
     half, on, drift = loop.chambers // 2, 0.0, 0.0
     for i in range(half):
         on = max(on, run.asked[i])
-    off = max(min(loop.period, loop.time_limit - (run.time + on)), 0.0)
+    off = max(min(loop.period, time_left(loop, run) - on), 0.0)
     run.on, run.off, run.off_points = on, off, TAIL_POINTS if off > 0.0 else 0
     run.on_points = _gas_instants(loop, run, notes) if on > 0.0 else 0
     for k in range(run.off_points):
@@ -212,7 +220,9 @@ def keep_instant(loop: Record, run: Record, instants: FloatArray, time: float) -
 
 
 @in_place
-def keep_injections(loop: Record, run: Record, motions: Record, start: float, injections: Record) -> bool:
+def keep_injections(
+    loop: Record, plant: Record, run: Record, motions: Record, start: float, injections: Record
+) -> bool:
     """Rows of the last command. Returns: whether the injection that should do the work has moved liquid."""
     half, longest, working = loop.chambers // 2, 0.0, False
     for chamber in range(loop.chambers):
@@ -221,6 +231,8 @@ def keep_injections(loop: Record, run: Record, motions: Record, start: float, in
             continue
         motion, fill = motions[pair], _driven_fill(loop, run, pair)
         moved = abs(fill - motion.fill_before) > NOTICEABLE
+        filled = (1.0 - fill) * plant.chamber_volume + plant.dead_volume
+        run.gas += motion.closing_pressure * filled
         # Noise keeps opening the other valve a little.
         if run.asked[pair] > longest:
             longest, working = run.asked[pair], moved

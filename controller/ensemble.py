@@ -17,7 +17,6 @@ from ringbalance.controller.loop_plan import LoopPlan, Records
 from ringbalance.controller.loop_records import AT_REST, HELD, IDLE, NOTICEABLE, RISING
 from ringbalance.controller.members import BLOCK, LARGEST_RATIO, Members, MemberUncertainty
 from ringbalance.controller.terms import check_fit, dynamics_of, run_models, terms_modelled
-from ringbalance.controller.tuning.loop_factor import LoopFactor, loop_factor
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, FlowLaw
@@ -68,7 +67,8 @@ class MemberRuns:
     @classmethod
     def judged(cls, runs: Records, *, noise_floor: float) -> MemberRuns:
         """How finished runs ended, as `Facts.outcome` tells it of one. Args: `noise_floor`: m."""
-        cause, since = runs["cause"], runs["since"]
+        cause = runs["cause"]
+        since = np.minimum(runs["held_since"], runs["since"])
         settled = (cause == HELD) | ((cause == AT_REST) & np.isfinite(since))
         drifted = (runs["drift"] > NOTICEABLE) & ~settled
         higher = runs["amplitude"] > runs["initial_amplitude"] + noise_floor
@@ -102,8 +102,6 @@ class _Plan:
 
     scene: Scene
     plan: LoopPlan
-    loop: LoopFactor
-    """Of a member with the scene's own values."""
     law: FlowLaw
 
     @classmethod
@@ -119,30 +117,18 @@ class _Plan:
             relative_error=RELATIVE_ERROR,
             most_samples=MOST_SAMPLES,
         )
-        loop = loop_factor(scene, model, algorithm)
-        return cls(scene=scene, plan=plan, loop=loop, law=model.flow)
+        return cls(scene=scene, plan=plan, law=model.flow)
 
     def run(self, members: Members, noise: Noise) -> MemberRuns:
         runs = self.plan.runs(members.proportional.size)
         runs["speed"], runs["proportional"] = members.velocity_factor, members.proportional
         runs["gain"] = members.moment_factor * members.influence_coefficient * np.exp(-1j * members.lag_angle)
         runs["residual_fill"] = members.residual_fill(self.scene, law=self.law)
-        runs["stays"] = self._stay(members)
         if members.gas_line is not None:
             runs["gas_line"] *= members.gas_line.T
             runs["gas_line"][:, 1] = np.minimum(runs["gas_line"][:, 1], LARGEST_RATIO)
         self.plan.finish(runs, noise)
         return MemberRuns.judged(runs, noise_floor=float(self.plan.loop["noise_floor"][0]))
-
-    def _stay(self, members: Members) -> BoolArray:
-        """Whether each member's loop is expected to stay within the limit, as `LoopFactor.stays`."""
-        if not self.loop.fixed:
-            return np.full(members.proportional.shape, self.loop.stays)
-        nominal = self.scene.rotor.influence_coefficient
-        faster = members.velocity_factor * members.moment_factor * members.influence_coefficient / nominal
-        error = np.cos(members.lag_angle - self.scene.controller.assumed_lag_angle)
-        largest = self.loop.largest_staying / max(self.loop.limit / 2.0, 1e-300)
-        return np.asarray(members.proportional * self.loop.rate * faster <= largest * np.maximum(error, 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -47,13 +47,15 @@ def simulate(
     modelled: Collection[str] | None = None,
     to_time_limit: bool = False,
     residual_fill: float | None = None,
+    speed: float = 1.0,
+    noise: np.random.Generator | None = None,
 ) -> Simulation:
     """One closed-loop run of a scene under a balancer model.
 
     Sample, step of the controller, gas into the commanded chambers (all pairs in parallel), gas off, wait of
-    one period, next sample; until the amplitude has held and is expected to stay, nothing can change any
-    more, the run cannot succeed, or the time is up.  `to_time_limit`: a run that has settled continues, with
-    the same answer, to its time limit.
+    one period, next sample; until the amplitude has held for the hold time and, in all but 1 % of the
+    samples, for a minute more, nothing can change any more, the run cannot succeed, or the time is up.
+    `to_time_limit`: a run that has settled continues, with the same answer, to its time limit.
     Args:
         flow_law: in place of `model`, a law that carries its own moments and volumes.
         sensor: default the scene's noise from the scene's seed.
@@ -61,6 +63,8 @@ def simulate(
             default all that the scene gives numbers for.
         residual_fill: of a driven chamber; injections are shortened so that none falls below it. Default the
             fill at which gas enters the port.
+        speed: factor on the law's velocity.
+        noise: random numbers of the scene's sensor; default those of the scene's seed.
     Raises: SceneError: an algorithm that this program does not have, settings without a meaning, a rotor too
         slow to form a ring, or a model made for another disc.
     Raises: ValueError: both a model and a flow law, or neither; terms to model that the scene or the law
@@ -87,13 +91,14 @@ def simulate(
         to_time_limit=to_time_limit,
     )
     runs = plan.runs(1)
-    runs["gain"], runs["residual_fill"], runs["stays"] = scene.rotor.influence, residual, loop.stays
+    runs["gain"], runs["residual_fill"], runs["speed"] = scene.rotor.influence, residual, speed
     own = None if isinstance(algorithm, BuiltIn) else algorithm
     outside = None
     if own is not None or sensor is not None:
         used_sensor = sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed)
         outside = _Outside(sensor=used_sensor, controller=own, chambers=scene.disc.chambers)
-    trace = _carried(plan.begin(runs), scene, outside, progress)
+    random = noise or np.random.default_rng(scene.run.seed)
+    trace = _carried(plan.begin(runs), random, scene.run.time_limit, outside, progress)
     time, vibration, fills = _histories(scene, balancer, trace)
     facts = Facts(
         scene=scene,
@@ -117,6 +122,7 @@ def simulate(
         as_scene=controller is None and sensor is None,
         outcome=facts.outcome,
         settling_time=facts.settling_time,
+        usable_moment=facts.plant.moment_towards(-scene.rotor.initial_unbalance),
         loop=loop,
         findings=run_findings(facts),
         time=time,
@@ -141,10 +147,15 @@ def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> Balanc
     raise ValueError("give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither")
 
 
-def _carried(hand: RunsInHand, scene: Scene, outside: _Outside | None, progress: Progress | None) -> Trace:
+def _carried(
+    hand: RunsInHand,
+    random: np.random.Generator,
+    limit: float,
+    outside: _Outside | None,
+    progress: Progress | None,
+) -> Trace:
     """Carry a run to its end, by one sample where anybody looks on. Returns: its trace."""
-    run, limit = hand.runs[0], scene.run.time_limit
-    random = np.random.default_rng(scene.run.seed)
+    run = hand.runs[0]
     parts = [hand.go_on(np.zeros((1, 0, 2)), traced=True)]
     while run["cause"] == NONE:
         if progress is not None:

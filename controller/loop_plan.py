@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.law_based import LawBased
+from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.compiled_loop import continue_runs
 from ringbalance.controller.loop_records import (
     GAS_LINE,
@@ -37,6 +38,8 @@ CHUNK: Final = 128
 """Samples for which runs are continued at once."""
 GROUP: Final = 256
 """Runs that are continued together."""
+ALLOWED: Final = 0.01
+"""Fraction of the samples in that time that may be above the limit."""
 IDLE_OPERATIONS: Final = 3
 """Commands in a row, beyond one for each chamber, whose longest injection may move nothing."""
 Records = npt.NDArray[np.void]
@@ -91,6 +94,8 @@ class LoopPlan:
         most_samples: int,
         sensed: bool = False,
         to_time_limit: bool = False,
+        further: float = FURTHER,
+        moments: MomentTable | None = None,
     ) -> LoopPlan:
         """Prepare the runs of a scene.
 
@@ -99,6 +104,8 @@ class LoopPlan:
             most_samples: after which a run ends undecided.
             sensed: whether the caller's sensor writes its samples into the run.
             to_time_limit: whether a settled run continues.
+            further: s, for which a run is watched after it has held its limit.
+            moments: those of the model, where they are known.
         """
         loop, memory = np.zeros(1, dtype=LOOP), np.zeros(1, dtype=RUN)
         total, chambers = 2 * scene.disc.initial_fill, scene.disc.chambers
@@ -107,9 +114,10 @@ class LoopPlan:
         loop["algorithm"] = OWN
         if isinstance(controller, BuiltIn):
             controller.fill(loop[0], memory[0])
-        for name, value in _settings(scene).items():
+        for name, value in _settings(scene, further).items():
             loop[name] = value
-        loop["lowest"], loop["moment_step"], loop["moment"][0] = MomentTable.of(model=model, total=total)
+        table = moments or MomentTable.of(model=model, total=total)
+        loop["lowest"], loop["moment_step"], loop["moment"][0] = table
         loop["axis"][0, : chambers // 2] = chamber_directions(chambers)[: chambers // 2]
         offsets = np.array(scene.controller.offsets(chambers))
         loop["shortest"][0, :chambers] = scene.controller.minimum_gas_time + offsets
@@ -198,7 +206,7 @@ def joined(parts: list[Trace]) -> Trace:
     )
 
 
-def _settings(scene: Scene) -> dict[str, Any]:
+def _settings(scene: Scene, further: float) -> dict[str, Any]:
     """Rotor, sensor, clock and bounds."""
     settings, sensor = scene.controller, scene.sensor
     return {
@@ -210,6 +218,8 @@ def _settings(scene: Scene) -> dict[str, Any]:
         "period": settings.period,
         "hold_time": settings.hold_time,
         "time_limit": scene.run.time_limit,
+        "further": further,
+        "allowed": ALLOWED * further / settings.period,
         "amplitude_noise": sensor.amplitude_noise,
         "phase_noise": sensor.phase_noise,
         "noise_floor": noise_floor(scene),

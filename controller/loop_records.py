@@ -45,7 +45,7 @@ NONE, RISING, IDLE, AT_REST, TIME, SAMPLES, HELD = range(7)
     the controller rests, the sensor is exact and no liquid can move: nothing will change,
     the time is up,
     there are as many samples as a run may have,
-    the amplitude has been within its limit for the hold time and is expected to stay.
+    the amplitude has been within its limit for the hold time and, but for few samples, for the further time.
 """
 
 _REAL: Final = (
@@ -56,7 +56,9 @@ _REAL: Final = (
     "limit",  # m
     "period",  # s
     "hold_time",  # s
-    "time_limit",  # s
+    "time_limit",  # s, by which the amplitude must have come within its limit
+    "further",  # s, for which it is watched after the hold time
+    "allowed",  # samples above the limit in that time
     "amplitude_noise",  # standard deviation, m
     "phase_noise",  # standard deviation, rad
     "noise_floor",  # m
@@ -112,7 +114,9 @@ _RUN_REAL: Final = (
     "proportional",  # Kc, s/m
     "time",  # s
     "since",  # s, from which on the amplitude was not above the limit; infinite while it is
-    "held_since",  # the same of the first time that it held
+    "held_since",  # the same of the hold that is watched, or has settled; infinite for none
+    "held",  # s, when the hold time of that was over
+    "above",  # samples above the limit since
     "amplitude",  # true, m
     "initial_amplitude",  # m
     "drift",  # how far liquid has run back with the gas off
@@ -129,9 +133,11 @@ _RUN_REAL: Final = (
     "before_amplitude",  # m
     "before_phase",  # rad
     "variance",  # law-based: mean square of the error of its influence coefficient, (m/(kg m))^2
+    "gas",  # what vented chambers have released, above ambient pressure, Pa m^3
 )
 _RUN_WHOLE: Final = (
-    "stays",  # whether an amplitude within its limit is expected to stay there
+    "settled",  # whether a hold was followed by the further time
+    "lost",  # holds that were not
     "usable",
     "resting",  # whether the algorithm is content
     "reason",

@@ -66,9 +66,9 @@ class Facts:
 
     @property
     def settling_time(self) -> float | None:
-        """s, from which on the amplitude first held; None when it has not, or is not expected to stay."""
+        """s, from which on the amplitude held; None when it has not."""
         first, last = float(self.run["held_since"]), float(self.run["since"])
-        if self.loop.stays and first < math.inf:
+        if self.run["settled"]:
             return first
         return last if self.run["cause"] == AT_REST and last < math.inf else None
 
@@ -96,9 +96,9 @@ class Facts:
     def outcome(self) -> Outcome:
         """How the run ended.
 
-        SETTLED takes a true amplitude that held within the limit for the hold time in a loop that is expected
-        to stay there, or a run in which nothing can change any more.  Both are known when they happen, so
-        that a later time limit gives the same answer.
+        SETTLED takes a true amplitude that held within the limit for the hold time and then in all but 1 % of
+        the samples of a further minute, or a run in which nothing can change any more.  Both are known when
+        they happen, so that a later time limit gives the same answer.
         """
         limit, cause = self.scene.controller.limit, self.run["cause"]
         if self.settling_time is not None:
@@ -114,8 +114,8 @@ class Facts:
             return Outcome.UNSTABLE
         if self.unreachable_amplitude > limit:
             return Outcome.STALLED
-        if min(self.run["since"], self.run["held_since"]) < math.inf:
-            return Outcome.HOLD_INCOMPLETE if self.loop.stays else Outcome.HOVERING
+        if self.run["lost"] or min(self.run["since"], self.run["held_since"]) < math.inf:
+            return Outcome.HOVERING if self.run["lost"] else Outcome.HOLD_INCOMPLETE
         if self.refused and cause == IDLE:
             return Outcome.CHAMBER_EMPTY
         if self.longest is not None and not self.longest.moved:

@@ -154,9 +154,9 @@ class RunVerdict(StrEnum):
     """What a run says of the loop."""
 
     SETTLED = "settled"
-    """The amplitude has held within its limit and is expected to stay, or nothing can change any more."""
+    """The amplitude has held within its limit and stayed there, or nothing can change any more."""
     HOVERING = "hovering"
-    """It ends within the limit, or has held, and is not expected to stay."""
+    """It has held within the limit, and has left it again."""
     NOT_SETTLED = "not settled"
     UNSTABLE = "unstable"
     """A small residual grows, or the amplitude did."""
@@ -195,6 +195,8 @@ class Simulation(PresentedResult):
     outcome: Outcome
     settling_time: float | None
     """s, from which on it first held, whatever the time limit; None when not settled."""
+    usable_moment: float
+    """Largest unbalance that the disc cancels where the scene's lies, kg m."""
     loop: LoopFactor
     """The loop about the balanced state."""
     findings: tuple[Finding, ...]
@@ -239,7 +241,7 @@ class Simulation(PresentedResult):
 
     @property
     def settled(self) -> bool:
-        """Whether the amplitude held within the limit for the hold time and is expected to stay."""
+        """Whether the amplitude held within the limit for the hold time, and stayed there."""
         return self.outcome is Outcome.SETTLED
 
     @property

@@ -65,7 +65,7 @@ class Budget:
     numerical: float
     """Rounding, quadrature, interpolation, and what finite elements contradict."""
     model: float
-    """Correlations, terms that are left out or have no model, and what over the crest cannot be told."""
+    """Correlations, terms that are left out or have no model, and what is undecided over the crest."""
     inputs: Mapping[str, float]
     """By path in the scene file, such as "tube.bore", "fitted" for all that were fitted together; those
     without any effect are not listed."""

@@ -44,7 +44,7 @@ REGIME_COLOURS: Final = {
     "separated": THIRD,
     "blocked": FIFTH,
     "reverse": FOURTH,
-    "cannot be told": MUTED,
+    "undecided": MUTED,
 }
 _DASHES: Final = ("-", (0, (5, 1.6)), (0, (1.2, 1.2)), (0, (6, 1.6, 1.2, 1.6)), (0, (3, 1)), (0, (9, 3)))
 _LINE_COLOURS: Final = (FOUND, THIRD, FOURTH, FIFTH, PAPER, MUTED)

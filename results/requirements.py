@@ -9,7 +9,7 @@ from typing import Any, Final
 
 MET: Final = "met"
 MISSED: Final = "not met"
-OPEN: Final = "cannot be told"
+OPEN: Final = "undecided"
 UNASKED: Final = "none stated"
 """Verdicts on a requirement."""
 AT_LEAST: Final = "at least"

@@ -1,5 +1,6 @@
 """Records of the rotor, where it stands, its sensor, the controller and the run, beside those of `models`."""
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -20,6 +21,7 @@ from ringbalance.scene.keys.fields import (
     PositiveTime,
     PositiveUnbalance,
     PositiveVelocity,
+    ProperFraction,
     Time,
     TimePerChamber,
     Turn,
@@ -270,7 +272,7 @@ class RunSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class RequirementSettings:
-    """What the balancer is wanted for; None where nothing is required. No result depends on it."""
+    """What the balancer is wanted for, and in which fraction of drawn devices; None: nothing is required."""
 
     settling_time: Annotated[
         PositiveTime | None,
@@ -292,3 +294,17 @@ class RequirementSettings:
         unused("none is required", "largest unbalance that must be corrected"),
         Shown("unbalance to be corrected", "g*mm"),
     ] = None
+    fraction: Annotated[
+        ProperFraction,
+        standard(0.9, "fraction of the devices that the scene may be which must meet every requirement"),
+        Shown("fraction of devices required"),
+    ] = 0.9
+    phase_range: Annotated[
+        Angle,
+        standard(
+            "180 deg",
+            "the phase of the initial vibration lies within this to either side of the scene's; the default "
+            "is any phase",
+        ),
+        Shown("phases of the initial vibration, plus or minus", "deg"),
+    ] = math.pi

@@ -21,10 +21,15 @@ def value_at(scene: SceneFile, path: str) -> float:
     return float(value if entry is None else value[entry])
 
 
-def with_values_at(scene: SomeScene, values: Mapping[str, float]) -> SomeScene:
-    """A copy with values in place of its own; nothing is checked again."""
+def with_values_at(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
+    """A copy with values in place of its own, text and whole lists as they are; nothing is checked again."""
     for path, value in values.items():
-        scene = moved_at(scene, path, partial(_first, value))
+        if isinstance(value, int | float):
+            scene = moved_at(scene, path, partial(_first, value))
+        else:
+            table, key, _ = _placed(path)
+            changed: dict[str, Any] = {table: replace(getattr(scene, table), **{key: value})}
+            scene = replace(scene, **changed)
     return scene
 
 

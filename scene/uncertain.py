@@ -158,7 +158,7 @@ def input_sides(
     """
     widths = independent_half_widths(scene)
     alone = {
-        name: (_moved(scene, {name: -width}), _moved(scene, {name: width}))
+        name: (moved(scene, {name: -width}), moved(scene, {name: width}))
         for name, width in widths.items()
         if name in among
     }
@@ -183,8 +183,8 @@ def direction_sides(
     moves = [dict(zip((keys[i] for i in which), change, strict=True)) for change in changes]
     return {
         f"{DIRECTION}{place + 1}": (
-            _moved(scene, {name: -change for name, change in move.items()}),
-            _moved(scene, move),
+            moved(scene, {name: -change for name, change in move.items()}),
+            moved(scene, move),
         )
         for place, move in enumerate(moves)
     }
@@ -213,7 +213,7 @@ def fitted_causes(scene: Scene) -> frozenset[str]:
     )
 
 
-def _moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
+def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """The scene with changes of inputs, SI, and of errors of models, in standard deviations."""
     for name, change in changes.items():
         if name.startswith(MODEL):

@@ -11,16 +11,23 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import (
+    FURTHER,
+    REQUIRED_FRACTION,
     CommonRotor,
+    Demand,
     Draws,
     Input,
     Outcomes,
     Progress,
+    Remedy,
     Setting,
+    Settings,
     TracedRun,
     inputs_of,
+    one_by_one,
     outcomes_of,
     rotor_fault,
+    settles_within,
 )
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements, reach_of
@@ -76,7 +83,7 @@ class EccentricMassBalancer:
 
     def run(
         self,
-        settings: Mapping[str, float],
+        settings: Settings,
         draws: Draws,
         *,
         trace: bool = False,
@@ -91,7 +98,29 @@ class EccentricMassBalancer:
             else simulate_eccentric(with_values_at(scene, {"run.seed": seed + number}), progress=progress)
             for number in draws.numbers
         )
-        return outcomes_of([_traced(run, scene.supervisor.start) for run in runs], trace=trace)
+        return outcomes_of([_traced(run, scene) for run in runs], trace=trace)
+
+    def run_all(
+        self,
+        settings: Sequence[Settings],
+        draws: Draws,
+        *,
+        further: float = FURTHER,  # noqa: ARG002
+    ) -> tuple[Outcomes, ...]:
+        """See `Balancer`; masses at rest are watched to the end of the run."""
+        return one_by_one(self, settings, draws)
+
+    def asked_fraction(self) -> float:
+        """See `Balancer`."""
+        return REQUIRED_FRACTION
+
+    def demands(self) -> tuple[Demand, ...]:
+        """See `Balancer`."""
+        return (settles_within(self.span(), stated=False),)
+
+    def remedies(self) -> tuple[Remedy, ...]:
+        """See `Balancer`."""
+        return ()
 
     def rotor(self) -> CommonRotor:
         """At the speed at which the strategy starts; see `Balancer`."""
@@ -185,8 +214,8 @@ class EccentricMassBalancer:
         return eccentric_history(run)
 
 
-def _traced(run: EccentricRun, start: float) -> TracedRun:
-    """Args: `start`: of balancing, s."""
+def _traced(run: EccentricRun, scene: EccentricScene) -> TracedRun:
+    start = scene.supervisor.start
     balancing = run.amplitude[run.time >= start]
     return TracedRun(
         run=run,
@@ -194,6 +223,9 @@ def _traced(run: EccentricRun, start: float) -> TracedRun:
         final_amplitude=run.final_amplitude,
         energy=run.electrical_energy,
         worst_amplitude=float(np.max(balancing)) if balancing.size else run.worst_amplitude,
+        ended=run.outcome.value,
+        usable_moment=reach_of(scene),
+        unbalance=scene.imbalance.mass * scene.imbalance.radius,
     )
 
 

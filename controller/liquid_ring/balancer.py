@@ -13,37 +13,41 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.balancer import (
+    FURTHER,
     CommonRotor,
+    Demand,
     Draws,
     Input,
     Outcomes,
     Progress,
+    Remedy,
     Setting,
+    Settings,
     TracedRun,
     inputs_of,
     outcomes_of,
     requirements_of,
+    settles_within,
 )
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
-from ringbalance.controller.ensemble import member_noise, simulate_members
+from ringbalance.controller.liquid_ring.devices import Spread
+from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns, run_noise
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.members import Members, MemberUncertainty
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.search import recommended
-from ringbalance.controller.tuning.settling import drawn_run
 from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import gives_forces
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.flow_law import BalancerModel, completed_model, lacking
+from ringbalance.reduced_model.law.flow_law import CALIBRATED, BalancerModel, completed_model, lacking
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
-from ringbalance.results.requirements import Requirement
+from ringbalance.results.requirements import AT_LEAST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.loop_models import ControllerSettings
@@ -120,68 +124,92 @@ class LiquidRingBalancer:
 
     def run(
         self,
-        settings: Mapping[str, float],
+        settings: Settings,
         draws: Draws,
         *,
         trace: bool = False,
         progress: Progress | None = None,
     ) -> Outcomes:
         """See `Balancer`; without traces, runs of the program's own algorithm and sensor are many at once."""
-        scene = with_values_at(self.scene, settings)
         own = (self.controller, self.sensor, self.modelled) != (None, None, None) or self.to_time_limit
         if not trace and not own:
-            return self._untraced(scene, draws)
-        runs = (
-            self._traced(scene, number, devices=draws.devices, progress=progress) for number in draws.numbers
-        )
+            return self.run_all([settings], draws)[0]
+        scene = with_values_at(self.scene, settings)
         traced = [
-            TracedRun(
-                run=run,
-                settling_time=run.settling_time,
-                final_amplitude=float(run.amplitude[-1]),
-                energy=run.gas.energy,
-                worst_amplitude=float(np.max(run.amplitude)),
-            )
-            for run in runs
+            self._traced(scene, number, devices=draws.devices, progress=progress) for number in draws.numbers
         ]
         return outcomes_of(traced, trace=trace)
 
-    def _untraced(self, scene: Scene, draws: Draws) -> Outcomes:
-        seed, numbers = scene.run.seed, list(draws.numbers)
-        members = Members.alike(scene, size=len(numbers))
-        if draws.devices:
-            members = Members.drawn(scene, uncertainty_95=self._widths, seed=seed, block=0).at(numbers)
+    def run_all(
+        self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
+    ) -> tuple[Outcomes, ...]:
+        """See `Balancer`; for the program's own algorithms and an exact or noisy sensor of the scene."""
+        return self._drawn_runs.outcomes(settings, draws, further=further)
 
-        def noise(place: int) -> np.random.Generator:
-            number = numbers[place]
-            return member_noise(seed, number) if draws.devices else np.random.default_rng(seed + number)
+    def asked_fraction(self) -> float:
+        """The scene's."""
+        return self.scene.requirement.fraction
 
-        runs = simulate_members(
-            scene, self.model, members=members, noise=noise, controller=controller_of(scene, self.model)
+    def demands(self) -> tuple[Demand, ...]:
+        """Settled in time, and the unbalance that must be corrected."""
+        wanted = self.scene.requirement
+        time = self.span() if wanted.settling_time is None else wanted.settling_time
+        settles = settles_within(time, stated=wanted.settling_time is not None)
+        if wanted.correction_moment is None:
+            return (settles,)
+        moment = Demand(
+            code="correction_moment",
+            outcome="usable_moment",
+            sense=AT_LEAST,
+            required=wanted.correction_moment,
+            unit="kg m",
+            stated=True,
         )
-        return Outcomes(
-            settled=runs.settled,
-            settling_time=runs.settling_time,
-            final_amplitude=runs.final_amplitude,
-        )
+        return settles, moment
+
+    def remedies(self) -> tuple[Remedy, ...]:
+        """See `Balancer`."""
+        return ()
 
     @cached_property
-    def _widths(self) -> MemberUncertainty:
-        return MemberUncertainty.of(self.scene, self.model)
+    def _drawn_runs(self) -> DrawnRuns:
+        remade = self.flow_law is None or self.flow_law == CALIBRATED
+        spread = Spread.of(self.scene, self.model, remade=remade)
+        return DrawnRuns(scene=self.scene, model=self.model, spread=spread, limit=self.scene.controller.limit)
 
-    def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> Simulation:
+    def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> TracedRun:
+        drawn: dict[str, Any] = {"controller": self.controller}
+        model = self.model
         if devices:
-            return drawn_run(scene, self.model, self._widths, number=number)
+            device = self._drawn_runs.device(number)
+            model, scene = device.model, device.under(scene, of=self.scene)
+            drawn = {
+                "controller": self.controller or controller_of(scene, self.model),
+                "speed": device.speed,
+                "noise": run_noise(self.scene.run.seed, number),
+            }
+        else:
+            scene = replace(scene, run=replace(scene.run, seed=scene.run.seed + number))
         run = simulate(
-            replace(scene, run=replace(scene.run, seed=scene.run.seed + number)),
-            self.model,
-            controller=self.controller,
+            scene,
+            model,
             sensor=self.sensor,
             progress=progress,
             modelled=self.modelled,
             to_time_limit=self.to_time_limit,
+            **drawn,
         )
-        return replace(run, findings=(*run.findings, *_of_own_law(self.flow_law, run)))
+        run = replace(run, findings=(*run.findings, *_of_own_law(self.flow_law, run)))
+        return TracedRun(
+            run=run,
+            settling_time=run.settling_time,
+            final_amplitude=float(run.amplitude[-1]),
+            energy=run.gas.energy,
+            worst_amplitude=float(np.max(run.amplitude)),
+            ended=run.outcome.value,
+            usable_moment=run.usable_moment,
+            unbalance=abs(scene.rotor.initial_unbalance),
+        )
 
     def rotor(self) -> CommonRotor:
         """See `Balancer`."""

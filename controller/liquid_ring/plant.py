@@ -12,7 +12,7 @@ from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.flow_law import BalancerModel, FlowLaw
 from ringbalance.reduced_model.residual_liquid import stalled_fill_ratio
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
 from ringbalance.scene.loop_models import Rotor
 
 NEAR_RESIDUAL: Final = 1e-6
@@ -77,21 +77,34 @@ class LiquidRing:
         """Vibration that remains with the liquid at its best, m; zero within capacity.
 
         It follows from the distance between the moment that is wanted and the nearest that the disc can form.
-        Those fill a polygon whose corners have every pair fully to one side or the other.
         Args: `least_fill`: as `largest_pair_moment`.
         Source: Eq. 8 of the liquid-ring paper, in every direction and for any number of chambers.
         """
+        corners = self._corners(least_fill)
+        edges = np.roll(corners, -1) - corners
+        offset = -rotor.initial_unbalance - corners
+        if self.chambers > 2 and np.all((edges.conj() * offset).imag >= 0):
+            return 0.0
+        along = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
+        return float(np.min(np.abs(offset - along * edges))) * rotor.influence_coefficient
+
+    def moment_towards(self, direction: complex, *, least_fill: float | None = None) -> float:
+        """Largest moment that the disc forms in a direction, kg m. Args: `least_fill`: as above."""
+        corners = self._corners(least_fill)
+        edges = np.roll(corners, -1) - corners
+        towards = direction / abs(direction) if direction else 1.0
+        # On the line of an edge: Im(edge* (t direction - corner)) = 0.
+        crossed = (edges.conj() * towards).imag
+        reached = (edges.conj() * corners).imag / np.where(crossed < 0, crossed, -np.inf)
+        return float(np.min(np.where(crossed < 0, reached, np.inf)))
+
+    def _corners(self, least_fill: float | None) -> ComplexArray:
+        """Of the moments that the disc can form: every pair fully to one side or the other, kg m."""
         n = self.chambers
         axes = chamber_directions(n)[: n // 2]
         seen_from = np.exp(1j * np.pi * (2 * np.arange(n) + 1) / n + 0.5j * np.pi)
         signs = np.sign((axes[None, :] * seen_from[:, None].conj()).real)
-        corners = self.largest_pair_moment(least_fill=least_fill) * (signs @ axes)
-        edges = np.roll(corners, -1) - corners
-        offset = -rotor.initial_unbalance - corners
-        if n > 2 and np.all((edges.conj() * offset).imag >= 0):
-            return 0.0
-        along = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
-        return float(np.min(np.abs(offset - along * edges))) * rotor.influence_coefficient
+        return np.asarray(self.largest_pair_moment(least_fill=least_fill) * (signs @ axes))
 
 
 def starting_pressure(

@@ -38,8 +38,8 @@ class Regime(IntEnum):
 
     @property
     def label(self) -> str:
-        """As it stands in JSON: the lower-case name, or "cannot be told"."""
-        return "cannot be told" if self is Regime.UNDECIDED else self.name.lower()
+        """As it stands in JSON: the lower-case name."""
+        return self.name.lower()
 
 
 @dataclass(frozen=True, kw_only=True)

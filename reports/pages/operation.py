@@ -50,7 +50,7 @@ _SHADES: Final = {
     "spilling": (FIFTH, 0.30),
     "blocked": (MUTED, 0.10),
     "reverse": (FOURTH, 0.26),
-    "cannot be told": (PAPER, 0.22),
+    "undecided": (PAPER, 0.22),
 }
 _CLEARANCE: Final = 2.2
 """Cells between a regime's name and the edge of its area, at the least."""

@@ -99,7 +99,7 @@ def requirements(evidence: Record) -> list[Requirement]:
 def requirement_table(rows: Iterable[Requirement]) -> Table:
     """As printed."""
     return Table(
-        caption="Requirements. A result within its uncertainty of what is required cannot be told; what "
+        caption="Requirements. Undecided: the requirement lies inside the result’s 95 % interval; what "
         "rests on inputs that nobody gave holds only if they do.",
         heads=("Requirement", "Required", "Result", "Verdict", "Rests on"),
         rows=[(row.name, row.wanted, row.result, row.verdict, row.rests) for row in rows],

@@ -44,7 +44,7 @@ _REGIME_LINES: Final[dict[str, Record]] = {
     "separated": {"linestyle": "-", "marker": "o", "markersize": 3.2, "markevery": 5},
     "blocked": {"linestyle": ":"},
     "reverse": {"linestyle": "-."},
-    "cannot be told": {"linestyle": "-", "marker": "x", "markersize": 3.2, "markevery": 5},
+    "undecided": {"linestyle": "-", "marker": "x", "markersize": 3.2, "markevery": 5},
 }
 _FAINT: Final = 1e-3
 """Of the largest term of k, up to which a term is not drawn."""

@@ -38,7 +38,7 @@ _POINTS: Final = 241
 _FILLS: Final = {
     Regime.SIPHON: "liquid fills it all the way",
     Regime.SEPARATED: "the column is separated at the siphon crest, and a cavity follows",
-    Regime.UNDECIDED: "whether liquid fills it all the way or separates at the siphon crest cannot be told",
+    Regime.UNDECIDED: "whether liquid fills it all the way or separates at the siphon crest is undecided",
     Regime.BLOCKED: "gas stands over the siphon crest and nothing flows",
 }
 

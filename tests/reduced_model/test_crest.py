@@ -185,7 +185,7 @@ def test_the_regime_cannot_be_told_within_its_uncertainty(table_1_scene: Scene, 
     regimes = law.evaluate(fill_ratio=0.25, gas_pressure=p, primed=True).regime
     order = [Regime(int(r)) for r in regimes[np.flatnonzero(np.diff(regimes, prepend=-1))]]
     assert [r for r in order if r in FLOWS] == [Regime.SEPARATED, Regime.UNDECIDED, Regime.SIPHON]
-    assert Regime.UNDECIDED.label == "cannot be told"
+    assert Regime.UNDECIDED.label == "undecided"
     for i in np.linspace(0, p.size - 1, 60).astype(int):
         found = HumpProfile.of(
             scene=table_1_scene, law=law, fill_ratio=0.25, gas_pressure=float(p[i]), primed=True, points=3

@@ -107,7 +107,7 @@ def test_an_unmet_requirement_is_not_called_met(evidence: Record) -> None:
 def test_a_result_that_not_all_drawn_runs_come_to_reads_as_one_sentence(evidence: Record) -> None:
     changed = json.loads(json.dumps(evidence))
     row = {**changed["requirements"][0], "quantity": "settling time", "unit": "s", "achieved": 2.32}
-    row.update(verdict="cannot be told", reached=0.38, lost=["masses.friction_arm"], achieved_interval=None)
+    row.update(verdict="undecided", reached=0.38, lost=["masses.friction_arm"], achieved_interval=None)
     changed["requirements"] = [row, {**row, "quantity": "patience", "reached": 1.0}]
     page = re.sub(r"<[^>]*>", "", render(changed)["report.html"])
     assert "2.32\u202fs with the scene’s values" in page
@@ -125,7 +125,7 @@ def test_what_a_requirement_depends_on_is_named_with_what_to_do(evidence: Record
         "rotor.damping": [5e-7, 0.0],
         "motor.resistance": [1e-12, 0.0],
     }
-    row.update(verdict="cannot be told", lost=[], achieved_interval=[0.0, 6e-7])
+    row.update(verdict="undecided", lost=[], achieved_interval=[0.0, 6e-7])
     changed["requirements"] = [row]
     page = re.sub(r"<[^>]*>", "", render(changed)["report.html"])
     assert "up to 0.600\u202fµm" in page

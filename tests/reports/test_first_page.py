@@ -135,11 +135,11 @@ def test_a_chamber_that_runs_dry_is_a_warning(evidence: Record, said: Said) -> N
     ("needed", "width", "verdict"),
     [
         (700e-6, 0.0, "met"),
-        (830e-6, 0.0, "cannot be told"),
-        (1020e-6, 0.0, "cannot be told"),
+        (830e-6, 0.0, "undecided"),
+        (1020e-6, 0.0, "undecided"),
         (1100e-6, 0.0, "not met"),
         # The needed moment is uncertain, too.
-        (700e-6, 250e-6, "cannot be told"),
+        (700e-6, 250e-6, "undecided"),
     ],
 )
 def test_the_capacity_is_judged_by_both_uncertainties(
@@ -162,7 +162,7 @@ def test_a_stated_moment_takes_the_place_of_the_initial_vibration(evidence: Reco
         (None, "met"),
         ([0.2e6, 0.6e6], "met"),
         # Somewhere within its range the crest asks for more than the supply gives.
-        ([0.2e6, 0.9e6], "cannot be told"),
+        ([0.2e6, 0.9e6], "undecided"),
         ([0.8e6, 0.9e6], "not met"),
     ],
 )
@@ -215,7 +215,7 @@ def tuned(evidence: Record, **changes: Any) -> Record:
         (None, [0.84, 1.0], "none stated"),
         (5.0, [0.96, 1.0], "met"),
         # 95 % of the runs are in time, but too few ran to be sure that 95 % settle.
-        (5.0, [0.84, 1.0], "cannot be told"),
+        (5.0, [0.84, 1.0], "undecided"),
         (2.8, [0.96, 1.0], "not met"),
         (5.0, [0.4, 0.6], "not met"),
     ],

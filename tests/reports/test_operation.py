@@ -68,7 +68,7 @@ def test_liquid_spills_between_the_priming_pressure_and_a_full_bore(work: Work, 
 def test_each_area_of_the_map_is_named_in_words(collected: Record) -> None:
     drawing = _operating_map(collected)
     there = {collected["regimes"][int(sign)] for row in collected["regime"] for sign in row}
-    assert there <= {*texts(drawing), "cannot be told"}
+    assert there <= {*texts(drawing), "undecided"}
 
 
 def test_the_section_carries_its_dimensions(collected: Record) -> None:

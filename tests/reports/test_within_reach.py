@@ -45,7 +45,7 @@ def test_each_end_of_the_default_range_keeps_its_name_whichever_corrects_by_less
     assert told.index("0.10") < told.index("slow valve") < told.index("0.20") < told.index("fast valve")
 
 
-@pytest.mark.parametrize(("factor", "verdict"), [(1.0, "met"), (1.3, "cannot be told"), (1.8, "not met")])
+@pytest.mark.parametrize(("factor", "verdict"), [(1.0, "met"), (1.3, "undecided"), (1.8, "not met")])
 def test_the_scenes_gain_is_judged_with_the_uncertainty_of_the_loop_factor(
     factor: float, verdict: str
 ) -> None:

@@ -13,17 +13,24 @@ from scipy.integrate import solve_ivp
 
 from ball_balancer.scene_keys import BallScene
 from ringbalance.controller.balancer import (
+    FURTHER,
+    REQUIRED_FRACTION,
     CommonRotor,
+    Demand,
     Draws,
     Input,
     Outcomes,
     Progress,
+    Remedy,
     Setting,
+    Settings,
     TracedRun,
     inputs_of,
+    one_by_one,
     outcomes_of,
     requirements_of,
     rotor_fault,
+    settles_within,
 )
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
 from ringbalance.results.requirements import Requirement
@@ -131,7 +138,7 @@ class BallBalancer:
 
     def run(
         self,
-        settings: Mapping[str, float],
+        settings: Settings,
         draws: Draws,
         *,
         trace: bool = False,
@@ -151,6 +158,9 @@ class BallBalancer:
                     final_amplitude=float(run.amplitude[-1]),
                     energy=0.0,
                     worst_amplitude=float(np.max(run.amplitude)),
+                    ended="settled" if run.settling_time is not None else "time_limit",
+                    usable_moment=2.0 * scene.balls.mass * scene.balls.race_radius,
+                    unbalance=abs(self.rotor().unbalance),
                 )
             )
         return outcomes_of(runs, trace=trace)
@@ -165,6 +175,28 @@ class BallBalancer:
         one, other = random.uniform(-math.pi, math.pi, 2).tolist()
         balls = replace(scene.balls, initial_angle=(one, other))
         return with_values_at(replace(scene, balls=balls), values)
+
+    def run_all(
+        self,
+        settings: Sequence[Settings],
+        draws: Draws,
+        *,
+        further: float = FURTHER,  # noqa: ARG002
+    ) -> tuple[Outcomes, ...]:
+        """A ball that rests is watched to the end of the run."""
+        return one_by_one(self, settings, draws)
+
+    def asked_fraction(self) -> float:
+        """The default."""
+        return REQUIRED_FRACTION
+
+    def demands(self) -> tuple[Demand, ...]:
+        """Within the time limit."""
+        return (settles_within(self.span(), stated=False),)
+
+    def remedies(self) -> tuple[Remedy, ...]:
+        """More oil."""
+        return (Remedy(code="drag", changes={"balls.drag": 2.0 * self.scene.balls.drag}),)
 
     def rotor(self) -> CommonRotor:
         """The scene's."""

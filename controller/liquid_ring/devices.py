@@ -1,0 +1,231 @@
+"""Devices that a liquid ring's scene may be: every uncertain input drawn, and the law made for each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.reduced_model.chamber.contributions import gravity_shares
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, nominal_law
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
+from ringbalance.reduced_model.tables import HermiteTable
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.draws import deviates, quantiles
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import (
+    NORMAL_95,
+    independent_half_widths,
+    moved,
+    nominal_value,
+    shifted,
+)
+
+ASSUMED_INFLUENCE: Final = 0.05
+"""Relative expanded uncertainty (95 %) of an influence coefficient for which the scene states none."""
+ASSUMED_LAG: Final = math.radians(3.0)
+"""Expanded uncertainty (95 %) of a lag angle for which the scene states none."""
+ASSUMED_AMPLITUDE: Final = 0.05
+"""Relative expanded uncertainty (95 %) of the initial amplitude from one machine to the next."""
+PAPER_DRAG_UNCERTAINTY: Final = 0.1
+"""Relative half-width taken for "k is about 50"."""
+PAPER_MOMENT_UNCERTAINTY: Final = 0.007
+"""Relative half-width that the liquid-ring paper states for lambda."""
+LOSS: Final = "model: loss of the tube"
+CAVITY: Final = "model: pressure of the cavity"
+MOMENT: Final = "model: moment"
+AMPLITUDE: Final = "rotor.initial_amplitude"
+PHASE: Final = "rotor.initial_phase"
+FITTED: Final = "fitted together, direction"
+"""Names of what is drawn beside the inputs of the scene."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """What differs between the devices of a scene under a law; expanded uncertainties (95 %)."""
+
+    inputs: Mapping[str, float]
+    """Of each input by itself, SI."""
+    directions: FloatArray
+    """Of inputs that were fitted together, SI, shape (quantities, directions)."""
+    loss: float
+    """Of the tube's head by models alone, relative; of a law that is not remade that of its velocity."""
+    cavity: bool
+    """Whether the pressure of a cavity lies anywhere between the vapour's and the gas's."""
+    remade: bool
+    """Whether a device has a law of its own, and not the scene's with another velocity."""
+    moment: float
+    """Of the moment by models alone, relative."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all that is drawn, inputs of the scene by their keys."""
+        fitted = [f"{FITTED} {place + 1}" for place in range(self.directions.shape[1])]
+        cavity = [CAVITY] if self.cavity else []
+        return (*self.inputs, *fitted, LOSS, *cavity, MOMENT, AMPLITUDE, PHASE)
+
+    @classmethod
+    def of(cls, scene: Scene, model: BalancerModel, *, remade: bool = True) -> Spread:
+        """Stated uncertainties, else assumed ones, and the errors of the law's models.
+
+        Args: `remade`: whether a calibrated law is the scene's own.
+        """
+        rotor, fitted = scene.rotor, {each.key for each in scene.fitted.quantities}
+        assumed = {
+            "influence_coefficient": ASSUMED_INFLUENCE * rotor.influence_coefficient,
+            "lag_angle": ASSUMED_LAG,
+        }
+        inputs = dict(independent_half_widths(scene))
+        inputs |= {
+            name: width
+            for name, width in assumed.items()
+            if name not in inputs and name not in fitted and not _states(scene, name)
+        }
+        return cls(
+            inputs=inputs,
+            directions=NORMAL_95 * scene.fitted.directions(),
+            loss=_loss(scene, model, remade=remade),
+            cavity=remade and isinstance(model.flow, CalibratedLaw) and model.flow.path.released > 0.0,
+            remade=remade and isinstance(model.flow, CalibratedLaw),
+            moment=_moment(model),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Device:
+    """One of them: its scene, with the vibration that it starts with, and its law."""
+
+    number: int
+    scene: Scene
+    model: BalancerModel
+    speed: float
+    """Factor on the law's velocity."""
+    moment: float
+    """Factor on the law's moments."""
+    inputs: Mapping[str, float]
+    """Place of everything that was drawn in its distribution, in (0, 1)."""
+    clipped: tuple[str, ...]
+    """Inputs that lie nearer to the scene's value than drawn, since no device has the drawn one."""
+
+    def under(self, settings: Scene, *, of: Scene) -> Scene:
+        """The device with a scene's controller and gas pressure; its gauge is as wrong as it was.
+
+        The factor on its moments is put into the influence coefficient, through which they act.
+        Args: `of`: the scene that the device was drawn from.
+        """
+        rotor, gas = self.scene.rotor, self.scene.gas
+        pressure = max(gas.pressure + settings.gas.pressure - of.gas.pressure, 0.0)
+        coefficient = rotor.influence_coefficient * self.moment
+        return replace(
+            self.scene,
+            controller=settings.controller,
+            gas=replace(gas, pressure=pressure),
+            rotor=replace(rotor, influence_coefficient=coefficient),
+        )
+
+
+def devices(
+    scene: Scene, model: BalancerModel, spread: Spread, numbers: Sequence[int], *, seed: int
+) -> Callable[[int], Device]:
+    """The device at a place among numbers, made when it is asked for."""
+    places = {name: quantiles(name, numbers, seed=seed) for name in spread.names}
+    normal = {name: deviates(name, numbers, seed=seed) / NORMAL_95 for name in spread.names}
+
+    def made(place: int) -> Device:
+        z = {name: float(each[place]) for name, each in normal.items()}
+        q = {name: float(each[place]) for name, each in places.items()}
+        drawn, clipped = _drawn(scene, spread, z, q)
+        law, speed = _law(drawn, model, spread, z, q)
+        return Device(
+            number=numbers[place],
+            scene=drawn,
+            model=law,
+            speed=speed,
+            moment=math.exp(math.log1p(spread.moment) * z[MOMENT]),
+            inputs=q,
+            clipped=clipped,
+        )
+
+    return made
+
+
+def _drawn(
+    scene: Scene, spread: Spread, z: Mapping[str, float], q: Mapping[str, float]
+) -> tuple[Scene, tuple[str, ...]]:
+    """The scene of a device, and the inputs that no device can have as drawn."""
+    device, clipped = scene, []
+    for name, width in spread.inputs.items():
+        change, before = width * z[name], nominal_value(scene=device, quantity=name)
+        device = shifted(scene=device, quantity=name, change=change)
+        after = nominal_value(scene=device, quantity=name)
+        if before is not None and after is not None and not math.isclose(after, before + change):
+            clipped.append(name)
+    keys = [each.key for each in scene.fitted.quantities]
+    for place, column in enumerate(spread.directions.T):
+        changes = zip(keys, (column * z[f"{FITTED} {place + 1}"]).tolist(), strict=True)
+        device = moved(device, dict(changes))
+    rotor, half = device.rotor, scene.requirement.phase_range
+    started = replace(
+        rotor,
+        initial_amplitude=rotor.initial_amplitude * math.exp(math.log1p(ASSUMED_AMPLITUDE) * z[AMPLITUDE]),
+        initial_phase=rotor.initial_phase + half * (2.0 * q[PHASE] - 1.0),
+    )
+    return replace(device, rotor=started), tuple(clipped)
+
+
+def _law(
+    device: Scene, model: BalancerModel, spread: Spread, z: Mapping[str, float], q: Mapping[str, float]
+) -> tuple[BalancerModel, float]:
+    """Law of a device, and the factor on its velocity where only that is known to be uncertain."""
+    if isinstance(model.flow, PaperLaw):
+        k = model.flow.drag_coefficient
+        drag = k * math.exp(math.log1p(2.0 * spread.loss * (k + 1.0) / k) * z[LOSS])
+        return paper_model(replace(device, tube=replace(device.tube, drag_coefficient=drag))), 1.0
+    if not spread.remade:
+        return model, math.exp(math.log1p(spread.loss) * z[LOSS])
+    law = nominal_law(device, gravity=gravity_shares(device).mean > device.tolerance)
+    more = math.log1p(spread.loss) * z[LOSS]
+    tables = ("head", "hump_head", "return_hump_head")
+    raised: dict[str, Any] = {name: _raised(getattr(law.heads, name), more) for name in tables}
+    heads = replace(law.heads, **raised)
+    path = replace(law.path, released=q[CAVITY]) if spread.cavity else law.path
+    return BalancerModel.of(replace(law, heads=heads, path=path)), 1.0
+
+
+def _raised(table: HermiteTable | None, more: float) -> HermiteTable | None:
+    return None if table is None else replace(table, value=table.value + more)
+
+
+def _states(scene: Scene, name: str) -> bool:
+    """Whether the scene states an uncertainty, be it zero."""
+    return any(each.quantity == name for each in scene.uncertainty)
+
+
+def _loss(scene: Scene, model: BalancerModel, *, remade: bool) -> float:
+    """Relative uncertainty of the head by models alone; of a law that is not remade of its velocity."""
+    law, fill = model.flow, scene.disc.initial_fill
+    if isinstance(law, PaperLaw):
+        stated = any(each.quantity == "drag_coefficient" for each in scene.uncertainty)
+        k = law.drag_coefficient
+        return 0.0 if stated else PAPER_DRAG_UNCERTAINTY * k / (k + 1.0) / 2.0
+    rest = law.evaluate(fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=0.0, primed=True)
+    flow = law.evaluate(
+        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=rest.primed
+    )
+    u = abs(float(flow.velocity)) or 1.0
+    if remade and isinstance(law, CalibratedLaw):
+        return float(law.heads.without_inputs(scene=scene, velocity=u).uncertainty(math.log(u)))
+    return float(flow.uncertainty) / u
+
+
+def _moment(model: BalancerModel) -> float:
+    """Relative uncertainty of a pair's largest moment by numerics and models."""
+    if not isinstance(model.moment, CalibratedMoment):
+        return PAPER_MOMENT_UNCERTAINTY
+    top = model.flow.max_fill_ratio
+    ends = model.moment.half_width(np.array([0.0, top]))
+    return float(np.hypot(*ends)) / float(model.moment.pair_moment(fill_ratio=top, opposite_fill_ratio=0.0))

@@ -1,0 +1,251 @@
+"""Closed-loop runs of drawn devices of a liquid ring, a device made once for all settings that are tried."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.algorithms.built_in import BuiltIn
+from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.balancer import FURTHER, Draws, Outcomes, Settings
+from ringbalance.controller.liquid_ring.devices import Device, Spread, devices
+from ringbalance.controller.liquid_ring.plant import LiquidRing
+from ringbalance.controller.loop_plan import LoopPlan, Records
+from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING, MomentTable
+from ringbalance.controller.simulation import Outcome
+from ringbalance.controller.terms import check_settings, dynamics_of, run_models, terms_modelled
+from ringbalance.physics.gas import compression_work
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
+from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
+from ringbalance.scene.loop_models import ControllerSettings
+from ringbalance.scene.models import Scene
+from ringbalance.scene.paths import with_values_at
+
+RELATIVE_ERROR: Final = 1e-4
+"""Allowed to one step of a run's states: an injection then ends within 1e-6 in fill of a single run's, and
+within 3e-5 without inertia."""
+MOST_SAMPLES: Final = 100_000
+"""Of one run without a trace."""
+_NOISE: Final = 3
+"""In the key of a run's noise, which the keys of drawn inputs do not have."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Setting:
+    """One of the settings that are tried."""
+
+    place: int
+    scene: Scene
+    """The scene's own device with it."""
+    controller: BuiltIn
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrawnRuns:
+    """What runs of a scene's devices under a law share."""
+
+    scene: Scene
+    model: BalancerModel
+    spread: Spread
+    limit: float
+    """Amplitude to come below, m, whatever the controller rests at."""
+
+    @cached_property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the terms that runs model, of all devices alike."""
+        return terms_modelled(run_models(scene=self.scene, model=self.model))
+
+    def outcomes(
+        self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
+    ) -> tuple[Outcomes, ...]:
+        """One a setting.
+
+        Args: `settings`: of the gas pressure and of keys of [controller].
+        Raises: SceneError: settings without a meaning, or a rotor too slow to form a ring.
+        """
+        check_ring(self.scene)
+        asked = [self._setting(place, each) for place, each in enumerate(settings)]
+        ended = [[_Ended() for _ in draws.numbers] for _ in asked]
+        seed, numbers = self.scene.run.seed, draws.numbers
+        device_at = devices(self.scene, self.model, self.spread, numbers, seed=seed)
+        drawn = []
+        for place, number in enumerate(numbers):
+            device = device_at(place) if draws.devices else _as_given(self.scene, self.model, number)
+            drawn.append(device)
+            for at, done in self._runs(device, asked, further):
+                ended[at][place] = done
+        return tuple(_outcomes(rows, drawn) for rows in ended)
+
+    def _setting(self, place: int, setting: Settings) -> _Setting:
+        scene = with_values_at(self.scene, setting)
+        check_settings(scene)
+        return _Setting(place=place, scene=scene, controller=controller_of(scene, self.model))
+
+    def _runs(
+        self, device: Device, asked: Sequence[_Setting], further: float
+    ) -> Iterator[tuple[int, _Ended]]:
+        """Place of a setting and how the device's run under it ended."""
+        moments = MomentTable.of(model=device.model, total=2 * device.scene.disc.initial_fill)
+        for _, some in _grouped(asked, lambda each: each.scene.gas.pressure):
+            under = _Under.of(device.under(some[0].scene, of=self.scene), device, modelled=self.terms)
+            for settings, alike in _grouped(
+                some, lambda each: replace(each.scene.controller, proportional=1)
+            ):
+                plan = LoopPlan.of(
+                    scene=replace(under.scene, controller=settings),
+                    model=device.model,
+                    dynamics=under.dynamics,
+                    controller=alike[0].controller,
+                    relative_error=RELATIVE_ERROR,
+                    most_samples=MOST_SAMPLES,
+                    further=further,
+                    moments=moments,
+                )
+                plan.loop["limit"] = self.limit
+                gains = [each.scene.controller.proportional for each in alike]
+                runs = under.carried(plan, device, gains, seed=self.scene.run.seed)
+                for each, run in zip(alike, runs, strict=True):
+                    yield each.place, _Ended.of(under, run, limit=self.limit)
+
+    def device(self, number: int) -> Device:
+        """One of the devices."""
+        return devices(self.scene, self.model, self.spread, (number,), seed=self.scene.run.seed)(0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Under:
+    """A device under one gas pressure."""
+
+    scene: Scene
+    dynamics: Dynamics
+    unreachable: float
+    """Vibration that remains with the liquid where the gas can bring it, m."""
+    beyond_disc: float
+    """The same with gas that empties a chamber to its residual fill, m."""
+    usable_moment: float
+    """Towards its own unbalance, kg m."""
+    unbalance: float
+    """kg m."""
+
+    @classmethod
+    def of(cls, scene: Scene, device: Device, *, modelled: Sequence[str]) -> _Under:
+        law, total = device.model.flow, 2 * scene.disc.initial_fill
+        residual = residual_fill_ratio(scene, law=law)
+        stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)
+        least = min(max(residual, stalled), total / 2)
+        dynamics = dynamics_of(
+            scene=scene, model=device.model, modelled=modelled, residual_fill=residual, checked=True
+        )
+        total = 2 * scene.disc.initial_fill
+        ring = LiquidRing(model=device.model, chambers=scene.disc.chambers, dynamics=dynamics, total=total)
+        return cls(
+            scene=scene,
+            dynamics=dynamics,
+            unreachable=ring.unreachable_vibration(rotor=scene.rotor, least_fill=least),
+            beyond_disc=ring.unreachable_vibration(rotor=scene.rotor, least_fill=residual),
+            usable_moment=device.moment
+            * ring.moment_towards(-scene.rotor.initial_unbalance, least_fill=least),
+            unbalance=device.moment * abs(scene.rotor.initial_unbalance),
+        )
+
+    def carried(self, plan: LoopPlan, device: Device, gains: Sequence[float], *, seed: int) -> Records:
+        """Runs to their ends, one for each gain, all with the noise of the device's number."""
+        runs = plan.runs(len(gains))
+        runs["speed"], runs["proportional"] = device.speed, gains
+        runs["gain"] = self.scene.rotor.influence
+        runs["residual_fill"] = self.dynamics.residual
+        plan.finish(runs, lambda _: run_noise(seed, device.number))
+        return runs
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Ended:
+    """How one run ended."""
+
+    settling_time: float = math.inf
+    final_amplitude: float = math.nan
+    energy: float = 0.0
+    usable_moment: float = math.nan
+    unbalance: float = math.nan
+    code: str = ""
+
+    @classmethod
+    def of(cls, under: _Under, run: np.void, *, limit: float) -> _Ended:
+        gas = under.scene.gas
+        rests = run["cause"] == AT_REST and run["since"] < math.inf
+        settled = run["settled"] > 0 or rests
+        since = run["held_since"] if run["settled"] > 0 else run["since"]
+        work = compression_work(
+            pressure_volume=float(run["gas"]),
+            pressure=gas.pressure + gas.ambient_pressure,
+            ambient_pressure=gas.ambient_pressure,
+        )
+        return cls(
+            settling_time=float(since) if settled else math.inf,
+            final_amplitude=float(run["amplitude"]),
+            energy=work,
+            usable_moment=under.usable_moment,
+            unbalance=under.unbalance,
+            code=str(Outcome.SETTLED if settled else _why(under, run, limit)),
+        )
+
+
+def _why(under: _Under, run: np.void, limit: float) -> Outcome:
+    """What kept a run from settling."""
+    if under.beyond_disc > limit:
+        return Outcome.CAPACITY_EXCEEDED
+    if under.unreachable > limit:
+        return Outcome.STALLED
+    if run["drains"] or run["drift"] > NOTICEABLE:
+        return Outcome.DRIFTING
+    if run["cause"] == RISING:
+        return Outcome.DIVERGING
+    if run["lost"] > 0:
+        return Outcome.HOVERING
+    return Outcome.GAS_TIME_TOO_SHORT if run["cause"] == IDLE else Outcome.TIME_LIMIT
+
+
+def run_noise(seed: int, number: int) -> np.random.Generator:
+    """Random numbers of the sensor in the run of a drawn device."""
+    key = np.random.SeedSequence(entropy=seed, spawn_key=(number, _NOISE))
+    return np.random.Generator(np.random.PCG64(key))
+
+
+def _as_given(scene: Scene, model: BalancerModel, number: int) -> Device:
+    return Device(number=number, scene=scene, model=model, speed=1.0, moment=1.0, inputs={}, clipped=())
+
+
+def _but_for_gain(setting: _Setting) -> ControllerSettings:
+    return replace(setting.scene.controller, proportional=1.0)
+
+
+def _grouped(settings: Sequence[_Setting], key: Any) -> Iterator[tuple[Any, list[_Setting]]]:
+    """Settings that are alike in a key, in the order of the first of each."""
+    groups: dict[Any, list[_Setting]] = {}
+    for each in settings:
+        groups.setdefault(key(each), []).append(each)
+    yield from groups.items()
+
+
+def _outcomes(rows: Sequence[_Ended], drawn: Sequence[Device]) -> Outcomes:
+    times = np.array([row.settling_time for row in rows])
+    return Outcomes(
+        settled=np.isfinite(times),
+        settling_time=times,
+        final_amplitude=np.array([row.final_amplitude for row in rows]),
+        energy=np.array([row.energy for row in rows]),
+        usable_moment=np.array([row.usable_moment for row in rows]),
+        unbalance=np.array([row.unbalance for row in rows]),
+        ended=tuple(row.code for row in rows),
+        numbers=tuple(device.number for device in drawn),
+        inputs={name: np.array([device.inputs[name] for device in drawn]) for name in drawn[0].inputs},
+        clipped=Counter(name for device in drawn for name in device.clipped),
+    )

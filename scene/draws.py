@@ -1,0 +1,46 @@
+"""Drawn devices by number: where in its distribution each uncertain input of a device lies.
+
+A block of 64 devices is a Latin hypercube: every input takes each 64th of its distribution once.  The column
+of an input depends on the seed, the block and the input's name alone, so that a device keeps its inputs in
+every setting, remedy, command and process, and with any number of further inputs.
+Source: McKay, Beckman and Conover, "A Comparison of Three Methods for Selecting Values of Input Variables in
+    the Analysis of Output from a Computer Code", Technometrics 21 (1979).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+from zlib import crc32
+
+import numpy as np
+from scipy.special import ndtri
+
+from ringbalance.scene.arrays import FloatArray
+
+BLOCK: Final = 64
+"""Devices of one Latin hypercube."""
+_LAST: Final = 1e-12
+"""Fraction at either end of a distribution that no device lies in."""
+
+
+def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
+    """Where an input lies in its distribution, in (0, 1), of devices by number."""
+    wanted = np.asarray(numbers, dtype=np.int64)
+    block, place = np.divmod(wanted, BLOCK)
+    drawn = np.empty(wanted.size)
+    for each in np.unique(block):
+        here = block == each
+        drawn[here] = _column(name, int(each), seed)[place[here]]
+    return np.clip(drawn, _LAST, 1.0 - _LAST)
+
+
+def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
+    """The same of a standard normal distribution."""
+    return np.asarray(ndtri(quantiles(name, numbers, seed=seed)))
+
+
+def _column(name: str, block: int, seed: int) -> FloatArray:
+    key = np.random.SeedSequence(entropy=seed, spawn_key=(block, crc32(name.encode())))
+    random = np.random.Generator(np.random.PCG64(key))
+    return np.asarray((random.permutation(BLOCK) + random.random(BLOCK)) / BLOCK)

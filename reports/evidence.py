@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import AS_GIVEN, balancer_of
+from ringbalance.controller.eccentric_mass.plant import rotor_record
 from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
@@ -316,6 +317,7 @@ def _eccentric_study(scene: EccentricScene) -> Record:
         "truth": truth,
         "closed_loop": {"balanced": run.to_dict()},
         "locked": locked_run(scene).to_dict(),
+        "rotor": rotor_record(scene),
         "tuning": tune_eccentric(scene, runs=0).to_dict(),
         "requirements": [each.document() for each in eccentric_requirements(scene, run)],
     }

@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import AutoLocator, FuncFormatter, NullLocator
 from numpy.typing import ArrayLike
 
+from ringbalance.reports.pictures import style
 from ringbalance.results.numbers import MINUS, display_unit, number, power_of_ten
 
 INK: Final = "#010101"
@@ -74,30 +75,18 @@ def _shades(low: str, middle: str, high: str) -> tuple[str, ...]:
 
 _MAP_LIGHT: Final = _shades("#f1f5fa", "#a9c9ec", "#5597d6")
 _MAP_DARK: Final = _shades("#18202a", "#1d4a7c", "#3f83c9")
-LIGHT: Final = {
-    "--fig-ink": "#1d2530",
-    "--fig-muted": "#5b6675",
-    "--fig-grid": "#dfe3e8",
-    "--fig-paper": "#b4500b",
-    "--fig-found": "#1059b0",
-    "--fig-third": "#1b7a55",
-    "--fig-fourth": "#7a3fa3",
-    "--fig-fifth": "#8a6d00",
-    "--fig-surface": "#ffffff",
-    **{f"--fig-map-{step}": shade for step, shade in enumerate(_MAP_LIGHT)},
-}
-DARK: Final = {
-    "--fig-ink": "#e4e8ee",
-    "--fig-muted": "#9aa6b5",
-    "--fig-grid": "#2c3540",
-    "--fig-paper": "#ffa35c",
-    "--fig-found": "#72b1ff",
-    "--fig-third": "#5fd0a0",
-    "--fig-fourth": "#cf9dfa",
-    "--fig-fifth": "#e3c55a",
-    "--fig-surface": "#12171e",
-    **{f"--fig-map-{step}": shade for step, shade in enumerate(_MAP_DARK)},
-}
+
+
+def _variables(palette: style.Palette, shades: Sequence[str]) -> dict[str, str]:
+    """CSS variables of a page's figures."""
+    names = ("ink", "muted", "grid", "paper", "found", "third", "fourth", "fifth")
+    colours = {f"--fig-{name}": getattr(palette, name) for name in names}
+    steps = {f"--fig-map-{step}": shade for step, shade in enumerate(shades)}
+    return {**colours, "--fig-surface": palette.background, **steps}
+
+
+LIGHT: Final = _variables(style.LIGHT, _MAP_LIGHT)
+DARK: Final = _variables(style.DARK, _MAP_DARK)
 
 _FONT: Final = "DejaVu Sans, Arial, sans-serif"
 """Of figures that are files."""

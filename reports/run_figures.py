@@ -10,9 +10,11 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike
 
 from ringbalance.controller.document import simulation_document
+from ringbalance.controller.eccentric_mass.plant import rotor_record
 from ringbalance.controller.eccentric_mass.run import locked_run
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
@@ -43,6 +45,7 @@ from ringbalance.reports.figure import (
     plain_number,
 )
 from ringbalance.reports.section import Record
+from ringbalance.results.numbers import number
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.origins import SceneFile
 
@@ -51,9 +54,15 @@ DEVIATIONS: Final = 2.0
 _COLOURS: Final = (FOUND, THIRD)
 _LOCKED: Final = {**AS_PAPER, "linewidth": 1.2, "label": "masses locked"}
 _BALANCED: Final = {"color": FOUND, "linewidth": 1.2, "label": "balanced"}
+_LIMIT: Final = {"color": MUTED, "linewidth": 1, "linestyle": ":", "label": "limit"}
 _SHORTEST: Final = 0.09
 """Fraction of the time axis that the name of a stage needs."""
 _MICROMETRE: Final = 1e6
+_MILLIMETRE: Final = 1e3
+RPM: Final = 30 / math.pi
+_LAG_TOP: Final = 300
+"""Lag, deg, above which an angle is a lead."""
+_ACROSS: Final = ("data", "axes fraction")
 _LABEL_ANGLES: Final = (-90, -75, -105, -60, -120, -45, -135)
 """Where the label of a ring may stand, deg; the first of equals is taken."""
 
@@ -72,9 +81,9 @@ def _ring(_: SceneFile, simulation: Simulation) -> list[Drawing]:
 
 def _masses(scene: EccentricScene, run: EccentricRun) -> list[Drawing]:
     document, locked = run.to_dict(), locked_run(scene).to_dict()
-    speed = [over_speed] if max(document["speed_rad_s"]) > min(document["speed_rad_s"]) else []
     return [
-        *(make(document, locked) for make in (over_time, *speed)),
+        over_time(document, locked),
+        *([run_up(document, locked, rotor_record(scene))] if run.speed.max() > run.speed.min() else []),
         mass_angles(document),
         imbalance_estimate(document, scene.imbalance.mass * scene.imbalance.radius),
         friction_estimates(document, scene.masses.friction_arm),
@@ -242,23 +251,44 @@ def _shade_stages(axes: Axes, run: Record) -> None:
             axes.axvspan(start, end, color=MUTED, alpha=0.12, linewidth=0)
         if end - start > _SHORTEST * span:
             name = stage["name"].replace("_", " ")
-            note(name, (start, 1), (3, -3), xycoords=("data", "axes fraction"), va="top")(axes)
+            note(name, (start, 1), (3, -3), xycoords=_ACROSS, va="top")(axes)
 
 
-def over_speed(run: Record, locked: Record) -> Drawing:
-    """Vibration amplitude over the rotor's speed, m, balanced and with the masses locked."""
-    speeds = [30 / math.pi * np.asarray(each["speed_rad_s"]) for each in (locked, run)]
-    values = (locked["amplitude_m"], run["amplitude_m"])
-    return draw(
-        "eccentric-run-up",
-        amplitudes(zip(speeds, values, (_LOCKED, _BALANCED), strict=True), run["limit_m"]),
-        x=("speed", "rpm"),
-        y=AMPLITUDE,
-        xlim=(speeds[1].min(), speeds[1].max()),
-        columns=3,
-        wide=True,
-        height=3.2,
-    )
+def run_up(run: Record, locked: Record, rotor: Record) -> Drawing:
+    """Bode plot of a run-up: vibration amplitude over speed, balanced and with the masses locked, and below
+    it the lag of the locked rotor behind its unbalance, with the critical speed.
+
+    Args: `rotor`: its `critical_speed_rad_s`, `amplification_factor` (None: none is defined), and
+    `locked_phase_rad`, the phase of what the locked masses leave of the unbalance.
+    """
+    speeds = [RPM * np.asarray(each["speed_rad_s"]) for each in (locked, run)]
+    lag = np.degrees((rotor["locked_phase_rad"] - np.asarray(locked["phase_rad"])) % math.tau)
+    # What lies a little before the unbalance is drawn there, not a turn later.
+    lag = np.where(lag > _LAG_TOP, lag - 360, lag)
+    critical, factor = RPM * rotor["critical_speed_rad_s"], rotor["amplification_factor"]
+    ends = min(speeds[1].min(), critical), max(speeds[1].max(), critical)
+
+    def paint(axes: Axes) -> None:
+        top, below = panels(axes, (0.09, 0.42, 0.89, 0.49), (0.09, 0.11, 0.89, 0.27))
+        values = [_MILLIMETRE * np.asarray(each["amplitude_m"]) for each in (locked, run)]
+        curves = zip(speeds, values, (_LOCKED, _BALANCED), strict=True)
+        amplitudes(curves, _MILLIMETRE * run["limit_m"])(top)
+        below.plot(speeds[0], lag, **_LOCKED)
+        for panel in (top, below):
+            panel.axvline(critical, color=INK, linewidth=0.9, linestyle=(0, (6, 2, 1, 2)))
+            panel.set_xlim(*ends)
+            panel.xaxis.set_major_formatter(FuncFormatter(plain_number))
+        top.tick_params(labelbottom=False)
+        top.set_ylabel("zero to peak in mm")
+        below.set(ylim=(-30, 210), yticks=(0, 90, 180), ylabel="lag in °", xlabel="speed in rpm")
+        text = f"critical speed {number(critical, digits=3)} rpm"
+        text += f", amplification factor {number(factor, digits=2)}" if factor else ""
+        side = "right" if critical > sum(ends) / 2 else "left"
+        note(text, (critical, 0.0), (-4 if side == "right" else 4, 4), xycoords=_ACROSS, ha=side)(top)
+        for look in (_LOCKED, _BALANCED, _LIMIT):
+            axes.plot([], [], **look)
+
+    return draw("eccentric-run-up", paint, columns=3, wide=True, height=4.4)
 
 
 def mass_angles(run: Record) -> Drawing:

@@ -42,6 +42,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, Motor
+from ringbalance.physics.balancing import amplification_factor, critical_speed
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.platform.compiled import compiled
 
@@ -134,6 +135,20 @@ class PlantParameters(NamedTuple):
             resistance=motor.resistance,
             maximum_voltage=math.inf if motor.maximum_voltage is None else motor.maximum_voltage,
         )
+
+
+def rotor_record(scene: EccentricScene) -> dict[str, float | None]:
+    """Critical speed, rad/s, amplification factor, and the phase of what the masses leave of the unbalance
+    where they start, rad in the rotor's frame; plain numbers.
+    """
+    plant, placed = PlantParameters.of(scene), scene.masses.initial_angle
+    left = cmath.rect(plant.unbalance, plant.phase) + sum(cmath.rect(plant.moment, each) for each in placed)
+    constants = {"mass": plant.mass, "stiffness": plant.stiffness}
+    return {
+        "critical_speed_rad_s": critical_speed(**constants),
+        "amplification_factor": amplification_factor(**constants, damping=plant.damping),
+        "locked_phase_rad": cmath.phase(left),
+    }
 
 
 def _reflected_inertia(motor: Motor) -> float:

@@ -10,13 +10,13 @@ from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Rectangle
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
 from ringbalance.controller.eccentric_mass.requirements import DRAWS
 from ringbalance.reports import summary
-from ringbalance.reports.figure import INK, Drawing, curve, draw, line
+from ringbalance.reports.figure import INK, MUTED, Drawing, draw, line, panels
 from ringbalance.reports.pages import measured
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.plain import requirements_view
@@ -26,14 +26,14 @@ from ringbalance.reports.run_figures import (
     friction_estimates,
     imbalance_estimate,
     mass_angles,
-    over_speed,
     over_time,
+    run_up,
 )
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
-_POLE_ROOM, _NEAR = 0.75, 0.02
-"""Half of the poles' picture over their extent, and the least extent."""
+_POLE_ROOM, _NEAR, _WHOLE = 0.75, 0.02, 1.12
+"""Half of the poles' magnified picture over their extent, the least extent, and half of the whole picture."""
 
 
 def _summary(_own: Record, evidence: Record) -> Record:
@@ -45,7 +45,7 @@ def _run(_own: Record, evidence: Record) -> Record:
     varies = max(run["speed_rad_s"]) > min(run["speed_rad_s"])
     ends = np.interp([stage["end_s"] for stage in run["stages"]], run["time_s"], run["amplitude_m"])
     return {
-        "over_speed": over_speed(run, locked) if varies else None,
+        "over_speed": run_up(run, locked, evidence["rotor"]) if varies else None,
         "over_time": over_time(run, locked),
         "stages": [{"place": place, "amplitude_m": float(end)} for place, end in enumerate(ends)],
     }
@@ -97,35 +97,28 @@ def _loops(_own: Record, evidence: Record) -> Record:
 
 
 def _sampled_poles(loops: Sequence[Record]) -> Drawing:
-    """Sampled poles of the drives' loops in the complex plane, with the unit circle where they are."""
-    points = np.array([[1.0, 0.0], *(pole for loop in loops for pole in loop["poles"])])
+    """Sampled poles of the drives' loops in the complex plane, with the unit circle, and magnified."""
+    groups = [np.array(loop["poles"]).reshape(-1, 2) for loop in loops]
+    points = np.concatenate([np.zeros((0, 2)), *groups])
     low, high = points.min(axis=0), points.max(axis=0)
     middle, half = (low + high) / 2, _POLE_ROOM * max(*(high - low), _NEAR)
-    (left, right), (bottom, top) = np.column_stack((middle - half, middle + half)).tolist()
+    whole = max(_WHOLE, float(np.abs(points).max()) * _WHOLE)
 
-    def circle(axes: Axes) -> None:
-        axes.add_patch(Circle((0, 0), 1, fill=False, color=INK, linewidth=1))
-        axes.set_aspect("equal")
+    def paint(axes: Axes) -> None:
+        everything, near = panels(axes, (0.075, 0.13, 0.4, 0.72), (0.575, 0.13, 0.4, 0.72))
+        for panel, centre, reach in ((everything, (0.0, 0.0), whole), (near, middle, half)):
+            panel.add_patch(Circle((0, 0), 1, fill=False, color=INK, linewidth=1))
+            for index, group in enumerate(groups):
+                panel.plot(*group.T, linestyle="", **line(index, size=6))
+            ends = [(at - reach, at + reach) for at in centre]
+            panel.set(xlim=ends[0], ylim=ends[1], aspect="equal", xlabel="real part")
+        everything.set_ylabel("imaginary part")
+        frame = Rectangle(middle - half, 2 * half, 2 * half, fill=False, color=MUTED, linewidth=0.8)
+        everything.add_patch(frame)
+        for index, loop in enumerate(loops):
+            axes.plot([], [], linestyle="", label=loop["name"], **line(index, size=6))
 
-    return draw(
-        "sampled-poles",
-        circle,
-        *(
-            curve(
-                [real for real, _ in loop["poles"]],
-                [imaginary for _, imaginary in loop["poles"]],
-                loop["name"],
-                linestyle="",
-                **line(index, size=6),
-            )
-            for index, loop in enumerate(loops)
-        ),
-        x=("real part", "1"),
-        y=("imaginary part", "1"),
-        xlim=(left, right),
-        ylim=(bottom, top),
-        height=3.4,
-    )
+    return draw("sampled-poles", paint, columns=3, wide=True, height=4.0)
 
 
 def _claims(_own: Record, evidence: Record) -> Record:

@@ -1,4 +1,4 @@
-"""How every 3-D picture looks: colours on a light and a dark page, camera, lettering in a proper font."""
+"""Colours of every figure and picture on a light and a dark page; camera and lettering of 3-D pictures."""
 
 from __future__ import annotations
 
@@ -20,37 +20,75 @@ PICTURE: Final = (1200, 800)
 
 
 @dataclass(frozen=True, kw_only=True)
+class Palette:
+    """Colours of one kind of page. The lines tell apart for deuteranopes and protanopes, and as text."""
+
+    background: str
+    ink: str
+    muted: str
+    grid: str
+    paper: str
+    """The paper's formulas."""
+    found: str
+    """What this program found."""
+    third: str
+    fourth: str
+    fifth: str
+
+
+LIGHT: Final = Palette(
+    background="#ffffff",
+    ink="#1d2530",
+    muted="#5b6675",
+    grid="#dfe3e8",
+    paper="#a36a00",
+    found="#1757ee",
+    third="#0a4420",
+    fourth="#cf1fb0",
+    fifth="#565400",
+)
+DARK: Final = Palette(
+    background="#12171e",
+    ink="#e4e8ee",
+    muted="#9aa6b5",
+    grid="#2c3540",
+    paper="#ff9d3c",
+    found="#5f86ff",
+    third="#8cf07a",
+    fourth="#a084c4",
+    fifth="#b58a1a",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Theme:
     """Colours of a picture, so that it sits on the page without a frame."""
 
     name: str
-    background: str
-    ink: str
+    palette: Palette
     metal: str
-    tube: str
     mark: str
     edge: str
 
+    @property
+    def background(self) -> str:
+        """Of the page."""
+        return self.palette.background
+
+    @property
+    def ink(self) -> str:
+        """Of the page's text."""
+        return self.palette.ink
+
+    @property
+    def tube(self) -> str:
+        """As in figures."""
+        return self.palette.paper
+
 
 THEMES: Final = (
-    Theme(
-        name="light",
-        background="#ffffff",
-        ink="#1d2530",
-        metal="#c3cad2",
-        tube="#c2661c",
-        mark="#1d2530",
-        edge="#5b6675",
-    ),
-    Theme(
-        name="dark",
-        background="#12171e",
-        ink="#e4e8ee",
-        metal="#66717e",
-        tube="#ffa35c",
-        mark="#ffffff",
-        edge="#9aa6b5",
-    ),
+    Theme(name="light", palette=LIGHT, metal="#c3cad2", mark=LIGHT.ink, edge=LIGHT.muted),
+    Theme(name="dark", palette=DARK, metal="#66717e", mark="#ffffff", edge=DARK.muted),
 )
 
 

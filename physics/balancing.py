@@ -1,0 +1,74 @@
+"""Numbers that the standards of balancing and of rotors define.
+
+Unbalance in kg m, speed in rad/s, vibration in m zero-to-peak.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from ringbalance.scene.arrays import FloatArray
+
+ZONES: Final = ((3.0, "A"), (4.0, "B"), (5.0, "C"), (math.inf, "D"))
+"""Largest peak sensitivity of each zone of ISO 14839-3: A as new, B acceptable, C not for long."""
+_ANGLES: Final[FloatArray] = np.concatenate([np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi, 1600)])
+"""Of z on the unit circle, rad."""
+
+
+def permissible_unbalance(*, grade: float, mass: float, speed: float) -> float:
+    """U_per = G M / W of a whole rigid rotor, kg m, with G in m/s; 9549 G M / n in g mm, mm/s and rpm.
+
+    Source: ISO 21940-11:2016.
+    """
+    return grade * mass / speed
+
+
+def unbalance_reduction_ratio(*, before: float, after: float) -> float:
+    """URR = 1 - U1/U0 of one correction.
+
+    Source: ISO 21940-21:2012.
+    """
+    return 1.0 - after / before
+
+
+def rms_velocity(*, amplitude: float, speed: float) -> float:
+    """A W / sqrt(2), m/s, of a sine of the running speed.
+
+    Source: the quantity that ISO 20816-1:2016 judges.
+    """
+    return amplitude * speed / math.sqrt(2.0)
+
+
+def critical_speed(*, mass: float, stiffness: float) -> float:
+    """sqrt(K/M) of a rotor on isotropic bearings, rad/s, undamped: there the lag is a quarter turn."""
+    return math.sqrt(stiffness / mass)
+
+
+def amplification_factor(*, mass: float, stiffness: float, damping: float) -> float | None:
+    """sqrt(K M)/C, 1/(2 zeta); None without damping, and where that is so strong that nothing peaks.
+
+    Source: the limit of API 617's N_c/(N_2 - N_1) for light damping, which is within 3 % of it from 7 on.
+    """
+    if damping <= 0 or 2.0 * stiffness * mass <= damping**2:
+        return None
+    return math.sqrt(stiffness * mass) / damping
+
+
+def peak_sensitivity(*, loop_factor: float, integral: float = 0.0, derivative: float = 0.0) -> float:
+    """Largest |1/(1 + L)| on the unit circle, L = h (1 + (i/2)(z + 1)/(z - 1) + q (1 - 1/z))/(z - 1).
+
+    2/(2 - h) with P alone, up to h = 2.  i = dt/Ti (`integral`), q = Td/dt (`derivative`).  The loop has to
+    be stable.
+    Source: ISO 14839-3:2006, which judges the loops of magnetic bearings by it; used here for comparison.
+    """
+    z = np.exp(1j * _ANGLES)
+    shape = 1.0 + integral / 2.0 * (z + 1.0) / (z - 1.0) + derivative * (1.0 - 1.0 / z)
+    return float(np.max(np.abs(1.0 / (1.0 + loop_factor * shape / (z - 1.0)))))
+
+
+def zone(sensitivity: float) -> str:
+    """A to D by ISO 14839-3."""
+    return next(name for most, name in ZONES if sensitivity <= most)

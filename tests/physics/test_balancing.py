@@ -1,0 +1,40 @@
+"""Numbers of the standards against their printed forms and closed solutions."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from ringbalance.physics import balancing
+
+
+def test_permissible_unbalance_is_the_standards_9549_g_m_over_n() -> None:
+    rpm = 3000.0
+    permissible = balancing.permissible_unbalance(grade=2.5e-3, mass=40.0, speed=rpm * math.pi / 30)
+    assert permissible == pytest.approx(1e-6 * 9549 * 2.5 * 40.0 / rpm, rel=1e-4)
+
+
+def test_velocity_is_rms() -> None:
+    assert balancing.rms_velocity(amplitude=1e-5, speed=100 * math.tau) == pytest.approx(4.443e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("loop_factor", "zone"), [(0.5, "A"), (1.0, "A"), (1.45, "B"), (1.59, "C"), (1.7, "D")]
+)
+def test_peak_sensitivity_of_a_proportional_loop(loop_factor: float, zone: str) -> None:
+    peak = balancing.peak_sensitivity(loop_factor=loop_factor)
+    assert peak == pytest.approx(2 / (2 - loop_factor), rel=1e-6)
+    assert balancing.zone(peak) == zone
+
+
+def test_amplification_factor_is_the_half_power_one() -> None:
+    """N_c/(N_2 - N_1) of API 617, between the speeds at which an unbalance gives 0.707 of the peak."""
+    mass, stiffness, damping = 5.36, 1000.0, 10.0
+    critical = balancing.critical_speed(mass=mass, stiffness=stiffness)
+    speeds = [critical * (0.7 + 1e-5 * step) for step in range(60_000)]
+    response = [w**2 / abs(complex(stiffness - mass * w**2, damping * w)) for w in speeds]
+    wide = [w for w, each in zip(speeds, response, strict=True) if each >= max(response) / math.sqrt(2)]
+    factor = balancing.amplification_factor(mass=mass, stiffness=stiffness, damping=damping)
+    assert factor == pytest.approx(critical / (wide[-1] - wide[0]), rel=0.03)
+    assert balancing.amplification_factor(mass=mass, stiffness=stiffness, damping=0.0) is None

@@ -56,7 +56,6 @@ class Device(NamedTuple):
     gain_imaginary: float
     start_real: float
     start_imaginary: float
-    surges: float  # 1: momentum carries liquid over the crest that the gas would not lift at rest
 
 
 class Drawn(NamedTuple):
@@ -144,7 +143,6 @@ def _device(v: dict[str, Any], *, start: complex, released: float) -> Drawn:
         gain_imaginary=gain.imag,
         start_real=start.real,
         start_imaginary=start.imag,
-        surges=0.0,
     )
     whole = Drawn(device, square, v["model_moment"] * moment, loss, upstream, downstream)
     residual = _residual(whole, v)
@@ -196,15 +194,13 @@ def _losses(
     haaland = (-1.8 * np.log10((v["roughness"] / d / 3.7) ** 1.11 + 6.9 / re)) ** -2
     fast = np.where(kt > 500, 0.942 * kt**0.05, 0.942 + 0.058 * np.maximum(kt, 1.0) ** 0.282)
     turbulent = haaland * np.where(kt > 1, np.maximum(fast, 1.0), 1.0)
-    if v["drag_coefficient"]:
-        turbulent = laminar = v["drag_coefficient"] * d / length + 0 * u
     share = 1 / (1 + np.exp(np.clip((laminar - turbulent) / (0.05 * turbulent), -50, 50)))
     arcs = sum(b.angle * b.radius for b in v["bends"])
     bends, friction = 0 * u, np.maximum(laminar, turbulent) * (length - arcs) / d
     for b in v["bends"]:
         ratio = b.radius / d
         bends += 0.388 * (0.95 + 4.42 * ratio**-1.96) * ratio**0.84 * re**-0.17 * b.angle / (math.pi / 2)
-    entrance = share * (0.0 if v["drag_coefficient"] else 0.5)
+    entrance = share * 0.5
     kinetic = share * 1.06 + (1 - share) * (1.2 + 0.8 * np.maximum(slow, 1.0) ** -1.5)
     ends = share * (entrance + 1.0) + (1 - share) * 2.3
     scale = v["model_loss"] * u / 2

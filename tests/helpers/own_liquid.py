@@ -8,7 +8,8 @@ being filled from a chamber or spills (1), or runs without gas over its crest (2
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Any, Final, TypeVar, cast
 
 import numba
 from own_draws import FILLS, SPEEDS, Floats
@@ -23,7 +24,12 @@ _GAS_OFF: Final = 100.0
 """Pa."""
 _STRAIGHT: Final = 0.999
 """Ratio of pressures from which the flow of gas is laminar."""
-compiled: Any = numba.njit(cache=True, error_model="numpy")
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def compiled(function: Function) -> Function:
+    """To machine code, kept beside this file."""
+    return cast("Function", numba.njit(cache=True, error_model="numpy")(function))
 
 
 @compiled
@@ -70,7 +76,7 @@ def _gas(d: Any, y: Floats, opened: int, dt: float) -> None:
 
 
 @compiled
-def _start(d: Any, y: Floats, squares: Floats) -> None:
+def _start(d: Any, y: Floats, squares: tuple[float, float]) -> None:
     """A parted tube is filled from the chamber that pushes harder."""
     near, far = squares
     push = y[P] - y[P + 1] + d.density * d.half_square * (far - near)
@@ -94,7 +100,7 @@ def _spill(table: Floats, head: float) -> float:
 
 
 @compiled
-def _front(d: Any, y: Floats, squares: Floats, tables: Any, dt: float) -> float:
+def _front(d: Any, y: Floats, squares: tuple[float, float], tables: Any, dt: float) -> float:
     """A front on its way to the crest, or liquid that spills over it. Returns: dx."""
     giver = int(y[FROM])
     sign = 1.0 if giver == 0 else -1.0
@@ -137,7 +143,7 @@ def _front(d: Any, y: Floats, squares: Floats, tables: Any, dt: float) -> float:
 
 
 @compiled
-def _column(d: Any, y: Floats, squares: Floats, tables: Any, dt: float) -> float:
+def _column(d: Any, y: Floats, squares: tuple[float, float], tables: Any, dt: float) -> float:
     """A tube without gas over its crest, full or separated there. Returns: dx."""
     u = y[U]
     head = (y[P] - y[P + 1]) / d.density + d.half_square * (squares[1] - squares[0])
@@ -158,11 +164,11 @@ def _column(d: Any, y: Floats, squares: Floats, tables: Any, dt: float) -> float
         y[MODE] = 2.0 if holds else 0.0
     else:
         y[U] = sign * after
-    return -y[U] * dt * d.area / d.volume
+    return float(-y[U] * dt * d.area / d.volume)
 
 
 @compiled
-def _step(d: Any, y: Floats, tables: Any, squares: Floats, dt: float) -> float:
+def _step(d: Any, y: Floats, tables: Any, squares: tuple[float, float], dt: float) -> float:
     """Returns: dx."""
     if y[MODE] == 0:
         _start(d, y, squares)
@@ -183,7 +189,7 @@ def _length(time: float, first: float, last: float, span: float, calm: bool) -> 
 
 
 @compiled
-def _quiet(d: Any, y: Floats, squares: Floats) -> bool:
+def _quiet(d: Any, y: Floats, squares: tuple[float, float]) -> bool:
     """Whether nothing moves or will, with the valves closed."""
     vented = d.passing <= 0.0 or (abs(y[P]) < _GAS_OFF / 2 and abs(y[P + 1]) < _GAS_OFF / 2)
     return bool(y[MODE] == 0 and vented and min(squares[0], squares[1]) > d.crest**2)

@@ -104,7 +104,7 @@ def _wanted(c: Any, memory: Floats, time: float, seen: float, phase: float) -> f
         if turned or wanted <= c.longest:
             memory[_INTEGRAL] = summed
     memory[_BEFORE], memory[_TIME], memory[_PHASE] = seen, time, phase
-    return min(max(wanted, 0.0), c.longest)
+    return float(min(max(wanted, 0.0), c.longest))
 
 
 @compiled

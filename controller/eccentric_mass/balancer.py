@@ -29,17 +29,24 @@ from ringbalance.controller.balancer import (
     rotor_fault,
     settles_within,
 )
+from ringbalance.controller.drawn_input import DrawnInput, drawn_key
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements, reach_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import advised
-from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.scene_records import (
+    EccentricRotor,
+    EccentricScene,
+    SpeedPoint,
+    eccentric_scene,
+)
 from ringbalance.controller.eccentric_mass.tuning import EccentricTuning, drawn_run, tune_eccentric
 from ringbalance.controller.trials import Trials, scaled
 from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
+from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.paths import with_values_at
 
 _FINEST_SHARE: Final = 0.01
@@ -129,6 +136,18 @@ class EccentricMassBalancer:
     def remedies(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
         return ()
+
+    def choices(self) -> tuple[Remedy, ...]:
+        """See `Balancer`."""
+        return ()
+
+    def drawn_input(self, name: str) -> DrawnInput:
+        """See `Balancer`."""
+        return drawn_key(self.scene, name)
+
+    def on_scene(self, scene: SceneFile) -> EccentricMassBalancer:
+        """See `Balancer`."""
+        return EccentricMassBalancer(eccentric_scene(scene))
 
     def rotor(self) -> CommonRotor:
         """At the speed at which the strategy starts; see `Balancer`."""

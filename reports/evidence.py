@@ -16,12 +16,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import AS_GIVEN, balancer_of
+from ringbalance.controller.balancer import AS_GIVEN, Draws, balancer_of
+from ringbalance.controller.eccentric_mass.band import amplitude_band
+from ringbalance.controller.eccentric_mass.loop_rows import loops_document
 from ringbalance.controller.eccentric_mass.plant import rotor_record
-from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements
+from ringbalance.controller.eccentric_mass.requirements import FEWEST, MOST, drawn_requirements
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
-from ringbalance.controller.eccentric_mass.tuning import tune_eccentric
+from ringbalance.controller.judging.judge import FRESH, judged_all
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
@@ -306,8 +309,10 @@ def _plain_study(scene: SceneFile) -> Record:
 
 
 def _eccentric_study(scene: EccentricScene) -> Record:
-    """The run, balanced and with its masses locked, its loops and requirements, and the true values."""
-    run = simulate_eccentric(scene)
+    """The run, balanced and with its masses locked, drawn devices, loops, and the true values."""
+    run, balancer = simulate_eccentric(scene), balancer_of(scene)
+    (judgement,) = judged_all(balancer, [{}], first=FEWEST, most=MOST)
+    several = balancer.run({}, Draws.block(FRESH, FEWEST), trace=True)
     truth = {
         "unbalance_kg_m": scene.imbalance.mass * scene.imbalance.radius,
         "phase_rad": scene.imbalance.phase,
@@ -318,8 +323,9 @@ def _eccentric_study(scene: EccentricScene) -> Record:
         "closed_loop": {"balanced": run.to_dict()},
         "locked": locked_run(scene).to_dict(),
         "rotor": rotor_record(scene),
-        "tuning": tune_eccentric(scene, runs=0).to_dict(),
-        "requirements": [each.document() for each in eccentric_requirements(scene, run)],
+        "tuning": loops_document(RecommendedGains.of(scene)),
+        "drawn": amplitude_band(several.traced, start=0.0, end=scene.run.time_limit),
+        "requirements": [each.document() for each in drawn_requirements(judgement)],
     }
 
 

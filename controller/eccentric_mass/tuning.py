@@ -9,17 +9,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-import numpy as np
-
+from ringbalance.controller.eccentric_mass.devices import device
+from ringbalance.controller.eccentric_mass.loop_rows import (
+    loops_document,
+    loops_quantities,
+    loops_status,
+    loops_table,
+)
 from ringbalance.controller.eccentric_mass.plan import STAGE_NAMES, Stage
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.tuning.settling import QUANTILES, Progress, SettlingTimes, summary
-from ringbalance.results.result import Result, Rows, Table
-from ringbalance.results.rows import Finding, Quantity
+from ringbalance.results.result import Result, Rows
+from ringbalance.results.rows import Finding
+from ringbalance.scene.draws import run_noise
 
 RUNS: Final = 40
 FIRST_RUNS: Final = 16
@@ -76,7 +82,9 @@ class EccentricTuning(Result):
     @property
     def status(self) -> str:
         """Whether the loops have their margin and the runs settle, and what to change."""
-        return "; ".join(text for text in (_of_loops(self.gains), _of_runs(self.settling)) if text)
+        loops = loops_status(self.gains)
+        tuned = f"tuned: {loops}" if loops.startswith("every") else loops
+        return "; ".join(text for text in (tuned, _of_runs(self.settling)) if text)
 
 
 def tune_eccentric(
@@ -110,7 +118,7 @@ def _eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> 
     short = span
     for number in range(runs):
         told(f"run {number + 1}")
-        done.append(drawn_run(scene, number, spans=(short, span)))
+        done.append(_drawn_run(scene, number, spans=(short, span)))
         short = min(_until_rest(done), span)
         if number + 1 == min(FIRST_RUNS, runs) and _times(done).settled.high < QUANTILES["p95"]:
             break
@@ -122,17 +130,12 @@ def _eccentric_settling(scene: EccentricScene, *, runs: int, told: Progress) -> 
     )
 
 
-def drawn_run(scene: EccentricScene, number: int, *, spans: Sequence[float] = ()) -> EccentricRun:
-    """The run of a device by its number: plant and noise are drawn, the strategy keeps the scene's values.
-
-    Args: `spans`: s, tried in turn until the run settles; default the scene's time limit.
-    """
-    seed = scene.run.seed + number
-    random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(0,)))
-    settings, plant = StrategySettings.of(scene), eccentric_drawn(scene, random)
-    for span in dict.fromkeys(spans or (scene.run.time_limit,)):
+def _drawn_run(scene: EccentricScene, number: int, *, spans: Sequence[float]) -> EccentricRun:
+    """Args: `spans`: s, tried in turn until the run settles."""
+    settings, plant = StrategySettings.of(scene), device(scene, number).scene
+    for span in dict.fromkeys(spans):
         limited = replace(plant, run=replace(plant.run, time_limit=span))
-        run = simulate_eccentric(limited, seed=seed, settings=settings)
+        run = simulate_eccentric(limited, seed=run_noise(scene.run.seed, number), settings=settings)
         if run.settled:
             break
     return run
@@ -157,17 +160,6 @@ def _advice(done: list[EccentricRun]) -> str:
     return next(run.status for run in failed if run.outcome is usual)
 
 
-def _of_loops(gains: RecommendedGains) -> str:
-    unstable = ", ".join(loop.name for loop in gains.loops if not loop.stable)
-    high = [loop for loop in gains.loops if loop.value > loop.recommended]
-    if not unstable and not high:
-        return "tuned: every loop of the drives is stable with a gain margin of two"
-    found = f"unstable: {unstable}" if unstable else "a gain margin is below two"
-    changes = ", ".join(f"{loop.key} to {loop.recommended:.4g} {loop.unit}".rstrip() for loop in high)
-    cure = f"lower {changes}, or hold" if changes else "hold"
-    return f"{found}: {cure} the voltage for at most {gains.step:.4g} s"
-
-
 def _of_runs(settling: _EccentricSettling | None) -> str:
     if settling is None:
         return ""
@@ -186,25 +178,8 @@ def _document(tuning: EccentricTuning) -> dict[str, Any]:
     return {
         "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
         "balancer": scene.balancer,
+        **loops_document(gains),
         "status": tuning.status,
-        "gain": {loop.key: loop.recommended for loop in gains.loops},
-        "loops": [
-            {
-                "name": loop.name,
-                "key": loop.key,
-                "value": loop.value,
-                "unit": loop.unit,
-                "poles": [[pole.real, pole.imag] for pole in loop.poles.tolist()],
-                "radius": loop.radius,
-                "stable": loop.stable,
-                "gain_margin": loop.gain_margin,
-                "recommended": loop.recommended,
-                "recommended_step_s": loop.recommended_step,
-            }
-            for loop in gains.loops
-        ],
-        "step_s": gains.step,
-        "drive_speed_rad_per_s": gains.drive_speed,
         "tuned": dict(tuning.tuned),
         "drawn": [each.quantity for each in scene.uncertainty],
         **_settling_document(tuning.settling),
@@ -227,29 +202,11 @@ def _settling_document(settling: _EccentricSettling | None) -> dict[str, Any]:
 
 
 def _rows(tuning: EccentricTuning) -> Rows:
-    scene, loops, settling = tuning.scene, tuning.gains.loops, tuning.settling
-    recommended = (
-        Quantity(key=loop.key, name=f"{loop.key}, at most", value=loop.recommended, unit=loop.unit or "1")
-        for loop in loops
-    )
-    hold = Quantity(key="voltage_hold", name="voltage hold, at most", unit="s", value=tuning.gains.step)
-    heads = ("loop", "key", "value", "at most", "unit", "largest pole", "hold, s")
-    rows = [
-        (
-            loop.name,
-            loop.key,
-            f"{loop.value:.4g}",
-            f"{loop.recommended:.4g}",
-            loop.unit,
-            f"{loop.radius:.4f}",
-            f"{loop.recommended_step:.4g}",
-        )
-        for loop in loops
-    ]
+    scene, gains, settling = tuning.scene, tuning.gains, tuning.settling
     drawn = ", ".join(each.quantity for each in scene.uncertainty) or "nothing, the scene states none"
     return Rows(
         title=f"Tuning of {scene.name} ({scene.source}), eccentric masses",
-        quantities=(*recommended, hold, *(() if settling is None else settling.times.quantities())),
+        quantities=(*loops_quantities(gains), *(() if settling is None else settling.times.quantities())),
         findings=(
             Finding(
                 code="tuned" if tuning.succeeded else "not_tuned",
@@ -258,5 +215,5 @@ def _rows(tuning: EccentricTuning) -> Rows:
             ),
         ),
         facts=() if settling is None else (("drawn from their uncertainty", drawn),),
-        tables=(Table(caption="Loops of the drives", heads=heads, rows=rows),),
+        tables=(loops_table(gains),),
     )

@@ -14,7 +14,6 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.balancer import (
     FURTHER,
-    CommonRotor,
     Demand,
     Draws,
     Input,
@@ -29,9 +28,10 @@ from ringbalance.controller.balancer import (
     requirements_of,
     settles_within,
 )
+from ringbalance.controller.common_rotor import CommonRotor
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
 from ringbalance.controller.liquid_ring.devices import Spread
-from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns, run_noise
+from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
 from ringbalance.controller.simulation import Simulation
@@ -50,6 +50,7 @@ from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUs
 from ringbalance.results.requirements import AT_LEAST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
+from ringbalance.scene.draws import run_noise
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.paths import with_values_at

@@ -14,7 +14,6 @@ from matplotlib.patches import Circle, Rectangle
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
-from ringbalance.controller.eccentric_mass.requirements import DRAWS
 from ringbalance.reports import summary
 from ringbalance.reports.figure import INK, MUTED, Drawing, draw, line, panels
 from ringbalance.reports.pages import measured
@@ -37,7 +36,7 @@ _POLE_ROOM, _NEAR, _WHOLE = 0.75, 0.02, 1.12
 
 
 def _summary(_own: Record, evidence: Record) -> Record:
-    return {**requirements_view(evidence), "draws": DRAWS}
+    return {**requirements_view(evidence), "draws": evidence["drawn"]["runs"]}
 
 
 def _run(_own: Record, evidence: Record) -> Record:

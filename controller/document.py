@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text, line_warning
 from ringbalance.reduced_model.injection.dynamics import Event, gives_forces
@@ -42,6 +43,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "status": simulation.status,
         "limit_m": simulation.limit,
         "hold_time_s": simulation.hold_time,
+        "further_time_s": FURTHER,
         "loop_factor": simulation.loop.value,
         "loop_factor_limit": simulation.loop.limit,
         "largest_staying_loop_factor": simulation.loop.largest_staying,

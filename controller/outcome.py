@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.algorithms.built_in import BELOW_MINIMUM, NO_SAMPLE
+from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.liquid_ring.plant import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,
@@ -172,6 +173,8 @@ def _numbers(facts: Facts) -> dict[str, Value]:
         "time": float(facts.run["time"]),
         "time_limit": run.time_limit,
         "hold_time": settings.hold_time,
+        "further": FURTHER,
+        "lost": int(facts.run["lost"]),
         "settling_time": facts.settling_time,
         "since": float(facts.run["since"]),
         "loop_factor": facts.loop.value,

@@ -33,9 +33,10 @@ _GENTLE: Final = 0.1
 _SAME_FILL: Final = 1e-8
 """Error of a fill, of which the last step leaves a hundredth."""
 _ROUNDING: Final = 1e-12
-_SCAN: Final = 17
-_REFINEMENTS: Final = 6
-"""Of a scan, each to a sixteenth: 1e-8 of a fill is left."""
+_SCANS: Final = 17, 6
+"""Places of a scan, and number of finer ones: 1e-8 of a fill is left."""
+_SCANS_OF_ONE: Final = 257, 2
+"""The same of a single row, for which few calls cost least."""
 Drawn = Callable[[IntArray, FloatArray], FloatArray]
 """Fill down to which the flow at a fill draws gas, of some rows."""
 
@@ -99,7 +100,11 @@ def _fixed_point(drawn_by: Drawn, top: FloatArray, covered: FloatArray, *, start
 
 
 def first_stalled(
-    moves: Callable[[IntArray, FloatArray], BoolArray], *, start: FloatArray, end: FloatArray
+    moves: Callable[[IntArray, FloatArray], BoolArray],
+    *,
+    start: FloatArray,
+    end: FloatArray,
+    scans: tuple[int, int] = _SCANS,
 ) -> FloatArray:
     """Fill from `start` down to `end` at which liquid first stops moving; NaN where it moves at all.
 
@@ -107,8 +112,10 @@ def first_stalled(
     Args: `moves`: of some rows, whether liquid moves at fills of shape (k, rows).
     """
 
+    places, refinements = scans
+
     def scan(rows: IntArray, start: FloatArray, end: FloatArray) -> BoolArray:
-        return moves(rows, start + np.linspace(0.0, 1.0, _SCAN)[:, None] * (end - start))
+        return moves(rows, start + np.linspace(0.0, 1.0, places)[:, None] * (end - start))
 
     moved = scan(np.arange(start.size), start, end)
     stops, first = ~moved.all(axis=0), np.argmin(moved, axis=0)
@@ -117,11 +124,11 @@ def first_stalled(
     if rows.size == 0:
         return stalled
     start, end, first = start[rows], end[rows], first[rows]
-    for _ in range(_REFINEMENTS):
-        step = (end - start) / (_SCAN - 1)
+    for _ in range(refinements):
+        step = (end - start) / (places - 1)
         start, end = start + (first - 1) * step, start + first * step
         first = np.argmin(scan(rows, start, end), axis=0)
-        first = np.where(first == 0, _SCAN - 1, first)
+        first = np.where(first == 0, places - 1, first)
     stalled[rows] = end
     return stalled
 
@@ -273,7 +280,7 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float) -> fl
 
     lowest = max(0.0, total - law.max_fill_ratio)
     end = np.array([max(lowest, NEARLY_EMPTY * total)])
-    stalled = float(first_stalled(moves, start=np.array([total / 2]), end=end)[0])
+    stalled = float(first_stalled(moves, start=np.array([total / 2]), end=end, scans=_SCANS_OF_ONE)[0])
     return lowest if math.isnan(stalled) else stalled
 
 

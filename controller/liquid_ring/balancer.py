@@ -180,10 +180,10 @@ class LiquidRingBalancer:
 
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> TracedRun:
         drawn: dict[str, Any] = {"controller": self.controller}
-        model = self.model
+        model, moment = self.model, 1.0
         if devices:
             device = self._drawn_runs.device(number)
-            model, scene = device.model, device.under(scene, of=self.scene)
+            model, scene, moment = device.model, device.under(scene, of=self.scene), device.moment
             drawn = {
                 "controller": self.controller or controller_of(scene, self.model),
                 "speed": device.speed,
@@ -208,8 +208,8 @@ class LiquidRingBalancer:
             energy=run.gas.energy,
             worst_amplitude=float(np.max(run.amplitude)),
             ended=run.outcome.value,
-            usable_moment=run.usable_moment,
-            unbalance=abs(scene.rotor.initial_unbalance),
+            usable_moment=moment * run.usable_moment,
+            unbalance=moment * abs(scene.rotor.initial_unbalance),
         )
 
     def rotor(self) -> CommonRotor:

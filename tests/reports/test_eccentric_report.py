@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 from check_traces import traces, untrue
 
-from ringbalance.controller.eccentric_mass import requirements
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports.evidence import parameters
@@ -22,7 +21,7 @@ from ringbalance.scene import bundled_scene, load_scene
 
 Record = dict[str, Any]
 UNCERTAIN = ("rotor.stiffness", "imbalance.mass", "masses.friction_arm")
-"""Inputs that the pages name: each is run at both ends of its interval."""
+"""Inputs that the pages name."""
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +43,8 @@ def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> P
     with pytest.MonkeyPatch.context() as patch:
         # The claims of its paper have tests of their own, and so have the intervals of the study.
         patch.setattr(evidence_module, "load_cases", tuple)
-        patch.setattr(requirements, "DRAWS", 5)
+        patch.setattr(evidence_module, "FEWEST", 4)
+        patch.setattr(evidence_module, "MOST", 4)
         write_report(scene, out, scene_text='name = "small"\n')
     return out
 
@@ -114,24 +114,6 @@ def test_a_result_that_not_all_drawn_runs_come_to_reads_as_one_sentence(evidence
     assert "none: of the runs with drawn inputs 38\u202f% get there, the others never do" in page
     assert "none: with an input at the end of its own interval the run never gets there" in page
     assert "Of the runs with inputs drawn from their uncertainty 38\u202f% settle." in page
-
-
-@pytest.mark.usefixtures("unwritten")
-def test_what_a_requirement_depends_on_is_named_with_what_to_do(evidence: Record) -> None:
-    changed = json.loads(json.dumps(evidence))
-    row = changed["requirements"][1]
-    row["effects"] = {
-        "rotor.mass": [1e-9, 0.0],
-        "rotor.damping": [5e-7, 0.0],
-        "motor.resistance": [1e-12, 0.0],
-    }
-    row.update(verdict="undecided", lost=[], achieved_interval=[0.0, 6e-7])
-    changed["requirements"] = [row]
-    page = re.sub(r"<[^>]*>", "", render(changed)["report.html"])
-    assert "up to 0.600\u202fµm" in page
-    assert "Determine more closely: damping of the rotor." in page
-    assert "limit of the supervisor" in page
-    assert ">supervisor.limit<" not in page
 
 
 def test_no_value_is_empty(scene: EccentricScene) -> None:

@@ -15,6 +15,7 @@ from typing import Any, Final, Protocol, Self
 import numpy as np
 
 from ringbalance.controller.common_rotor import CommonRotor
+from ringbalance.controller.trials import Trials
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
 from ringbalance.results.result import Rows
@@ -213,7 +214,7 @@ class _Recommendation(Protocol):
 
     @property
     def succeeded(self) -> bool:
-        """Whether 95 % of the runs settle."""
+        """Whether what the scene requires is met."""
         ...
 
     def rows(self) -> Rows:
@@ -288,6 +289,10 @@ class Balancer(Protocol):
         """What is asked of every device: first that it settles in time, then what else the scene states."""
         ...
 
+    def trials(self) -> tuple[Trials, ...]:
+        """Settings to try, of the scene's kind of controller first; empty: there are none."""
+        ...
+
     def remedies(self) -> tuple[Remedy, ...]:
         """Changes of the scene to try where too few devices meet its demands, each by itself."""
         ...
@@ -315,8 +320,14 @@ class Balancer(Protocol):
         """With the settings that its formulas recommend, and those that this changed, SI; no run is made."""
         ...
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> _Recommendation:
-        """Settings, judged by runs over the draws."""
+    def recommend(
+        self, *, pressure: bool = False, progress: Callable[[str], None] | None = None
+    ) -> _Recommendation:
+        """Settings, judged by runs over the draws.
+
+        Args: `pressure`: whether what `Trials.along` names, such as the supply's pressure, is searched even
+            where the scene's own suffices.
+        """
         ...
 
     def quantities(self) -> tuple[Quantity, ...]:

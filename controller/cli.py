@@ -7,8 +7,10 @@ from pathlib import Path
 
 from ringbalance.controller.balancer import balancer_of, balancer_under, takes
 from ringbalance.controller.compare import compare as compare_balancers
+from ringbalance.scene.changes import file_text
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, with_tolerance
+from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.terminal import activity, results_console
 
 
@@ -17,28 +19,39 @@ def tune(
     *,
     law: str = "calibrated",
     json: bool = False,
+    pressure: bool = False,
+    save: Path | None = None,
     tolerance: str | None = None,
     models: Models | None = None,
 ) -> int:
-    """Recommend the settings of a balancer's controller, and how long it takes to settle under them.
+    """Recommend settings of a balancer's controller, by runs of what the scene's device may be.
 
     Args:
         scene: the scene file.
         law: of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.
         json: print one JSON document instead of tables.
+        pressure: search the gas pressure of a liquid ring even where the scene's meets what is required.
+        save: write the scene with the recommended settings.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
         models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
-        Exit code: 0 what is recommended settles 95 % of the runs; 1 otherwise; the result is printed either
-        way.
+        Exit code: 0 the scene's requirements are met with what is recommended; 1 otherwise; the result is
+        printed either way.
 
     Raises:
         SceneError: a scene or a law that cannot be used.
+        OSError: a file that cannot be written.
     """
+    if save is not None:
+        if save.resolve() == scene.resolve():
+            raise OSError(f"{save} is the scene itself; choose another file")
+        check_file(save)
     balancer = balancer_under(law, with_tolerance(load_scene(scene), tolerance=tolerance, models=models))
     with activity("tune", "runs ...") as shown:
-        found = balancer.recommend(progress=shown.show)
+        found = balancer.recommend(pressure=pressure, progress=shown.show)
+    if save is not None:
+        write_whole(save, file_text(found.recommended_scene, to=save.parent))
     if json:
         print(json_format.dumps(found.to_dict(), allow_nan=False))
     else:

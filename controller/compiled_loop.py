@@ -52,7 +52,7 @@ from ringbalance.scene.platform.compiled import in_place
 def continue_runs(
     loop: Record,
     plant: Record,
-    assumed: Record | None,
+    assumed: Record,
     runs: Record,
     motions: Record,
     liquid: Record,
@@ -67,8 +67,7 @@ def continue_runs(
 
     Args:
         loop: of type `LOOP`. plant: of type `PLANT`; it is given each run's gas line.
-        assumed: the same as the law-based algorithm has it; None for the others, whose loop is then compiled
-            without it, in half the time.
+        assumed: the same as the law-based algorithm has it; the others do not look at it.
         runs: of type `RUN`, shape (n,), changed.
         motions, liquid: of type `MOTION`, shape (n, pairs), (n, pairs or 0): the pairs as they are and, with
             one more, as the law-based algorithm believes them to be.
@@ -137,7 +136,7 @@ def _sense(loop: Record, run: Record, amplitude_noise: float, phase_noise: float
 
 @in_place
 def _decide(
-    loop: Record, assumed: Record | None, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
+    loop: Record, assumed: Record, run: Record, liquid: Record, notes: FloatArray, w: FloatArray
 ) -> None:
     """One step of the algorithm on what the sensor shows."""
     half, opened = loop.chambers // 2, False
@@ -147,22 +146,15 @@ def _decide(
     if run.usable < (NO_PHASE if loop.algorithm == TRIAL else USABLE):
         run.reason = UNUSABLE
         return
-    if assumed is None:
-        _simple_step(loop, run)
+    if loop.algorithm == TARGET_VECTOR:
+        target_vector_step(loop, run)
+    elif loop.algorithm == TRIAL:
+        trial_step(loop, run)
     else:
         law_based_step(loop, assumed, run, liquid, notes, w)
     for i in range(half):
         opened = opened or run.asked[i] > 0.0
     run.reason = 0 if opened or run.resting > 0 else TOO_SHORT
-
-
-@in_place
-def _simple_step(loop: Record, run: Record) -> None:
-    """A step of an algorithm that follows no liquid."""
-    if loop.algorithm == TARGET_VECTOR:
-        target_vector_step(loop, run)
-    elif loop.algorithm == TRIAL:
-        trial_step(loop, run)
 
 
 @in_place

@@ -13,6 +13,7 @@ from ringbalance.controller.algorithms.algorithm import Command, Controller, Mea
 from ringbalance.controller.algorithms.built_in import BuiltIn, command_of, show
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import command_document, simulation_rows
+from ringbalance.controller.liquid_ring.loop_factor import loop_factor
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_plan import CHUNK, LoopPlan, RunsInHand, Trace, joined
 from ringbalance.controller.loop_records import NONE
@@ -20,7 +21,6 @@ from ringbalance.controller.outcome import Facts, run_findings
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.controller.terms import check_fit, check_settings, dynamics_of, run_models, terms_modelled
-from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR
 from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw, Regime

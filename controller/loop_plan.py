@@ -75,8 +75,8 @@ class LoopPlan:
     """Type `LOOP`, shape (1,)."""
     plant: Records
     """Type `PLANT`, shape (1,)."""
-    assumed: Records | None
-    """The same as the law-based algorithm has it; None for the others."""
+    assumed: Records
+    """The same as the law-based algorithm has it; the others do not look at it."""
     memory: Records
     """Type `RUN`, shape (1,), with what the algorithm remembers at the start."""
     liquid: Records
@@ -124,7 +124,7 @@ class LoopPlan:
         loop["rises_tolerated"], loop["most_samples"] = controller.rises_tolerated, most_samples
         loop["sensed"], loop["to_time_limit"] = sensed or not built_in, to_time_limit
         loop["exact"] = not sensed and scene.sensor.amplitude_noise == scene.sensor.phase_noise == 0
-        assumed = controller.plant.copy() if isinstance(controller, LawBased) else None
+        assumed = controller.plant.copy() if isinstance(controller, LawBased) else plant
         liquid = controller.liquid() if isinstance(controller, BuiltIn) else np.zeros(0, dtype=MOTION)
         return cls(loop=loop, plant=plant, assumed=assumed, memory=memory, liquid=liquid)
 
@@ -179,7 +179,7 @@ class RunsInHand:
         continue_runs(
             plan.loop[0],
             self._plant[0],
-            None if plan.assumed is None else plan.assumed[0],
+            plan.assumed[0],
             self.runs,
             self._motions,
             self._liquid,

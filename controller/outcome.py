@@ -12,6 +12,7 @@ import numpy as np
 
 from ringbalance.controller.algorithms.built_in import BELOW_MINIMUM, NO_SAMPLE
 from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.liquid_ring.loop_factor import STAYING_DEVIATIONS, LoopFactor
 from ringbalance.controller.liquid_ring.plant import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,
@@ -22,7 +23,6 @@ from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISIN
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.simulation import NOISE_DEVIATIONS, Injection, Outcome, Sample, noise_floor
 from ringbalance.controller.tuning.dead_time import standing_finding
-from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS, LoopFactor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.reduced_model.residual_liquid import Holding

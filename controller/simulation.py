@@ -10,9 +10,9 @@ from functools import cached_property
 from typing import Final
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
+from ringbalance.controller.liquid_ring.loop_factor import LoopFactor
 from ringbalance.controller.liquid_ring.plant import NEAR_RESIDUAL
 from ringbalance.controller.loop_records import NOTICEABLE
-from ringbalance.controller.tuning.loop_factor import LoopFactor
 from ringbalance.physics.gas import GasLine, compression_work, normal_volume, nozzle_flow
 from ringbalance.physics.results import Status
 from ringbalance.reduced_model.chamber.contributions import chamber_status

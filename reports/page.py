@@ -155,6 +155,7 @@ def _frame(evidence: Record, sections: list[Record]) -> Record:
         "named": partial(named_with_origin, evidence),
         "unstated": UNSTATED,
         "scene": evidence["scene"],
+        "papers": summary.is_papers(evidence),
         "sections": sections,
         "stamp": _stamp(evidence),
         "running_head": _running_head(evidence),

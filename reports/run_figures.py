@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
-from matplotlib.ticker import FuncFormatter
-from numpy.typing import ArrayLike
 
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.eccentric_mass.plant import rotor_record
@@ -21,7 +19,6 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reports.figure import (
     AMPLITUDE,
-    AS_PAPER,
     FOUND,
     GRID,
     INK,
@@ -30,13 +27,11 @@ from ringbalance.reports.figure import (
     SURFACE,
     THIRD,
     TIME,
-    Axis,
     Drawing,
     Paint,
     amplitudes,
     curve,
     draw,
-    level,
     line,
     logarithmic,
     nice_span,
@@ -44,25 +39,20 @@ from ringbalance.reports.figure import (
     panels,
     plain_number,
 )
+from ringbalance.reports.mass_figures import (
+    friction_estimates,
+    imbalance_estimate,
+    mass_angles,
+    over_time,
+    run_up,
+)
 from ringbalance.reports.section import Record
-from ringbalance.results.numbers import number
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.origins import SceneFile
 
-DEVIATIONS: Final = 2.0
-"""Half-width of a band: a normal error is within it with 95 %."""
-_COLOURS: Final = (FOUND, THIRD)
-_LOCKED: Final = {**AS_PAPER, "linewidth": 1.2, "label": "masses locked"}
-_BALANCED: Final = {"color": FOUND, "linewidth": 1.2, "label": "balanced"}
-_LIMIT: Final = {"color": MUTED, "linewidth": 1, "linestyle": ":", "label": "limit"}
-_SHORTEST: Final = 0.09
-"""Fraction of the time axis that the name of a stage needs."""
 _MICROMETRE: Final = 1e6
-_MILLIMETRE: Final = 1e3
-RPM: Final = 30 / math.pi
-_LAG_TOP: Final = 300
-"""Lag, deg, above which an angle is a lead."""
-_ACROSS: Final = ("data", "axes fraction")
+_NUMBERED, _APART, _SEEN = 12, 0.09, 0.02
+"""Samples that are numbered, how far they must stand apart over the picture's half width, and the least lag
+angle that is drawn, rad."""
 _LABEL_ANGLES: Final = (-90, -75, -105, -60, -120, -45, -135)
 """Where the label of a ring may stand, deg; the first of equals is taken."""
 
@@ -160,10 +150,11 @@ def _valve_open_times(run: Record) -> Drawing:
 
 
 def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
-    """Residual vibration as a vector over a run, with the limit's circle and what the disc can cancel.
+    """Residual vibration as a vector over a run, with the limit's circle and what the disc can cancel; the
+    first samples of the controller numbered.
 
     Args: `run`: a simulation document. `reach`: of a pair alone, `vibration_m`, and of the first pair,
-    `direction_rad` as vibration, with the number of `pairs`; None: not shown.
+    `direction_rad` as vibration, minus the lag angle, with the number of `pairs`; None: not shown.
     """
     vector = np.asarray(run["amplitude_m"]) * np.exp(1j * np.asarray(run["phase_rad"])) * _MICROMETRE
     limit = run["limit_m"] * _MICROMETRE
@@ -177,6 +168,9 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
         for panel, span, title in ((far, whole, "whole run"), (near, close, "near the limit")):
             _residual(panel, vector, limit, span, ends)
             panel.set_title(title, loc="left", fontsize="medium", color=INK)
+        _number_samples(far, run, whole)
+        if reach is not None:
+            _lag(far, vector[0], -reach["direction_rad"], whole)
         near.text(-0.98 * close, -0.98 * close, "circle: limit", color=PAPER)
         if ends.size:
             closed, corner = np.append(ends, ends[0]), -0.98 * whole
@@ -184,6 +178,35 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
             far.text(corner, corner, "dashed: what the disc can cancel", color=THIRD)
 
     return draw("residual-polar", paint, columns=0, wide=True, height=3.7)
+
+
+def _number_samples(panel: Axes, run: Record, span: float) -> None:
+    """Of the first samples of the controller their numbers, from one on, where they stand apart."""
+    times = run.get("samples", {"time_s": []})["time_s"][:_NUMBERED]
+    if not times:
+        return
+    phases = np.unwrap(np.asarray(run["phase_rad"]))
+    sizes = _MICROMETRE * np.interp(times, run["time_s"], run["amplitude_m"])
+    places = sizes * np.exp(1j * np.interp(times, run["time_s"], phases))
+    taken: list[complex] = []
+    for place, at in enumerate(places.tolist(), start=1):
+        panel.plot(at.real, at.imag, ".", color=FOUND, markersize=5)
+        if all(abs(at - other) > _APART * span for other in taken):
+            note(str(place), (at.real, at.imag), (5, 3), color=FOUND)(panel)
+            taken.append(at)
+
+
+def _lag(panel: Axes, start: complex, lag: float, span: float) -> None:
+    """The way that the unbalance points, ahead of the vibration by the lag angle, with that angle."""
+    phase = float(np.angle(start))
+    heavy = np.exp(1j * (phase + lag)) * span
+    panel.plot([0, heavy.real], [0, heavy.imag], color=MUTED, linewidth=1, linestyle=(0, (6, 2, 1, 2)))
+    if abs(lag) > _SEEN:
+        arc = 0.3 * span * np.exp(1j * (phase + lag * np.linspace(0, 1, 30)))
+        panel.plot(arc.real, arc.imag, color=MUTED, linewidth=1)
+    text = f"unbalance, lag {plain_number(round(math.degrees(lag), 1))}°"
+    aligned = "right" if heavy.real > 0 else "left"
+    panel.text(0.8 * heavy.real, 0.8 * heavy.imag, text, color=MUTED, ha=aligned, va="bottom")
 
 
 def _reachable(length: float, direction: float, pairs: int) -> Any:
@@ -225,145 +248,3 @@ def _clearest(ring: float, vector: Any, ends: Any) -> complex:
     places = ring * np.exp(1j * np.radians(_LABEL_ANGLES))
     gaps = np.abs(places[:, None] - np.concatenate([vector, sides])).min(axis=1)
     return complex(places[int(np.argmax(gaps))])
-
-
-def over_time(run: Record, locked: Record) -> Drawing:
-    """Vibration amplitude over time, m, balanced and with the masses locked, with the limit."""
-    pairs = ((locked, _LOCKED), (run, _BALANCED))
-    return draw(
-        "eccentric-amplitude",
-        amplitudes([(each["time_s"], each["amplitude_m"], look) for each, look in pairs], run["limit_m"]),
-        lambda axes: _shade_stages(axes, run),
-        x=TIME,
-        y=AMPLITUDE,
-        xlim=(run["time_s"][0], run["time_s"][-1]),
-        columns=3,
-        wide=True,
-        height=3.2,
-    )
-
-
-def _shade_stages(axes: Axes, run: Record) -> None:
-    span = run["time_s"][-1] - run["time_s"][0]
-    for place, stage in enumerate(run["stages"]):
-        start, end = stage["start_s"], stage["end_s"]
-        if place % 2 == 0:
-            axes.axvspan(start, end, color=MUTED, alpha=0.12, linewidth=0)
-        if end - start > _SHORTEST * span:
-            name = stage["name"].replace("_", " ")
-            note(name, (start, 1), (3, -3), xycoords=_ACROSS, va="top")(axes)
-
-
-def run_up(run: Record, locked: Record, rotor: Record) -> Drawing:
-    """Bode plot of a run-up: vibration amplitude over speed, balanced and with the masses locked, and below
-    it the lag of the locked rotor behind its unbalance, with the critical speed.
-
-    Args: `rotor`: its `critical_speed_rad_s`, `amplification_factor` (None: none is defined), and
-    `locked_phase_rad`, the phase of what the locked masses leave of the unbalance.
-    """
-    speeds = [RPM * np.asarray(each["speed_rad_s"]) for each in (locked, run)]
-    lag = np.degrees((rotor["locked_phase_rad"] - np.asarray(locked["phase_rad"])) % math.tau)
-    # What lies a little before the unbalance is drawn there, not a turn later.
-    lag = np.where(lag > _LAG_TOP, lag - 360, lag)
-    critical, factor = RPM * rotor["critical_speed_rad_s"], rotor["amplification_factor"]
-    ends = min(speeds[1].min(), critical), max(speeds[1].max(), critical)
-
-    def paint(axes: Axes) -> None:
-        top, below = panels(axes, (0.09, 0.42, 0.89, 0.49), (0.09, 0.11, 0.89, 0.27))
-        values = [_MILLIMETRE * np.asarray(each["amplitude_m"]) for each in (locked, run)]
-        curves = zip(speeds, values, (_LOCKED, _BALANCED), strict=True)
-        amplitudes(curves, _MILLIMETRE * run["limit_m"])(top)
-        below.plot(speeds[0], lag, **_LOCKED)
-        for panel in (top, below):
-            panel.axvline(critical, color=INK, linewidth=0.9, linestyle=(0, (6, 2, 1, 2)))
-            panel.set_xlim(*ends)
-            panel.xaxis.set_major_formatter(FuncFormatter(plain_number))
-        top.tick_params(labelbottom=False)
-        top.set_ylabel("zero to peak in mm")
-        below.set(ylim=(-30, 210), yticks=(0, 90, 180), ylabel="lag in °", xlabel="speed in rpm")
-        text = f"critical speed {number(critical, digits=3)} rpm"
-        text += f", amplification factor {number(factor, digits=2)}" if factor else ""
-        side = "right" if critical > sum(ends) / 2 else "left"
-        note(text, (critical, 0.0), (-4 if side == "right" else 4, 4), xycoords=_ACROSS, ha=side)(top)
-        for look in (_LOCKED, _BALANCED, _LIMIT):
-            axes.plot([], [], **look)
-
-    return draw("eccentric-run-up", paint, columns=3, wide=True, height=4.4)
-
-
-def mass_angles(run: Record) -> Drawing:
-    """Angles of both masses and their goals over time, degrees, until shortly after balancing."""
-    early, time = _early(run)
-    angles, goals = (np.degrees(run[key])[:, early] for key in ("mass_angle_rad", "goal_rad"))
-    return draw(
-        "eccentric-angles",
-        *(
-            paint
-            for index, colour in enumerate(_COLOURS)
-            for paint in (
-                curve(time, angles[index], f"mass {index + 1}", color=colour),
-                curve(time, goals[index], f"goal {index + 1}", color=colour, linewidth=1, linestyle=":"),
-            )
-        ),
-        x=TIME,
-        y=("angle", "°"),
-        xlim=(0, _until(run)),
-        columns=4,
-    )
-
-
-def imbalance_estimate(run: Record, true: float) -> Drawing:
-    """Magnitude of the estimated imbalance over time, kg m, with its 95 % band and the true one."""
-    vector = np.asarray(run["estimates"]["imbalance_kg_m"])
-    covariance = np.asarray(run["estimates"]["imbalance_covariance"])
-    size = np.hypot(*vector)
-    along = vector / np.where(size > 0, size, 1.0)
-    deviation = np.sqrt(np.maximum(np.einsum("in,nij,jn->n", along, covariance, along), 0.0))
-    return _estimate(run, "imbalance", ("imbalance", "kg m"), [size], [deviation], [true])
-
-
-def friction_estimates(run: Record, true: Sequence[float]) -> Drawing:
-    """Estimated friction arms over time, m, with their 95 % bands and the true ones."""
-    arms = np.asarray(run["estimates"]["friction_arm_m"])
-    deviations = np.sqrt(np.asarray(run["estimates"]["friction_variance"]))
-    return _estimate(run, "friction", ("friction arm", "m"), arms, deviations, true)
-
-
-def _estimate(
-    run: Record,
-    name: str,
-    shown: Axis,
-    values: Sequence[FloatArray] | FloatArray,
-    deviations: Sequence[FloatArray] | FloatArray,
-    true: Sequence[float],
-) -> Drawing:
-    early, time = _early(run)
-    paints: list[Paint] = []
-    for index, (value, deviation) in enumerate(zip(values, deviations, strict=True)):
-        colour, which = _COLOURS[index], f" {index + 1}" if len(true) > 1 else ""
-        band: ArrayLike = DEVIATIONS * deviation[early]
-        paints.append(curve(time, value[early], f"estimate{which}", band=band, color=colour))
-        paints.append(level(true[index], f"true{which}", color=colour, linewidth=1, linestyle=":"))
-    largest = max(*true, *(float(np.max(value[early])) for value in values), 0.0)
-    return draw(
-        f"eccentric-{name}",
-        *paints,
-        x=TIME,
-        y=shown,
-        xlim=(0, _until(run)),
-        ylim=(min(0.0, -0.1 * largest), 1.5 * largest or 1.0),
-        columns=4,
-    )
-
-
-def _early(run: Record) -> tuple[Any, FloatArray]:
-    """Which instants lie before `_until`, and their times, s."""
-    time = np.asarray(run["time_s"])
-    early = time <= _until(run)
-    return early, time[early]
-
-
-def _until(run: Record) -> float:
-    """Shortly after the last stage has begun, s."""
-    end, last = run["time_s"][-1], run["stages"][-1]["start_s"]
-    return float(min(end, 1.2 * last) if last > 0 else end) or 1.0

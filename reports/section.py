@@ -59,6 +59,8 @@ class Section:
     """In the contents."""
     place: Place = "annex"
     """Which of the two documents it stands in."""
+    of_paper: bool = False
+    """Whether it stands in the annex of every scene but the paper's own."""
     collect: Callable[[Work], Record | None] = _nothing
     """Plain numbers and texts for the evidence, under the section's name; None: nothing there."""
     apart: bool = False

@@ -13,6 +13,7 @@ from itertools import count
 from types import MappingProxyType
 from typing import Any, Final
 
+from ringbalance.reports import summary
 from ringbalance.reports.figure import Drawing
 from ringbalance.reports.pages import (
     chamber,
@@ -40,7 +41,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     CONDITIONS,
     operation.SECTION,
     loop.LOOP,
-    Section(name="claims", title="Claims of the liquid-ring paper", place="report"),
+    Section(name="claims", title="Claims of the liquid-ring paper", place="report", of_paper=True),
     CREDIBILITY,
     Section(name="parameters", title="Parameters and their origin", place="report"),
     DOCUMENT,
@@ -122,14 +123,14 @@ def section_views(evidence: Record) -> dict[str, Record | None]:
 
 def viewed(evidence: Record, views: Mapping[str, Record | None]) -> list[Record]:
     """The sections that have something to show by `section_views`, in order and numbered."""
-    counts = {"report": count(1), "annex": count(1)}
+    counts, own = {"report": count(1), "annex": count(1)}, summary.is_papers(evidence)
     return [
         {
             "name": s.name,
             "title": s.title,
             "template": s.file,
-            "place": s.place,
-            "number": f"{PREFIXES[s.place]}{next(counts[s.place])}",
+            "place": (place := "annex" if s.of_paper and not own else s.place),
+            "number": f"{PREFIXES[place]}{next(counts[place])}",
             "view": view,
         }
         for s in sections_of(evidence)

@@ -136,6 +136,12 @@ def elsewhere(case: Record, evidence: Record) -> bool:
     return bool(judged) and judged != evidence["scene"]["values_sha256"]
 
 
+def is_papers(evidence: Record) -> bool:
+    """Whether the scene is the one that its paper's claims are judged on."""
+    cases = claims(evidence, paper=evidence.get("balancer", "liquid_ring"))
+    return bool(cases) and not any(elsewhere(case, evidence) for case in cases)
+
+
 def tuning_of(evidence: Record) -> Record:
     """The tuning's document; empty where nothing was tuned."""
     return (evidence.get("summary") or {}).get("tuning") or {}

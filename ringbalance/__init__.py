@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from ringbalance.controller.eccentric_mass.run_record import EccentricRun as EccentricRun
     from ringbalance.controller.eccentric_mass.scene_records import EccentricScene as EccentricScene
     from ringbalance.controller.eccentric_mass.tuning import EccentricTuning as EccentricTuning
+    from ringbalance.controller.judging.tuning import Tuning as Tuning
     from ringbalance.controller.rotor import Sensor as Sensor
     from ringbalance.controller.simulation import Simulation as Simulation
-    from ringbalance.controller.tuning.result import Tuning as Tuning
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
@@ -82,7 +82,7 @@ _NAMES = {
     "controller.eccentric_mass.tuning": ("EccentricTuning",),
     "controller.rotor": ("Sensor",),
     "controller.simulation": ("Simulation",),
-    "controller.tuning.result": ("Tuning",),
+    "controller.judging.tuning": ("Tuning",),
     "face": (
         "compare",
         "simulate",

@@ -12,10 +12,10 @@ from ringbalance.controller.compare import compare as run_comparison
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.tuning import EccentricTuning
+from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.loop import Progress
 from ringbalance.controller.rotor import Sensor
 from ringbalance.controller.simulation import Simulation
-from ringbalance.controller.tuning.result import Tuning
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.scene import AnyScene, Scene
 from ringbalance.scene.changes import checked_scene
@@ -109,31 +109,45 @@ def compare(first: AnyScene, second: AnyScene) -> Comparison:
 
 @overload
 def tune(
-    scene: Scene, *, flow_law: GivesVelocities | None = None, progress: Callable[[str], None] | None = None
+    scene: Scene,
+    *,
+    flow_law: GivesVelocities | None = None,
+    pressure: bool = False,
+    progress: Callable[[str], None] | None = None,
 ) -> Tuning: ...
 
 
 @overload
 def tune(
-    scene: EccentricScene, *, flow_law: None = None, progress: Callable[[str], None] | None = None
+    scene: EccentricScene,
+    *,
+    flow_law: None = None,
+    pressure: bool = False,
+    progress: Callable[[str], None] | None = None,
 ) -> EccentricTuning: ...
 
 
 @overload
-def tune(scene: AnyScene, *, progress: Callable[[str], None] | None = None) -> Tuning | EccentricTuning: ...
+def tune(
+    scene: AnyScene, *, pressure: bool = False, progress: Callable[[str], None] | None = None
+) -> Tuning | EccentricTuning: ...
 
 
 def tune(
     scene: AnyScene,
     *,
     flow_law: GivesVelocities | None = None,
+    pressure: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Tuning | EccentricTuning:
-    """Recommend the controller's gain, with its margins and the settling times under it.
+    """Recommend settings of the controller, chosen by runs of drawn devices and judged on others.
 
-    Args: `flow_law`: as in `simulate`. `progress`: called with what is being done.
+    Args: `flow_law`: as in `simulate`. `pressure`: whether the gas pressure is searched even where that of
+        the scene meets what is required. `progress`: called with what is being done.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a flow law for eccentric masses.
     """
-    tuning = balancer_of(checked_scene(scene), flow_law=flow_law).recommend(progress=progress)
+    tuning = balancer_of(checked_scene(scene), flow_law=flow_law).recommend(
+        pressure=pressure, progress=progress
+    )
     return cast("Tuning | EccentricTuning", tuning)

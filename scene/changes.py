@@ -7,9 +7,11 @@ file, and nothing has checked it: `checked_scene` refuses it.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
@@ -103,6 +105,18 @@ def checked_scene(scene: SceneFile) -> AnyScene:
 def document_of(scene: SceneFile) -> Mapping[str, Any]:
     """The scene's document, as TOML has it. Raises: SceneError: a scene that was not read."""
     return _known(scene).document
+
+
+def file_text(scene: SceneFile, *, to: Path) -> bytes:
+    """The scene as a file in a folder, from which its mesh, if it names one, is found.
+
+    Raises: SceneError: a scene that was not read.
+    """
+    known = _known(scene)
+    document = deepcopy(dict(known.document))
+    if mesh := document.get("disc", {}).get("mesh"):
+        document["disc"]["mesh"] = Path(os.path.relpath(known.folder / mesh, to)).as_posix()
+    return toml_bytes(document)
 
 
 def _known(scene: SceneFile) -> CheckedValues:

@@ -16,9 +16,14 @@ _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d+)\])?")
 
 def value_at(scene: SceneFile, path: str) -> float:
     """One value."""
+    return float(raw_value_at(scene, path))
+
+
+def raw_value_at(scene: SceneFile, path: str) -> Any:
+    """One value as it is, a text, a whole list, or None."""
     table, key, entry = _placed(path)
     value = getattr(getattr(scene, table), key)
-    return float(value if entry is None else value[entry])
+    return value if entry is None else value[entry]
 
 
 def with_values_at(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:

@@ -137,6 +137,8 @@ class Quantity:
     """A claim's number, the idea behind it, or one reading of what the paper leaves open."""
     correction: str = ""
     """Named correction after which a claim's number is reproduced."""
+    against: str = ""
+    """Of a claim: what the number that it is compared with is, where the paper does not print it."""
 
 
 @dataclass(frozen=True, kw_only=True)

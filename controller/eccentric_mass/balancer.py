@@ -37,6 +37,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.tuning import EccentricTuning, tune_eccentric
+from ringbalance.controller.trials import Trials, scaled
 from ringbalance.results.requirements import AT_MOST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -47,6 +48,8 @@ _FINEST_SHARE: Final = 0.01
 """Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
 _SETTLED_WHIRL: Final = 12.0
 """Time constants of the free whirl after which a run with eccentric masses starts to balance."""
+_FACTORS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
+"""Times a gain."""
 _REACH: Final = 10.0
 """Factor up to which a gain is tried."""
 
@@ -152,6 +155,11 @@ class EccentricMassBalancer:
         )
         return settles, residual
 
+    def trials(self) -> tuple[Trials, ...]:
+        """See `Balancer`; masses settle by the gains of the scene or near them."""
+        values = {each.path: each.value for each in self.settings()}
+        return (scaled("eccentric_mass", values, _FACTORS, first=(1, 2)),)
+
     def remedies(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
         return ()
@@ -224,7 +232,12 @@ class EccentricMassBalancer:
         scene, changes = advised(self.scene)
         return EccentricMassBalancer(scene), changes
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> EccentricTuning:
+    def recommend(
+        self,
+        *,
+        pressure: bool = False,  # noqa: ARG002
+        progress: Callable[[str], None] | None = None,
+    ) -> EccentricTuning:
         """See `Balancer`."""
         return tune_eccentric(self.scene, told=progress)
 

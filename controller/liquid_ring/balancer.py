@@ -30,16 +30,19 @@ from ringbalance.controller.balancer import (
 )
 from ringbalance.controller.common_rotor import CommonRotor
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
+from ringbalance.controller.judging.tune import tuned
+from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.liquid_ring.devices import Spread
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
+from ringbalance.controller.liquid_ring.information import loop_information
+from ringbalance.controller.liquid_ring.trials import trials
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
+from ringbalance.controller.trials import Trials
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
-from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.search import recommended
-from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import gives_forces
@@ -53,6 +56,8 @@ from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.draws import run_noise
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.paths import with_values_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
 
@@ -168,15 +173,32 @@ class LiquidRingBalancer:
         )
         return settles, moment
 
+    def trials(self) -> tuple[Trials, ...]:
+        """Gain, integral time and a common offset of the valve-open times, and the gas pressure."""
+        return trials(self.scene, self.model, limit=self.limit)
+
     def remedies(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
         return ()
+
+    @property
+    def limit(self) -> float:
+        """Amplitude that may remain, m: the residual required, or what the grade leaves, else the
+        controller's limit.
+
+        Source: ISO 21940-11:2016 for the grade, U = G m/w.
+        """
+        wanted, rotor = self.scene.requirement, self.scene.rotor
+        asked = [] if wanted.residual is None else [wanted.residual]
+        if wanted.grade is not None and rotor.mass is not None:
+            asked.append(wanted.grade * rotor.mass / rotor.speed * rotor.influence_coefficient)
+        return min(asked, default=self.scene.controller.limit)
 
     @cached_property
     def _drawn_runs(self) -> DrawnRuns:
         remade = self.flow_law is None or self.flow_law == CALIBRATED
         spread = Spread.of(self.scene, self.model, remade=remade)
-        return DrawnRuns(scene=self.scene, model=self.model, spread=spread, limit=self.scene.controller.limit)
+        return DrawnRuns(scene=self.scene, model=self.model, spread=spread, limit=self.limit)
 
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> TracedRun:
         drawn: dict[str, Any] = {"controller": self.controller}
@@ -281,9 +303,13 @@ class LiquidRingBalancer:
         changes = _changes(self.scene.controller, best.scene.controller, chambers=self.scene.disc.chambers)
         return replace(self, scene=best.scene), changes
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> Tuning:
+    def recommend(self, *, pressure: bool = False, progress: Callable[[str], None] | None = None) -> Tuning:
         """See `Balancer`."""
-        return tune(self.scene, self.model, progress=progress)
+
+        def information(scene: SceneFile) -> Information:
+            return loop_information(liquid_ring_scene(scene), self.model)
+
+        return tuned(self, information=information, along=pressure, progress=progress)
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Those of its calibration; see `Balancer`."""

@@ -35,6 +35,9 @@ RELATIVE_ERROR: Final = 1e-4
 within 3e-5 without inertia."""
 MOST_SAMPLES: Final = 100_000
 """Of one run without a trace."""
+_OUT_OF_REACH: Final = 2.0
+"""Times the limit that remain with the liquid at its best, from which on a run is not carried out: none
+settles, and each would take its whole time limit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,6 +98,9 @@ class DrawnRuns:
         moments = MomentTable.of(model=device.model, total=2 * device.scene.disc.initial_fill)
         for _, some in _grouped(asked, lambda each: each.scene.gas.pressure):
             under = _Under.of(device.under(some[0].scene, of=self.scene), device, modelled=self.terms)
+            if under.unreachable > _OUT_OF_REACH * self.limit:
+                yield from ((each.place, _Ended.at_best(under, limit=self.limit)) for each in some)
+                continue
             for settings, alike in _grouped(
                 some, lambda each: replace(each.scene.controller, proportional=1)
             ):
@@ -194,6 +200,18 @@ class _Ended:
             usable_moment=under.usable_moment,
             unbalance=under.unbalance,
             code=str(Outcome.SETTLED if settled else _why(under, run, limit)),
+        )
+
+    @classmethod
+    def at_best(cls, under: _Under, *, limit: float) -> _Ended:
+        """With the liquid at its best, of a device that this does not bring to the limit."""
+        beyond = under.beyond_disc > limit
+        return cls(
+            final_amplitude=under.unreachable,
+            energy=math.nan,
+            usable_moment=under.usable_moment,
+            unbalance=under.unbalance,
+            code=str(Outcome.CAPACITY_EXCEEDED if beyond else Outcome.STALLED),
         )
 
 

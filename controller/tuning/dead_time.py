@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.liquid_ring.loop_factor import balanced_fills, vibration_rates
 from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
-from ringbalance.controller.tuning.loop_factor import balanced_fills, vibration_rates
 from ringbalance.reduced_model.gas_line import standing_amplitude
 from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.flow_law import BalancerModel

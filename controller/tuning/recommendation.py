@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.liquid_ring.loop_factor import LoopFactor, vibration_rates
 from ringbalance.controller.members import MemberUncertainty, starting_flow
-from ringbalance.controller.tuning.loop_factor import LoopFactor, vibration_rates
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ringbalance.controller.tuning.loop_factor import LoopFactor, Margins
+from ringbalance.controller.liquid_ring.loop_factor import LoopFactor, Margins
 from ringbalance.controller.tuning.recommendation import Contribution
 from ringbalance.controller.tuning.search import Search
 from ringbalance.controller.tuning.settling import SettlingTimes

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
+from ringbalance.controller.liquid_ring.loop_factor import loop_factor, with_driving_gas
 from ringbalance.controller.tuning.dead_time import compensated, dead_times, offset_text
-from ringbalance.controller.tuning.loop_factor import loop_factor, with_driving_gas
 from ringbalance.controller.tuning.recommendation import FactorUncertainty, recommended_gain
 from ringbalance.controller.tuning.settling import Progress, SettlingTimes, many_runs, tried
 from ringbalance.reduced_model.law.flow_law import BalancerModel

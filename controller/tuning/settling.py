@@ -11,11 +11,11 @@ import numpy as np
 
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
 from ringbalance.controller.ensemble import Probability, simulate_ensemble
+from ringbalance.controller.liquid_ring.loop_factor import usable_fill, with_driving_gas
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.members import Members, MemberUncertainty
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models, terms_modelled
-from ringbalance.controller.tuning.loop_factor import usable_fill, with_driving_gas
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import Holding, stalled_fill_ratio
 from ringbalance.results.rows import Finding, Quantity

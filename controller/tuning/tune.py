@@ -7,10 +7,7 @@ import math
 import numpy as np
 
 from ringbalance.controller.algorithms.by_name import controller_of, law_based_of
-from ringbalance.controller.liquid_ring.plant import BEYOND_CAPACITY, RUNS_BACK
-from ringbalance.controller.terms import check_settings, run_models
-from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
-from ringbalance.controller.tuning.loop_factor import (
+from ringbalance.controller.liquid_ring.loop_factor import (
     LoopFactor,
     Margins,
     loop_factor,
@@ -18,6 +15,9 @@ from ringbalance.controller.tuning.loop_factor import (
     vibration_rates,
     with_driving_gas,
 )
+from ringbalance.controller.liquid_ring.plant import BEYOND_CAPACITY, RUNS_BACK
+from ringbalance.controller.terms import check_settings, run_models
+from ringbalance.controller.tuning.dead_time import dead_times, dead_zone
 from ringbalance.controller.tuning.recommendation import FactorUncertainty, factor_uncertainty
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.search import (

@@ -109,12 +109,13 @@ def _quantity_row(quantity: Record, path: str) -> Record:
         return text if text == MISSING else traced(text, f"{path}.{key}")
 
     unit = quantity.get("unit") or "1"
-    own = quantity.get("value_uncertainty")
+    own, ends = quantity.get("value_uncertainty"), _range(quantity)
     half_width = quantity.get("uncertainty") if own is None else own
+    value = given(quantity.get("value"), unit, digits=2) if ends else _value(quantity, half_width)
     return {
         "name": quantity.get("title") or quantity["name"],
         "why": quantity.get("why") or "",
-        "value": marked("value", _value(quantity, half_width)),
+        "value": marked("value", value) + (f" ({ends})" if ends else ""),
         "reference": marked(
             "reference",
             shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
@@ -132,7 +133,7 @@ def _quantity_row(quantity: Record, path: str) -> Record:
 def _error(quantity: Record, unit: str) -> str:
     """To the second digit of its half-width, or to two digits of its own where those are fewer."""
     error, width = quantity.get("error"), quantity.get("uncertainty")
-    fine = error and width and width < _FINE * abs(error)
+    fine = error and width and (width < _FINE * abs(error) or _range(quantity))
     return shown(error, unit, None if fine else width, digits=2)
 
 
@@ -189,19 +190,32 @@ def _in_brief(case: Record) -> Record:
     """The deciding quantity in one line: what the paper has, what was found, the comparison's half-width."""
     quantity, path = _deciding_quantity(case), f"verification.{case['id']}.quantities"
     if quantity is None:
-        return dict.fromkeys(("paper", "found", "half_width"), MISSING) | {"what": ""}
+        empty = dict.fromkeys(("what", "against", "corrected"), "")
+        return dict.fromkeys(("paper", "found", "half_width"), MISSING) | empty
     unit, reference = quantity.get("unit") or "1", quantity.get("reference")
     path = f"{path}.{case['quantities'].index(quantity)}"
-    value_text = _brief_value(quantity)
+    value_text, corrected = _brief_value(quantity), quantity.get("corrected")
     paper = MISSING if reference is None else traced(given(reference, unit, digits=4), f"{path}.reference")
     if reference is None and quantity.get("value") is not None:
         paper = _criterion(quantity)
+    departs = quantity.get("verdict") == "confirmed with correction" and corrected is not None
     return {
         "paper": paper,
+        "against": _unprinted(case, quantity),
+        "corrected": traced(shown(corrected, unit), f"{path}.corrected") if departs else "",
         "found": value_text if quantity.get("value") is None else traced(value_text, f"{path}.value"),
         "half_width": _traced_width(quantity, path),
         "what": quantity.get("title") or "",
     }
+
+
+def _unprinted(case: Record, quantity: Record) -> str:
+    """What a claim is compared with where the paper does not print it; empty where it does."""
+    kind = (case.get("reference") or {}).get("kind")
+    if quantity.get("against") or kind == "printed number":
+        return str(quantity.get("against") or "")
+    bound = quantity.get("metric") in {"at_most", "at_least"}
+    return "criterion" if bound else {"printed formula": "by its formula"}.get(kind or "", kind or "")
 
 
 def _brief_value(quantity: Record) -> str:
@@ -228,17 +242,24 @@ def _width(quantity: Record) -> str:
     if value and half_width and half_width < (place := _last_place(value)) / 2:
         return f"<{THIN_SPACE}{given(place, quantity.get('unit') or '1', digits=1)}"
     display = display_unit(quantity.get("unit") or "1", value)
-    low, high = quantity.get("value_low"), quantity.get("value_high")
-    if value is not None and low is not None and high is not None:
-        sides = sorted((value - low, high - value))
-        if sides[1] > _LOPSIDED * sides[0] and sides[1] > 0.1 * abs(value):
-            # What is left of a numerical uncertainty about zero is zero.
-            least = _NOTHING * (high - low)
-            ends = (end * display.factor if abs(end) > least else 0.0 for end in (low, high))
-            return with_unit(" to ".join(number(end, digits=2) for end in ends), display.symbol)
-    return with_unit(
+    return _range(quantity) or with_unit(
         number(None if not half_width else half_width * display.factor, digits=2), display.symbol
     )
+
+
+def _range(quantity: Record) -> str:
+    """Both ends of a number's interval in its unit; empty where it is about as wide on both sides."""
+    value, low, high = (quantity.get(key) for key in ("value", "value_low", "value_high"))
+    if value is None or low is None or high is None:
+        return ""
+    sides = sorted((value - low, high - value))
+    if sides[1] <= _LOPSIDED * sides[0] or sides[1] <= 0.1 * abs(value):
+        return ""
+    display = display_unit(quantity.get("unit") or "1", value or max(map(abs, (low, high))))
+    # What is left of a numerical uncertainty about zero is zero.
+    least = _NOTHING * (high - low)
+    ends = (end * display.factor if abs(end) > least else 0.0 for end in (low, high))
+    return with_unit(" to ".join(number(end, digits=2) for end in ends), display.symbol)
 
 
 def _last_place(value: float) -> float:

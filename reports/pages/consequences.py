@@ -12,9 +12,9 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble import Ensemble, ensemble_dynamics, simulate_ensemble
+from ringbalance.controller.liquid_ring.loop_factor import loop_factor
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Simulation
-from ringbalance.controller.tuning.loop_factor import loop_factor
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.flow_law import BalancerModel

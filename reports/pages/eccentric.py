@@ -16,11 +16,7 @@ from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
 from ringbalance.reports import summary
 from ringbalance.reports.figure import INK, MUTED, Drawing, draw, line, panels
-from ringbalance.reports.pages import measured
-from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.plain import requirements_view
-from ringbalance.reports.pages.standing import CREDIBILITY, DOCUMENT
-from ringbalance.reports.run_figures import (
+from ringbalance.reports.mass_figures import (
     DEVIATIONS,
     friction_estimates,
     imbalance_estimate,
@@ -28,6 +24,10 @@ from ringbalance.reports.run_figures import (
     over_time,
     run_up,
 )
+from ringbalance.reports.pages import measured
+from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.pages.plain import requirements_view
+from ringbalance.reports.pages.standing import CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
@@ -141,6 +141,7 @@ SECTIONS: Final = (
         name="claims",
         title="Claims of the eccentric-mass paper",
         place="report",
+        of_paper=True,
         show=_claims,
         template="masses_claims.html",
     ),

@@ -32,9 +32,10 @@ from ringbalance.reports.figure import (
 )
 from ringbalance.reports.pages.consequences import find_consequences
 from ringbalance.reports.pages.first_page import RETUNED, place_of_run
+from ringbalance.reports.ring_figures import ring_frames, run_with_injections
 from ringbalance.reports.run_figures import early_time, fill_ratios, residual_polar
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.summary import runs_settled, tuning_of
+from ringbalance.reports.summary import is_papers, runs_settled, tuning_of
 from ringbalance.results.numbers import percent
 
 _GAINS: Final = {1: "with the scene’s gain", 2: "with the recommended settings"}
@@ -43,12 +44,6 @@ _LAWS: Final[dict[str, dict[str, Any]]] = {
     "calibrated": {"color": FOUND, "label": "the calibrated law"},
     "paper": {**AS_PAPER, "label": "the paper’s law"},
 }
-_SAME: Final = 1e-3
-"""Relative change of the amplitude that counts as none."""
-_CROPPED: Final = 0.7
-"""Fraction of a run up to which its rest is cut off, when nothing moves there."""
-_MARKED: Final = 20
-"""Samples that are marked: those at rest repeat one value."""
 _BINS: Final = 16
 _MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
 """Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""
@@ -66,16 +61,16 @@ def _reach(work: Work) -> Record:
 
 
 def _loop(own: Record, evidence: Record) -> Record:
-    runs, limit = evidence["closed_loop"], evidence["limit_m"]
+    runs, limit = _drawn_runs(evidence), evidence["limit_m"]
     run, tuning = runs.get("calibrated"), tuning_of(evidence)
-    longest, until = _still_from(runs)
+    disc = (evidence.get("operation") or {}).get("disc")
     samples = _samples(evidence) if own else []
     return {
         "retuned": place_of_run(evidence, RETUNED),
         "runs_settled": runs_settled(tuning) if tuning.get("fraction_settled") is not None else "",
-        "amplitude": _amplitude(runs, limit, until) if runs else None,
-        "longest": longest,
-        "laws": [name for name in _LAWS if name in runs],
+        "amplitude": run_with_injections(runs, _LAWS, limit) if runs else None,
+        "rings": ring_frames(run, disc) if run and disc else None,
+        "laws": list(runs),
         "polar": residual_polar(run, own) if run and own else None,
         "settling": _settling_histogram(samples) if samples else None,
         "samples": samples,
@@ -98,40 +93,10 @@ def _samples(evidence: Record) -> list[Record]:
     ]
 
 
-def _still_from(runs: Mapping[str, Record]) -> tuple[str, float]:
-    """Law of the longest run, where it ends with nothing moving, else empty; time up to which to draw, s."""
-    ends = {law: float(run["time_s"][-1]) for law, run in runs.items()}
-    longest = max(ends, key=lambda law: ends[law], default="")
-    last = max((_last_change(run) for run in runs.values()), default=0.0)
-    cropped = 0 < 1.5 * last < _CROPPED * ends.get(longest, 0.0)
-    return (longest, 1.5 * last) if cropped else ("", ends.get(longest, 1.0))
-
-
-def _last_change(run: Record) -> float:
-    """Time from which the amplitude of a run changes no more, s."""
-    values = np.asarray(run["amplitude_m"])
-    moving = np.flatnonzero(np.abs(values - values[-1]) > _SAME * values[-1])
-    return float(run["time_s"][moving[-1]]) if moving.size else 0.0
-
-
-def _amplitude(runs: Mapping[str, Record], limit: float, until: float) -> Drawing:
-    """Vibration amplitude at the controller's samples, m, under the laws that were run."""
-    marks = {"linewidth": 1.2, "marker": "o", "markersize": 3, "markevery": slice(0, _MARKED)}
-
-    def of(run: Record, look: dict[str, Any]) -> Curve:
-        time = run["samples"]["time_s"]
-        return time, np.interp(time, run["time_s"], run["amplitude_m"]), {**look, **marks}
-
-    return draw(
-        "amplitude",
-        amplitudes([of(runs[name], look) for name, look in _LAWS.items() if name in runs], limit),
-        x=TIME,
-        y=AMPLITUDE,
-        xlim=(0, until),
-        columns=3,
-        wide=True,
-        height=3.5,
-    )
+def _drawn_runs(evidence: Record) -> dict[str, Record]:
+    """By law, the calibrated one first; the paper's law is compared on the paper's own disc alone."""
+    runs = evidence["closed_loop"]
+    return {law: runs[law] for law in _LAWS if law in runs and (law != "paper" or is_papers(evidence))}
 
 
 def _settling_histogram(samples: list[Record]) -> Drawing:

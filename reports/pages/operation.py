@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, gaussian_filter
 
+from ringbalance.mesh.geometry import surface_radius
 from ringbalance.mesh.section import outlines
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Regime
@@ -35,6 +36,9 @@ from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.numbers import number
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.models import Scene
+from ringbalance.verification.assumptions import assumptions_of
+from ringbalance.verification.case import RestsOn
 
 _FILLS: Final = 101
 _PRESSURES: Final = 121
@@ -52,6 +56,15 @@ _SHADES: Final = {
     "reverse": (FOURTH, 0.26),
     "undecided": (PAPER, 0.22),
 }
+_HATCHED: Final[dict[str, Any]] = {
+    "facecolor": "none",
+    "edgecolor": PAPER,
+    "hatch": "////",
+    "linewidth": 0.8,
+}
+_CREST: Final = "tube.hump_radius"
+_SMOOTHED: Final = 1.0
+"""Standard deviation, in points of the map, over which its borders are smoothed."""
 _CLEARANCE: Final = 2.2
 """Cells between a regime's name and the edge of its area, at the least."""
 _LINE: Final = 0.035
@@ -91,9 +104,37 @@ def _collect(work: Work) -> Record:
             "gas_pressure_Pa": scene.gas.pressure,
             "regime": _NAMES[at],
         },
+        "crest": _crest(work, fill),
         "working_fill_ratio": [rest.fill_ratio, rest.largest_fill_ratio],
         "disc": _disc(work),
     }
+
+
+def _crest(work: Work, fill: FloatArray) -> Record | None:
+    """Range of the siphon crest's radius, assumed or stated, and the gas pressure that lifts the liquid of
+    each fill over either end of it; None without a crest, or where it is known.
+    """
+    scene, calibration = work.scene, work.calibration
+    ends = _crest_range(scene)
+    if ends is None:
+        return None
+    surface = surface_radius(disc=scene.disc, fill_ratio=fill)
+    head = 0.5 * scene.liquid.density * scene.rotor.speed**2 / calibration.flow_law.gas_factor
+    return {
+        "radius_m": list(ends),
+        "lifting_pressure_Pa": [np.maximum(head * (surface**2 - end**2), 0.0).tolist() for end in ends],
+    }
+
+
+def _crest_range(scene: Scene) -> tuple[float, float] | None:
+    (assumed,) = assumptions_of((RestsOn(path=_CREST, documented=True, why="see there"),), scene) or (None,)
+    if assumed is not None:
+        return assumed.low, assumed.high
+    width = next((each for each in scene.uncertainty if _CREST.endswith(each.quantity)), None)
+    if width is None or scene.tube.hump_radius is None:
+        return None
+    half = width.absolute(scene.tube.hump_radius)
+    return scene.tube.hump_radius - half, scene.tube.hump_radius + half
 
 
 def _disc(work: Work) -> Record:
@@ -146,16 +187,29 @@ def _operating_map(found: Record) -> Drawing:
             colour, strength = _SHADES[name]
             there = regime == index
             if not there.all() and there.any():
-                axes.contourf(fill, pressure, there, levels=[0.5, 1.5], colors=[colour], alpha=strength)
-                axes.contour(fill, pressure, there, levels=[0.5], colors=[MUTED], linewidths=0.7)
+                smooth = gaussian_filter(there.astype(float), _SMOOTHED)
+                axes.contourf(fill, pressure, smooth, levels=[0.5, 1.5], colors=[colour], alpha=strength)
+                axes.contour(fill, pressure, smooth, levels=[0.5], colors=[MUTED], linewidths=0.7)
         near = np.abs(pressure - gas)[:, None] < _LINE * (pressure[-1] - pressure[0])
         _name_areas(axes, fill, pressure, np.where(near, -1, regime), found["regimes"])
         axes.grid(visible=False)
+
+    def crest(axes: Axes) -> None:
+        if found.get("crest"):
+            low, high = found["crest"]["lifting_pressure_Pa"]
+            band: dict[str, Any] = {
+                "facecolor": "none",
+                "edgecolor": PAPER,
+                "hatch": "////",
+                "linewidth": 0.8,
+            }
+            axes.fill_between(fill, high, low, label="start of the flow, crest in its range", **band)
 
     working: dict[str, Any] = {"color": INK, "marker": "|", "linewidth": 2, "markersize": 9}
     return draw(
         "operating-map",
         areas,
+        crest,
         curve(found["working_fill_ratio"], [gas, gas], "working range", **working),
         curve(
             [point["fill_ratio"]], [gas], "operating point", color=INK, linestyle="", marker="o", markersize=6
@@ -164,6 +218,7 @@ def _operating_map(found: Record) -> Drawing:
         y=("gas pressure, gauge,", "Pa"),
         xlim=(fill[0], fill[-1]),
         ylim=(pressure[0], pressure[-1]),
+        columns=3,
         wide=True,
         height=3.6,
     )

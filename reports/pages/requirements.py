@@ -9,7 +9,7 @@ from typing import Final
 
 from matplotlib.axes import Axes
 
-from ringbalance.controller.tuning.loop_factor import STAYING_DEVIATIONS
+from ringbalance.controller.liquid_ring.loop_factor import STAYING_DEVIATIONS
 from ringbalance.reports.figure import FIFTH, INK, PAPER, THIRD, Drawing, draw
 from ringbalance.reports.prose import resting
 from ringbalance.reports.section import Record

@@ -18,7 +18,7 @@ import re
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache, cached_property
 from pathlib import Path
 from types import FrameType
@@ -26,7 +26,7 @@ from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import registry, sigutils, types
+from numba.core import compiler, registry, sigutils, types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import overload, register_jitable
 
@@ -36,6 +36,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _OPTIONS: Final[dict[str, Any]] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
+_FOR_COMPILED_CODE: Final[dict[str, Any]] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _PLAIN: Final = frozenset({"None", "bool", "int", "float", "complex", "tuple", "Pair"})
 """Names in the annotation of a result that numba makes without calling a Python function."""
 _MARK: Final = f"from {__name__} import".encode()
@@ -45,12 +46,8 @@ _MARK: Final = f"from {__name__} import".encode()
 _Dispatcher: Any = getattr(registry, "CPUDispatcher", object)
 _normalized: Any = sigutils.normalize_signature
 _unliteral: Any = types.unliteral
-_FINAL_STEPS: Final = (
-    "_optimize_final_module",
-    "_finalize_final_module",
-    "_finalize_dynamic_globals",
-    "_verify_declare_only_symbols",
-)
+_Flags: Any = compiler.Flags
+_FINAL_STEPS: Final = ("_linking_libraries", "_reload_init", "_finalize_dynamic_globals", "_finalized")
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -77,7 +74,9 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
 
 def both_ways(function: Callable[P, R]) -> Callable[P, R]:
     """A plain function for numbers and arrays, which compiled code may call with numbers."""
-    registered: Callable[P, R] = register_jitable(error_model="numpy", _nrt=False, forceinline=True)(function)
+    registered: Callable[P, R] = register_jitable(
+        error_model="numpy", _nrt=False, forceinline=True, **_FOR_COMPILED_CODE
+    )(function)
     return registered
 
 
@@ -122,9 +121,18 @@ class _Called(_Dispatcher):  # type: ignore[misc]
     its own: those of the outermost function hold them.  That saves a good part of the time.
     """
 
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        self._compiler._customize_flags = _Alike
+
+    def compile(self, sig: Any) -> Any:
+        """As numba's, but for code that another process is making now, which is waited for."""
+        with getattr(self._cache, "in_turn", nullcontext)():
+            return super().compile(sig)
+
     @cached_property
     def _inner(self) -> Any:
-        options = self.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        options = self.targetoptions | _FOR_COMPILED_CODE
         return _Inner(py_func=self.py_func, locals=self.locals, targetoptions=options)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
@@ -149,28 +157,54 @@ class _Inner(_Dispatcher):  # type: ignore[misc]
         if args not in self.overloads:
             with global_compiler_lock, self._compiling_counter:
                 found = self._compiler.compile(args, result)._replace(entry_point=_NoAddress())
-                _link_alone(found.library)
-                self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+                libraries = _left_to_callers(found.library)
+                self.targetctx.insert_user_function(found.entry_point, found.fndesc, libraries)
                 self.overloads[args] = found
         return self.overloads[args].entry_point
 
 
-def _link_alone(library: Any) -> None:
-    """Leave optimisation and machine code of a library to those that it is linked into, if numba lets us."""
+def _left_to_callers(library: Any) -> list[Any]:
+    """Leave linking, optimisation and machine code of a library to the outermost caller, if numba lets us.
+
+    Returns: The library with those that it needs, which each caller then needs as well: every one is linked
+    once, into the outermost, and not into each caller on the way.
+    """
     if not all(hasattr(library, name) for name in _FINAL_STEPS):
-        return
+        return [library]
+    needed = list(dict.fromkeys(library._linking_libraries))
 
     def finalize() -> None:
+        for each in needed:
+            library._reload_init.update(each._reload_init)
         library._finalize_dynamic_globals()
-        library._verify_declare_only_symbols()
         library._finalized = True
 
-    library._finalize_final_module = finalize
-    library._optimize_final_module = _nothing
+    library.finalize = finalize
+    return [library, *needed]
 
 
-def _nothing() -> None:
-    """Leaves a library as it is."""
+class _Alike(_Flags):  # type: ignore[misc]
+    """Flags of a function that are those of all functions here, for what numba compiles on their behalf.
+
+    It keeps what it has compiled (`min` of two numbers) by the caller's flags, which it compares at every
+    operator, all thirty; of these but the ones below reach what is called.
+    """
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return _HASH
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, _Flags) and _inherited(self) == _inherited(other))
+
+
+_HASH: Final = hash(_Flags())
+"""The same of all flags: of their names."""
+
+
+def _inherited(flags: Any) -> tuple[Any, ...]:
+    return flags.nrt, flags.error_model, flags.boundscheck, flags.fastmath
 
 
 class _NoAddress:
@@ -179,7 +213,7 @@ class _NoAddress:
 
 def _without_address(flags: Any) -> Any:
     flags.no_compile = True
-    return flags
+    return _Alike(flags)
 
 
 class _Guarded(_Called):

@@ -17,7 +17,7 @@ import shutil
 import stat
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Final
@@ -26,9 +26,19 @@ from numba.core import caching, serialize
 
 from ringbalance.scene.platform.files import cache_folder, write_whole
 
+try:
+    import fcntl
+except ImportError:
+    # Windows: two processes that need the same code both compile it.
+    fcntl = None  # type: ignore[assignment]
+
 CODE: Final = ".nbc"
 OTHER: Final = ".kept"
 """What another room keeps beside the code, and makes again without it."""
+_TURN: Final = ".turn"
+"""Empty, held by the process that compiles a function."""
+_LONGEST_TURN: Final = 60.0
+"""s, for which another process is waited for: several times what the longest function takes."""
 _LONGEST_KEPT: Final = 60 * 86400.0
 """s, after which a file is removed when another one is kept."""
 _SIZE: Final = hashlib.sha256().digest_size
@@ -146,6 +156,28 @@ class _Files:
         digest = hashlib.sha256(f"{self._known}{key}".encode()).hexdigest()[:16]
         return code_root() / f"{self._name}.{digest}{CODE}"
 
+    def turn(self) -> int | None:
+        """A descriptor that no other process has until it is closed; None where it cannot be had in time."""
+        if fcntl is None:
+            return None
+        try:
+            _make_private(code_root())
+            held = os.open(code_root() / f"{self._name}{_TURN}", os.O_RDWR | os.O_CREAT, 0o600)
+        except OSError:
+            return None
+        start = time.monotonic()
+        while time.monotonic() < start + _LONGEST_TURN:
+            try:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                time.sleep(0.05)
+            except OSError:
+                break
+            else:
+                return held
+        os.close(held)
+        return None
+
 
 class KeptCode(_NumbaCache):  # type: ignore[misc]
     """Numba's cache of one function, in the files described above."""
@@ -178,11 +210,29 @@ class KeptCode(_NumbaCache):  # type: ignore[misc]
         self._impl_class = Format
         super().__init__(function)
         self._cache_file = _Files(function, digest)
+        self._turn: int | None = None
+
+    @contextlib.contextmanager
+    def in_turn(self) -> Iterator[None]:
+        """Within, what `load_overload` does not find one process compiles, and the others wait for it."""
+        try:
+            yield
+        finally:
+            if self._turn is not None:
+                os.close(self._turn)
+                self._turn = None
 
     def load_overload(self, sig: object, target_context: object) -> object:
         """The compiled code of a signature, or None: it is then compiled."""
         if not trusted(code_root()):
             return None
+        kept = self._load(sig, target_context)
+        if kept is None and self._turn is None:
+            self._turn = self._cache_file.turn()
+            kept = self._load(sig, target_context)
+        return kept
+
+    def _load(self, sig: object, target_context: object) -> object:
         try:
             return super().load_overload(sig, target_context)
         except Exception:
@@ -202,7 +252,7 @@ class KeptCode(_NumbaCache):  # type: ignore[misc]
 @cache
 def _remove_old() -> None:
     """Remove once in a process what was kept long ago."""
-    for path in (*code_root().glob(f"*{CODE}"), *code_root().glob(f"*{OTHER}")):
+    for path in [path for kind in (CODE, OTHER, _TURN) for path in code_root().glob(f"*{kind}")]:
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > _LONGEST_KEPT:
                 path.unlink()

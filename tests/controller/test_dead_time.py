@@ -12,6 +12,7 @@ import pytest
 from ringbalance.controller.algorithms.algorithm import Measurement
 from ringbalance.controller.algorithms.by_name import law_based_of, target_vector_of
 from ringbalance.controller.ensemble import simulate_members
+from ringbalance.controller.liquid_ring.loop_factor import vibration_rates
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning import search
 from ringbalance.controller.tuning import tune as tune_module
@@ -22,7 +23,6 @@ from ringbalance.controller.tuning.dead_time import (
     offset_text,
     standing_finding,
 )
-from ringbalance.controller.tuning.loop_factor import vibration_rates
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.gas_line import line_answers, line_warning, standing_amplitude

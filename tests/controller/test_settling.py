@@ -13,11 +13,7 @@ import pytest
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.ensemble import member_noise, simulate_members
-from ringbalance.controller.loop import simulate
-from ringbalance.controller.rotor import disc_unbalance
-from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
-from ringbalance.controller.terms import dynamics_of
-from ringbalance.controller.tuning.loop_factor import (
+from ringbalance.controller.liquid_ring.loop_factor import (
     LoopFactor,
     _largest_staying,
     _stationary_deviation,
@@ -25,6 +21,10 @@ from ringbalance.controller.tuning.loop_factor import (
     loop_factor,
     vibration_rates,
 )
+from ringbalance.controller.loop import simulate
+from ringbalance.controller.rotor import disc_unbalance
+from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
+from ringbalance.controller.terms import dynamics_of
 from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.injection.pair import Motion, PairState, opened, pass_time
 from ringbalance.reduced_model.law.flow_law import BalancerModel

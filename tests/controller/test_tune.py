@@ -20,8 +20,8 @@ from ringbalance.controller.eccentric_mass.scene_records import (
     eccentric_scene,
 )
 from ringbalance.controller.eccentric_mass.tuning import FIRST_RUNS, tune_eccentric
+from ringbalance.controller.liquid_ring.loop_factor import loop_margins, vibration_rates
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.tuning.loop_factor import loop_margins, vibration_rates
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.tune import tune

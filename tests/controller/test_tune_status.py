@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from ringbalance.controller.algorithms.by_name import target_vector_of
 from ringbalance.controller.ensemble import Probability
-from ringbalance.controller.tuning.loop_factor import loop_factor, usable_fill, with_driving_gas
+from ringbalance.controller.liquid_ring.loop_factor import loop_factor, usable_fill, with_driving_gas
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
 from ringbalance.controller.tuning.result import Tuning
 from ringbalance.controller.tuning.search import Candidate, Search, search, with_ways_out

@@ -85,15 +85,26 @@ def _program(tmp_path: Path, text: str = PROGRAM) -> list[str]:
     return [sys.executable, str(script)]
 
 
-def _misses(tmp_path: Path, cache: Path) -> int:
-    """Signatures that had to be compiled."""
+def _misses(tmp_path: Path, cache: Path, processes: int = 1) -> int:
+    """Signatures that had to be compiled, by processes side by side."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    done = subprocess.run(
-        _program(tmp_path), env=environment, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
-    return int(done.stdout.split()[-1])
+    command, pipe = _program(tmp_path), subprocess.PIPE
+    started = [
+        subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe, text=True)
+        for _ in range(processes)
+    ]
+    count = 0
+    for process in started:
+        out, errors = process.communicate(timeout=120)
+        assert process.returncode == 0, errors
+        assert "Traceback" not in errors
+        count += int(out.split()[-1])
+    return count
+
+
+@pytest.mark.skipif(os.name == "nt", reason="without locks that another process sees")
+def test_one_process_compiles_while_the_others_wait(tmp_path: Path) -> None:
+    assert _misses(tmp_path, tmp_path / "cache", processes=3) == 3
 
 
 DAMAGE = (

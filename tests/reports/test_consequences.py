@@ -106,4 +106,4 @@ def test_claims_judged_on_another_disc_are_distinguished(evidence: Record) -> No
     marked["scene_sha256"] = "0" * 64
     assert summary.elsewhere(marked, changed)
     assert "1 of them" in summary.lead_sentence(changed)
-    assert "Judged on the paper’s disc" in render(changed)["report.html"]
+    assert "Judged on the paper’s disc" in render(changed)["annex.html"]

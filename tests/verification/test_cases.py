@@ -170,12 +170,12 @@ def test_claims_on_eccentric_masses_come_out_with_these_verdicts(results: Mappin
     assert found == {
         "driven_fig4_imbalance": "confirmed",
         "driven_fig5_friction": "confirmed",
-        "driven_fig6_effort": "refuted",
+        "driven_fig6_effort": "inconclusive",
         "driven_fig6_weights": "refuted",
         "driven_fig7_positioning": "confirmed",
         "driven_fig8_fine_tuning": "confirmed",
         "driven_fig9_run_up": "confirmed with correction",
-        "driven_bound": "confirmed with correction",
+        "driven_bound": "refuted",
         "driven_collision": "confirmed",
         "driven_stability": "confirmed with correction",
     }

@@ -63,8 +63,9 @@ def effort(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
         Curve("not compensated", "N m s", shown["without"]),
         Curve("as printed", "N m s", shown["printed"], style="paper"),
     )
+    judged, short = (float(grown[name if defect is None else "without"].min()) for name in ("exact", "short"))
     return Evidence(
-        found=as_found(exact=grown["exact" if defect is None else "without"].min()),
+        found={"exact": Found(value=judged).moved(0.0, short - judged)},
         numbers={
             "without": grown["without"].min(),
             "without_most": grown["without"].max(),
@@ -81,9 +82,14 @@ def weights(scene: EccentricScene, level: Level, defect: str | None = None) -> E
     # The largest over the smallest q/r, and the larger over the smaller mass ratio.
     over_weight = {name: each[:, -1] / each[:, 0] for name, each in found.items()}
     over_mass = {name: each[0] / each[1] for name, each in found.items()}
-    judged = "exact" if defect is None else "without"
+    exact, short = ("exact", "short") if defect is None else ("without", "without")
     return Evidence(
-        found=as_found(over_weight=over_weight[judged].max(), over_mass=over_mass[judged].max()),
+        found={
+            name: Found(value=float(grown[exact].max())).moved(
+                0.0, float(grown[short].max() - grown[exact].max())
+            )
+            for name, grown in (("over_weight", over_weight), ("over_mass", over_mass))
+        },
         numbers={
             "weight_without": over_weight["without"].max(),
             "mass_without": over_mass["without"].min(),

@@ -31,6 +31,7 @@ from ringbalance.controller.balancer import (
     settles_within,
 )
 from ringbalance.controller.common_rotor import CommonRotor, rotor_fault
+from ringbalance.controller.trials import Trials, scaled
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
 from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
@@ -193,6 +194,11 @@ class BallBalancer:
         """Within the time limit."""
         return (settles_within(self.span(), stated=False),)
 
+    def trials(self) -> tuple[Trials, ...]:
+        """The drag between its bounds."""
+        drag = {each.path: each.value for each in self.settings()}
+        return (scaled("drag", drag, tuple(np.geomspace(1 / 30, 30, 9).tolist()), first=(0, 2, 4, 6, 8)),)
+
     def remedies(self) -> tuple[Remedy, ...]:
         """More oil."""
         return (Remedy(code="drag", changes={"balls.drag": 2.0 * self.scene.balls.drag}),)
@@ -244,7 +250,12 @@ class BallBalancer:
         """No formula recommends anything."""
         return self, {}
 
-    def recommend(self, *, progress: Callable[[str], None] | None = None) -> BallTuning:
+    def recommend(
+        self,
+        *,
+        pressure: bool = False,  # noqa: ARG002
+        progress: Callable[[str], None] | None = None,
+    ) -> BallTuning:
         """The drag of five between its bounds that settles most devices."""
         (drag,) = self.settings()
         found = []

@@ -274,8 +274,8 @@ class Margins:
 def loop_margins(
     *,
     loop_factor: float,
-    gain_uncertainty: float,
-    phase_uncertainty: float,
+    gain_uncertainty: float = 0.0,
+    phase_uncertainty: float = 0.0,
     integral: float = 0.0,
     derivative: float = 0.0,
 ) -> Margins:

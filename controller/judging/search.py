@@ -1,0 +1,246 @@
+"""Settings by runs: levels of what a balancer offers to try, raced over few drawn devices.
+
+The fraction of devices that a setting serves is a plateau with steps of one device, so that nothing smooth is
+there to follow: coarse levels first, then the neighbours of the best until it is within them.  Settings far
+below the best are dropped after few devices.  What is chosen on these devices is judged on others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from ringbalance.controller.balancer import Balancer, Draws, Settings
+from ringbalance.controller.judging.judge import Judgement
+from ringbalance.controller.trials import Axis, Trials
+
+Progress = Callable[[str], None]
+
+_HEATS: Final = ((0, 8), (8, 16), (16, 32))
+"""Devices of the heats of a race, by first and last number."""
+DEVICES: Final = _HEATS[-1][1]
+"""On which settings are chosen."""
+_BEHIND: Final = 0.15
+"""Fraction of the devices by which a setting may be behind the best and run in the next heat."""
+_MORE: Final = 2
+"""Devices by which another kind of controller must be better than the scene's."""
+_AS_FAST: Final = 1.3
+"""Times the least settling time: as fast as the fastest."""
+_SETTLED: Final = 0.9
+"""Of the devices that the best settings serve: by when these have settled decides between equals."""
+_ROUNDS: Final = 6
+"""In which neighbours are tried."""
+CURVE: Final = Draws.block(64, 64)
+"""Devices of the answer along an axis: neither those of the choice nor those of the verdict."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """A point of what a balancer offers to try."""
+
+    trials: Trials
+    places: tuple[int, ...]
+    """Of its levels on the axes."""
+    along: float | None
+    """Level on the axis along which the answer is drawn; None: the scene's."""
+
+    @cached_property
+    def settings(self) -> Settings | None:
+        """By path; None: there are none."""
+        levels = {axis.name: axis.levels[at] for axis, at in zip(self.trials.axes, self.places, strict=True)}
+        if self.along is not None and self.trials.along is not None:
+            levels[self.trials.along.name] = self.along
+        return self.trials.settings(levels)
+
+    @property
+    def key(self) -> tuple[str, tuple[int, ...], float | None]:
+        """Of this point."""
+        return self.trials.kind, self.places, self.along
+
+    def neighbours(self) -> list[Candidate]:
+        """One level away on one axis."""
+        return [
+            self._moved(axis, by) for axis in range(len(self.places)) for by in (-1, 1) if self._has(axis, by)
+        ]
+
+    def _has(self, axis: int, by: int) -> bool:
+        return 0 <= self.places[axis] + by < len(self.trials.axes[axis].levels)
+
+    def _moved(self, axis: int, by: int) -> Candidate:
+        places = tuple(at + by * (axis == i) for i, at in enumerate(self.places))
+        return Candidate(trials=self.trials, places=places, along=self.along)
+
+    def at(self, along: float) -> Candidate:
+        """The same at another level of that axis."""
+        return Candidate(trials=self.trials, places=self.places, along=along)
+
+    def is_beside(self, other: Candidate) -> bool:
+        """Whether one step, on each axis at most, leads there."""
+        alike = self.trials.kind == other.trials.kind and self.along == other.along
+        return alike and all(abs(a - b) <= 1 for a, b in zip(self.places, other.places, strict=True))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tried:
+    """A candidate and what became of it."""
+
+    candidate: Candidate
+    judgement: Judgement
+
+    @property
+    def count(self) -> int:
+        """Of devices that meet every demand."""
+        return self.judgement.fraction.count
+
+    def time(self, count: int) -> float:
+        """By which so many devices have settled, s."""
+        return float(np.sort(self.judgement.outcomes.settling_time)[max(count, 1) - 1])
+
+
+def search(
+    balancer: Balancer, trials: Sequence[Trials], *, along: float | None = None, progress: Progress
+) -> tuple[Tried, ...]:
+    """The best settings of every kind of controller, the kind to take first.
+
+    Args: `along`: level on `Trials.along`; default the scene's.
+    """
+    found = [best for each in trials if (best := _best_of(balancer, each, along, progress)) is not None]
+    own = found[:1] if found and found[0].candidate.trials is trials[0] else []
+    return tuple(sorted(found, key=lambda each: each.count + _MORE * (each in own), reverse=True))
+
+
+def _best_of(balancer: Balancer, trials: Trials, along: float | None, progress: Progress) -> Tried | None:
+    coarse = [
+        Candidate(trials=trials, places=places, along=along)
+        for places in product(*(axis.first for axis in trials.axes))
+    ]
+    tried: dict[object, Tried | None] = {}
+    field: list[Candidate] = coarse
+    for _ in range(_ROUNDS):
+        fresh = [each for each in field if each.key not in tried]
+        if not fresh:
+            break
+        progress(f"{len(fresh)} settings, {trials.kind.replace('_', ' ')}")
+        leading = max((each.count for each in tried.values() if each), default=0)
+        ran = _raced(balancer, fresh, leading=leading)
+        tried |= {each.key: None for each in fresh} | {each.candidate.key: each for each in ran}
+        best = chosen(each for each in tried.values() if each)
+        field = best.candidate.neighbours() if best else []
+    return chosen(each for each in tried.values() if each)
+
+
+def chosen(tried: Iterable[Tried]) -> Tried | None:
+    """Most devices; of these as fast as the fastest; of these the one amid most others that are as good."""
+    whole = list(tried)
+    most = max((each.count for each in whole), default=0)
+    if most == 0:
+        return whole[0] if whole else None
+    at = math.ceil(_SETTLED * most)
+    best = [each for each in whole if each.count == most]
+    fastest = min(each.time(at) for each in best)
+    plateau = [each for each in whole if each.count >= most - 1 and each.time(at) <= _AS_FAST**2 * fastest]
+
+    def amid(each: Tried) -> int:
+        return sum(each.candidate.is_beside(other.candidate) for other in plateau)
+
+    fast = [each for each in best if each.time(at) <= _AS_FAST * fastest]
+    return max(fast, key=lambda each: (amid(each), -each.time(at)))
+
+
+def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: int = 0) -> list[Tried]:
+    """Those that are not far behind the best after each heat. Args: `leading`: devices of the best before."""
+    asked, demands = balancer.asked_fraction(), balancer.demands()
+    running: dict[int, Tried | None] = {i: None for i, each in enumerate(field) if each.settings is not None}
+    for first, last in _HEATS:
+        if not running:
+            break
+        settings = [field[i].settings or {} for i in running]
+        ran = balancer.run_all(settings, Draws.block(first, last - first))
+        for i, outcomes in zip(running, ran, strict=True):
+            before = running[i]
+            whole = before.judgement.outcomes.joined(outcomes) if before else outcomes
+            judged = Judgement(settings=field[i].settings or {}, asked=asked, demands=demands, outcomes=whole)
+            running[i] = Tried(candidate=field[i], judgement=judged)
+        most = max(max(each.count for each in running.values() if each), leading * last / DEVICES)
+        behind = max(_BEHIND * last, 2.0)
+        running = {i: each for i, each in running.items() if each and each.count >= most - behind}
+    return [each for each in running.values() if each]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Along:
+    """The best settings at one level of an axis, over devices that they were not chosen on."""
+
+    level: float
+    """SI."""
+    judgement: Judgement
+
+    @property
+    def usable_moment(self) -> tuple[float, float, float]:
+        """Of a tenth of the devices at most, of half of them, of a tenth at least, kg m."""
+        low, middle, high = np.quantile(self.judgement.outcomes.usable_moment, [0.1, 0.5, 0.9])
+        return float(low), float(middle), float(high)
+
+
+def searched_along(balancer: Balancer, best: Tried, *, progress: Progress) -> tuple[Along, ...]:
+    """Settings near the best ones at every level of an axis, wider until the best level is within them."""
+    axis = best.candidate.trials.along
+    if axis is None:
+        return ()
+    found: dict[int, Along] = {}
+    places: Sequence[int] = axis.first
+    while places:
+        progress(f"{len(places)} levels of {axis.name}")
+        found |= _answered(balancer, best.candidate, axis, places)
+        top = _top(found)
+        places = [at for at in (top - 1, top + 1) if at not in found and 0 <= at < len(axis.levels)]
+    return tuple(found[at] for at in sorted(found))
+
+
+def _answered(balancer: Balancer, best: Candidate, axis: Axis, places: Sequence[int]) -> dict[int, Along]:
+    around = [best, *best.neighbours()]
+    levels = {at: axis.levels[at] for at in places}
+    ran = _raced(balancer, [each.at(level) for level in levels.values() for each in around])
+    by_level = {
+        at: chosen(each for each in ran if each.candidate.along == level) for at, level in levels.items()
+    }
+    kept = {at: each.candidate if each else best.at(levels[at]) for at, each in by_level.items()}
+    settings = [each.settings or _bare(each, axis) for each in kept.values()]
+    asked, demands = balancer.asked_fraction(), balancer.demands()
+    outcomes = balancer.run_all(settings, CURVE)
+    return {
+        at: Along(
+            level=levels[at],
+            judgement=Judgement(settings=setting, asked=asked, demands=demands, outcomes=outcome),
+        )
+        for at, setting, outcome in zip(kept, settings, outcomes, strict=True)
+    }
+
+
+def _bare(candidate: Candidate, axis: Axis) -> Settings:
+    return {axis.name: candidate.along}
+
+
+def _top(found: dict[int, Along]) -> int:
+    """Place of the level to take: most devices, and then amid levels that serve about as many."""
+    count = {at: each.judgement.fraction.count for at, each in found.items()}
+    near = {at: sum(count.get(at + by, 0) for by in (-1, 0, 1)) for at in found}
+    most = max(count.values())
+    return max((at for at in found if count[at] >= most - 1), key=lambda at: (near[at], count[at]))
+
+
+def top_level(levels: Sequence[Along]) -> Along:
+    """The level to take."""
+    return levels[_top(dict(enumerate(levels)))]
+
+
+def searched(balancer: Balancer, *, progress: Progress = lambda _: None) -> Settings:
+    """The best settings under the scene's own supply; none where nothing is to be tried."""
+    found = search(balancer, balancer.trials(), progress=progress)
+    return (found[0].candidate.settings if found else None) or {}

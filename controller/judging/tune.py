@@ -1,0 +1,95 @@
+"""How `tune` comes to its settings: chosen by runs of few drawn devices, judged on others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ringbalance.controller.balancer import Balancer, Settings
+from ringbalance.controller.judging.judge import Judgement, judged_all
+from ringbalance.controller.judging.search import Along, Progress, Tried, search, searched_along, top_level
+from ringbalance.controller.judging.tuning import Information, Tuning
+from ringbalance.controller.judging.tuning_rows import LONGER, tuning_document, tuning_rows
+from ringbalance.results.requirements import MET
+from ringbalance.results.result import Presentation
+from ringbalance.scene.draws import BLOCK
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.paths import with_values_at
+
+
+def tuned(
+    balancer: Balancer,
+    *,
+    information: Callable[[SceneFile], Information] = lambda _: Information(),
+    along: bool = False,
+    progress: Progress | None = None,
+) -> Tuning:
+    """Settings of a balancer by runs.
+
+    Args: `information`: of the scene with the recommended settings. `along`: whether the axis that the
+        balancer names is searched in any case; else only where the scene's level of it does not suffice.
+    """
+    told = progress or (lambda _: None)
+    trials = balancer.trials()
+    found: Sequence[Tried] = search(balancer, trials, progress=told) if trials else ()
+    stated = not trials or trials[0].stated
+    own, best = _judged(balancer, found, own=stated, progress=told)
+    curve: tuple[Along, ...] = ()
+    if found and (along or best.verdict != MET):
+        curve = searched_along(balancer, found[0], progress=told)
+        best, found = _better(balancer, best, found, curve, progress=told)
+    (longer,) = judged_all(balancer, [best.settings], first=BLOCK, most=BLOCK, further=LONGER, progress=told)
+    axis = trials[0].along if trials else None
+    return Tuning(
+        presentation=Presentation(document=tuning_document, rows=tuning_rows),
+        given=balancer.scene,
+        recommended=best,
+        own=own,
+        longer=longer,
+        tried=tuple(found),
+        along=curve,
+        along_name=axis.name if axis else "",
+        along_unit=axis.unit if axis else "1",
+        information=information(with_values_at(balancer.scene, best.settings)),
+    )
+
+
+def _judged(
+    balancer: Balancer, found: Sequence[Tried], *, own: bool, progress: Progress
+) -> tuple[Judgement | None, Judgement]:
+    """Of the scene's own settings and of the best, on the same devices."""
+    settings = _to_judge(found) or [{}]
+    judged = judged_all(balancer, [*([{}] if own else []), *settings], progress=progress)
+    best = _best(judged[1:] if own else judged)
+    given = judged[0] if own else None
+    return given, given if given is not None and given.fraction.value > best.fraction.value else best
+
+
+def _to_judge(found: Sequence[Tried]) -> list[Settings]:
+    """Of the kind that is first, and of others that serve more devices."""
+    most = found[0].count if found else 0
+    kept = [each for place, each in enumerate(found) if place == 0 or each.count > most]
+    return [each.candidate.settings or {} for each in kept]
+
+
+def _best(judged: Sequence[Judgement]) -> Judgement:
+    """Most devices; the earlier of equals."""
+    return max(judged, key=lambda each: each.fraction.value)
+
+
+def _better(
+    balancer: Balancer,
+    best: Judgement,
+    found: Sequence[Tried],
+    curve: tuple[Along, ...],
+    *,
+    progress: Progress,
+) -> tuple[Judgement, Sequence[Tried]]:
+    """The best settings at the best level, where these serve more devices."""
+    if not curve:
+        return best, found
+    top = top_level(curve)
+    if top.judgement.fraction.count == 0 or top.judgement.fraction.value <= best.fraction.low:
+        return best, found
+    again = search(balancer, balancer.trials(), along=top.level, progress=progress)
+    _, there = _judged(balancer, again, own=False, progress=progress)
+    return (there, again) if there.fraction.value > best.fraction.value else (best, found)

@@ -1,0 +1,69 @@
+"""What `tune` answers with: settings chosen by runs of few drawn devices, judged on others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ringbalance.controller.judging.judge import Judgement
+from ringbalance.controller.judging.search import Along, Tried
+from ringbalance.results.requirements import MET
+from ringbalance.results.result import Facts, PresentedResult
+from ringbalance.results.rows import Quantity
+from ringbalance.scene.changes import rechecked
+from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.paths import with_values_at
+
+
+@dataclass(frozen=True, kw_only=True)
+class Information:
+    """What is known of a loop without a run; nothing is judged by it."""
+
+    quantities: tuple[Quantity, ...] = ()
+    facts: Facts = ()
+    document: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
+class Tuning(PresentedResult):
+    """Settings for a scene's controller, and the fraction of drawn devices that they serve."""
+
+    given: SceneFile
+    """The scene as it was."""
+    recommended: Judgement
+    own: Judgement | None
+    """Of the scene's own settings on the same devices; None: it gives none."""
+    longer: Judgement
+    """Of the recommended ones, devices watched for `LONGER`."""
+    tried: tuple[Tried, ...]
+    """The best of every kind of controller, on the devices of the search."""
+    along: tuple[Along, ...] = ()
+    """The best at every level of the axis that the balancer names, such as the gas pressure."""
+    along_name: str = ""
+    """Path of its key."""
+    along_unit: str = "1"
+    information: Information = Information()
+    remedies: tuple[Any, ...] = ()
+    ranking: Any = None
+
+    @property
+    def scene(self) -> Any:
+        """The scene with what is recommended, of the type that it was."""
+        return with_values_at(self.given, self.recommended.settings)
+
+    @property
+    def recommended_scene(self) -> AnyScene:
+        """The same, checked, with a hash of its own."""
+        return rechecked(self.scene)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether what the scene requires is met with the recommended settings."""
+        return self.recommended.verdict == MET
+
+    @property
+    def status(self) -> str:
+        """The first sentences."""
+        return " ".join(each.text for each in self.rows().findings[:2])

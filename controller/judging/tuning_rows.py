@@ -1,0 +1,244 @@
+"""A `Tuning` as rows and as a JSON document."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+from ringbalance.controller.balancer import FURTHER, Settings
+from ringbalance.controller.judging.judge import Judgement
+from ringbalance.controller.judging.search import Along
+from ringbalance.controller.judging.tuning import Tuning
+from ringbalance.results.numbers import given, percent
+from ringbalance.results.requirements import MET, MISSED, OPEN
+from ringbalance.results.result import Rows, Table
+from ringbalance.results.rows import Finding, Quantity, Value
+from ringbalance.scene.arrays import finite
+from ringbalance.scene.describe import in_usual_unit, usual_unit
+from ringbalance.scene.paths import raw_value_at
+
+LONGER: Final = 300.0
+"""s, for which devices under the recommended settings are watched once more."""
+_CODES: Final = {MET: "tuned_met", MISSED: "tuned_missed", OPEN: "tuned_open"}
+_SETTLED: Final = "settled"
+_MOST_CAUSES: Final = 3
+
+
+def tuning_rows(tuning: Tuning) -> Rows:
+    """What is recommended, its verdict, and what it rests on."""
+    scene = tuning.given
+    return Rows(
+        title=f"Tuning of {scene.name} ({scene.source})",
+        quantities=(*_fractions(tuning), *tuning.information.quantities),
+        findings=tuple(_findings(tuning)),
+        facts=tuning.information.facts,
+        tables=(_settings_table(tuning), _required_table(tuning), _along_table(tuning), _tried_table(tuning)),
+    )
+
+
+def tuning_document(tuning: Tuning) -> dict[str, Any]:
+    """In SI."""
+    scene = tuning.given
+    return {
+        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
+        "balancer": scene.balancer,
+        "status": tuning.status,
+        "asked": tuning.recommended.asked,
+        **_judgement(tuning.recommended),
+        "settings": _plain(tuning.recommended.settings),
+        "own": None if tuning.own is None else _judgement(tuning.own),
+        "further_s": FURTHER,
+        "longer": {"further_s": LONGER, "fraction": tuning.longer.fraction.document()},
+        "required": [
+            {
+                "code": each.code,
+                "sense": each.sense,
+                "required": each.required,
+                "unit": each.unit,
+                "stated": each.stated,
+                "fraction": tuning.recommended.fraction_of(each).document(),
+            }
+            for each in tuning.recommended.demands
+        ],
+        "along": {
+            "path": tuning.along_name,
+            "unit": tuning.along_unit,
+            "levels": [_level(each) for each in tuning.along],
+        },
+        "tried": [
+            {
+                "kind": each.candidate.trials.kind,
+                "settings": _plain(each.judgement.settings),
+                "fraction": each.judgement.fraction.document(),
+            }
+            for each in tuning.tried
+        ],
+        "clipped": dict(tuning.recommended.outcomes.clipped),
+        **tuning.information.document,
+        **tuning.rows().document(),
+    }
+
+
+def _judgement(judgement: Judgement) -> dict[str, Any]:
+    return {
+        "verdict": judgement.verdict,
+        "fraction": judgement.fraction.document(),
+        "settling_time_s": times_of(judgement),
+        "ended": dict(Counter(judgement.outcomes.ended)),
+    }
+
+
+def _level(level: Along) -> dict[str, Any]:
+    low, middle, high = level.usable_moment
+    return {
+        "value": level.level,
+        "settings": _plain(level.judgement.settings),
+        "fraction": level.judgement.fraction.document(),
+        "verdict": level.judgement.verdict,
+        "settling_time_s": times_of(level.judgement),
+        "usable_moment_kg_m": {"p10": finite(low), "p50": finite(middle), "p90": finite(high)},
+    }
+
+
+def times_of(judgement: Judgement) -> dict[str, float | None]:
+    """When half and nine tenths of all devices have settled, s; None where the bound is open."""
+    times = {name: judgement.settling_time(part) for name, part in (("p50", 0.5), ("p90", 0.9))}
+    return {name: None if time is None else finite(time[0]) for name, time in times.items()}
+
+
+def _plain(settings: Settings) -> dict[str, Any]:
+    return {path: list(value) if isinstance(value, tuple) else value for path, value in settings.items()}
+
+
+def _fractions(tuning: Tuning) -> Iterator[Quantity]:
+    for key, name, judgement in (
+        ("fraction_met", "devices that meet what is required", tuning.recommended),
+        ("fraction_met_own", "the same with the scene's own settings", tuning.own),
+        ("fraction_met_longer", "the same, watched longer", tuning.longer),
+    ):
+        if judgement is not None:
+            share = judgement.fraction
+            yield Quantity(
+                key=key, name=name, value=share.value, lower=share.low, upper=share.high, origin="simulated"
+            )
+    for key, time in times_of(tuning.recommended).items():
+        name = {"p50": "half of them settle within", "p90": "nine tenths settle within"}[key]
+        yield Quantity(
+            key=f"settling_time_{key}",
+            name=name,
+            unit="s",
+            value=time,
+            origin="simulated",
+            status="ok" if time is not None else "not_reached",
+            digits=3,
+        )
+
+
+def _findings(tuning: Tuning) -> Iterator[Finding]:
+    best = tuning.recommended
+    changes = {
+        path: value[0] if isinstance(value, tuple) else value
+        for path, value in best.settings.items()
+        if value is not None
+    }
+    yield Finding(code=_CODES[best.verdict], values=_values(best), change=changes)
+    times = times_of(best)
+    if times["p50"] is not None:
+        code = "tuned_half" if times["p90"] is None else "tuned_times"
+        yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
+    if tuning.own is None:
+        yield Finding(code="tuned_own_none")
+    elif not best.settings:
+        yield Finding(code="tuned_own_best")
+    else:
+        yield Finding(code="tuned_own", values={**_values(tuning.own), "verdict": tuning.own.verdict})
+    yield Finding(code="tuned_longer", values={**_values(tuning.longer), "time": LONGER, "first": FURTHER})
+    if best.verdict != MET and (causes := _causes(best)):
+        yield Finding(code="tuned_causes", values={"causes": causes})
+    if tuning.remedies == () and tuning.along and best.verdict != MET:
+        yield Finding(code="tuned_no_level", values={"key": tuning.along_name})
+
+
+def _values(judgement: Judgement) -> dict[str, Value]:
+    share = judgement.fraction
+    return {
+        "share": share.value,
+        "low": share.low,
+        "high": share.high,
+        "count": share.count,
+        "of": share.of,
+        "asked": judgement.asked,
+    }
+
+
+def _causes(judgement: Judgement) -> list[str]:
+    """How many devices ended in which way without meeting what is required, most first."""
+    ended = zip(judgement.outcomes.ended, judgement.meets, strict=True)
+    counted = Counter("settled too late" if code == _SETTLED else code for code, met in ended if not met)
+    return [f"{code.replace('_', ' ')} {count}" for code, count in counted.most_common(_MOST_CAUSES)]
+
+
+def _settings_table(tuning: Tuning) -> Table:
+    rows = [
+        (path, setting_text(path, raw_value_at(tuning.given, path)), setting_text(path, value))
+        for path, value in tuning.recommended.settings.items()
+    ]
+    return Table(caption="Settings", heads=("key", "the scene's", "recommended"), rows=rows)
+
+
+def setting_text(path: str, value: object) -> str:
+    """A value of a scene, SI, as a reader knows it."""
+    if value is None:
+        return "none"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return ", ".join(setting_text(path, each) for each in value)
+    if isinstance(value, float | int):
+        return f"{in_usual_unit(path, float(value)):.4g} {usual_unit(path)}".rstrip()
+    return str(value)
+
+
+def _required_table(tuning: Tuning) -> Table:
+    rows = [
+        (
+            each.code.replace("_", " "),
+            f"{each.sense} {given(each.required, each.unit, digits=4)}",
+            percent(tuning.recommended.fraction_of(each).value),
+        )
+        for each in tuning.recommended.demands
+    ]
+    return Table(caption="Required of every device", heads=("what", "required", "met by"), rows=rows)
+
+
+def _along_table(tuning: Tuning) -> Table:
+    rows = [
+        (
+            given(each.level, tuning.along_unit, digits=4),
+            _share_text(each.judgement),
+            *(given(time, "s", digits=3) for time in times_of(each.judgement).values()),
+            given(each.usable_moment[1], "kg m", digits=4),
+        )
+        for each in tuning.along
+    ]
+    heads = (tuning.along_name, "devices that meet all", "half within", "90 % within", "usable moment")
+    return Table(caption=f"Over {tuning.along_name}", heads=heads, rows=rows)
+
+
+def _tried_table(tuning: Tuning) -> Table:
+    rows = [
+        (
+            each.candidate.trials.kind.replace("_", " "),
+            ", ".join(
+                f"{path} {setting_text(path, value)}" for path, value in each.judgement.settings.items()
+            ),
+            _share_text(each.judgement),
+        )
+        for each in tuning.tried
+    ]
+    caption = "The best of each kind, over the devices of the search"
+    return Table(caption=caption, heads=("kind", "settings", "devices"), rows=rows)
+
+
+def _share_text(judgement: Judgement) -> str:
+    share = judgement.fraction
+    return f"{percent(share.value)} ({percent(share.low)} to {percent(share.high)})"

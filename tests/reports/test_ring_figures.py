@@ -1,0 +1,38 @@
+"""What the figures of a ring's loop are drawn of."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringbalance.reports.ring_figures import _frames, injections_until, settled_over_time
+
+RUN: dict[str, Any] = {
+    "time_s": [0.0, 1.0, 30.0],
+    "injections": [
+        {"time_s": 0.0, "duration_s": 0.4, "chamber": "C"},
+        {"time_s": 0.0, "duration_s": 0.1, "chamber": "B"},
+        {"time_s": 2.0, "duration_s": 0.1, "chamber": "A"},
+    ],
+}
+
+
+def test_injections_that_begin_together_are_one_frame() -> None:
+    assert [(title.split(",")[0], time) for title, time in _frames(RUN)] == [
+        ("start", 0.0),
+        ("B and C", 0.4),
+        ("A", pytest.approx(2.1)),
+        ("end", 30.0),
+    ]
+    assert injections_until(RUN) == pytest.approx(2.1)
+
+
+def test_the_axis_ends_a_little_past_the_last_device_that_settles() -> None:
+    times = np.array([1.0, 2.5, math.nan, math.inf])
+    svg = settled_over_time({"as it is": times}, 120.0, asked=0.9).svg
+    ticks = [float(text) for text in re.findall(r">(\d(?:\.\d)?)</text>", svg)]
+    assert max(ticks) <= 3.0

@@ -240,6 +240,11 @@ class Balancer(Protocol):
     options: frozenset[str]
     """Arguments besides the scene that it can be made with, such as "flow_law"."""
 
+    verdict_draws: tuple[int, int]
+    """Devices of a verdict, at first and at the most."""
+    watched_to_end: bool
+    """Whether every run is watched to its time limit, whatever is asked for."""
+
     @property
     def scene(self) -> SceneFile:
         """The scene that it was made of."""

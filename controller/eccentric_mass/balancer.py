@@ -28,28 +28,33 @@ from ringbalance.controller.balancer import (
 )
 from ringbalance.controller.common_rotor import CommonRotor, rotor_fault
 from ringbalance.controller.eccentric_mass.devices import Device, device
-from ringbalance.controller.eccentric_mass.loop_rows import loops_quantities
+from ringbalance.controller.eccentric_mass.loop_rows import loops_document, loops_quantities, loops_status
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.requirements import reach_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
-from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
+from ringbalance.controller.eccentric_mass.scene_records import (
+    EccentricRotor,
+    EccentricScene,
+    SpeedPoint,
+    eccentric_scene,
+)
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
-from ringbalance.controller.eccentric_mass.tuning import EccentricTuning, tune_eccentric
-from ringbalance.controller.trials import Trials, scaled
+from ringbalance.controller.judging.tune import tuned
+from ringbalance.controller.judging.tuning import Information, Tuning
+from ringbalance.controller.trials import Axis, Trials
 from ringbalance.results.requirements import AT_MOST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.draws import run_noise
+from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.paths import with_values_at
 
 _FINEST_SHARE: Final = 0.01
 """Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
 _SETTLED_WHIRL: Final = 12.0
 """Time constants of the free whirl after which a run with eccentric masses starts to balance."""
-_FACTORS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Times a gain."""
 _REACH: Final = 10.0
 """Factor up to which a gain is tried."""
 
@@ -63,6 +68,8 @@ class EccentricMassBalancer:
     """
 
     options = frozenset[str]()
+    verdict_draws = (16, 64)
+    watched_to_end = True
     models_used: tuple[Any, ...] = ()
 
     def __init__(self, scene: EccentricScene) -> None:
@@ -156,9 +163,14 @@ class EccentricMassBalancer:
         return settles, residual
 
     def trials(self) -> tuple[Trials, ...]:
-        """See `Balancer`; masses settle by the gains of the scene or near them."""
-        values = {each.path: each.value for each in self.settings()}
-        return (scaled("eccentric_mass", values, _FACTORS, first=(1, 2)),)
+        """The gains of the drives with their margins, where the scene's have less: no other gain decides
+        whether masses settle."""
+        changes = advised(self.scene)[1]
+        if not changes:
+            return ()
+        loops = Axis(name="margins of the drives", levels=(0.0, 1.0), first=(0, 1))
+        kind = self.scene.balancer
+        return (Trials(kind=kind, axes=(loops,), settings=lambda at: changes if at[loops.name] else {}),)
 
     def remedies(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
@@ -232,14 +244,9 @@ class EccentricMassBalancer:
         scene, changes = advised(self.scene)
         return EccentricMassBalancer(scene), changes
 
-    def recommend(
-        self,
-        *,
-        pressure: bool = False,  # noqa: ARG002
-        progress: Callable[[str], None] | None = None,
-    ) -> EccentricTuning:
+    def recommend(self, *, pressure: bool = False, progress: Callable[[str], None] | None = None) -> Tuning:
         """See `Balancer`."""
-        return tune_eccentric(self.scene, told=progress)
+        return tuned(self, information=_information, along=pressure, progress=progress)
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Reach, and the largest gains of the drives; see `Balancer`."""
@@ -266,6 +273,15 @@ class EccentricMassBalancer:
     def history(self, run: EccentricRun) -> Mapping[str, Sequence[Any]]:
         """See `Balancer`."""
         return eccentric_history(run)
+
+
+def _information(scene: SceneFile) -> Information:
+    gains = RecommendedGains.of(eccentric_scene(scene))
+    return Information(
+        quantities=loops_quantities(gains),
+        facts=(("loops of the drives", loops_status(gains)),),
+        document=loops_document(gains),
+    )
 
 
 def _traced(run: EccentricRun, scene: EccentricScene) -> TracedRun:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
-from ringbalance.results.result import Table
 from ringbalance.results.rows import Quantity
-
-_HEADS: Final = ("loop", "key", "value", "at most", "unit", "largest pole", "hold, s")
 
 
 def loops_status(gains: RecommendedGains) -> str:
@@ -26,7 +23,7 @@ def loops_status(gains: RecommendedGains) -> str:
 def loops_document(gains: RecommendedGains) -> dict[str, Any]:
     """For JSON, SI."""
     return {
-        "status": loops_status(gains),
+        "loops_status": loops_status(gains),
         "gain": {loop.key: loop.recommended for loop in gains.loops},
         "loops": [
             {
@@ -55,20 +52,3 @@ def loops_quantities(gains: RecommendedGains) -> tuple[Quantity, ...]:
         for loop in gains.loops
     )
     return (*largest, Quantity(key="voltage_hold", name="voltage hold, at most", unit="s", value=gains.step))
-
-
-def loops_table(gains: RecommendedGains) -> Table:
-    """One row a loop."""
-    rows = [
-        (
-            loop.name,
-            loop.key,
-            f"{loop.value:.4g}",
-            f"{loop.recommended:.4g}",
-            loop.unit,
-            f"{loop.radius:.4f}",
-            f"{loop.recommended_step:.4g}",
-        )
-        for loop in gains.loops
-    ]
-    return Table(caption="Loops of the drives", heads=_HEADS, rows=rows)

@@ -30,6 +30,7 @@ from ringbalance.controller.balancer import (
 )
 from ringbalance.controller.common_rotor import CommonRotor
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
+from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.liquid_ring.devices import Spread
@@ -53,7 +54,7 @@ from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUs
 from ringbalance.results.requirements import AT_LEAST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
-from ringbalance.scene.draws import run_noise
+from ringbalance.scene.draws import BLOCK, run_noise
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
@@ -71,6 +72,8 @@ class LiquidRingBalancer:
     """A disc with chambers that a gas drives liquid between; options as in `ringbalance.simulate`."""
 
     options = frozenset({"flow_law", "controller", "sensor", "modelled"})
+    verdict_draws = (BLOCK, MOST_DRAWS)
+    watched_to_end = False
     scene: Scene
     _: KW_ONLY
     flow_law: Any = None

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from eccentric_runs import bundled
 
 from ringbalance.controller.balancer import Draws, balancer_of
 from ringbalance.controller.eccentric_mass.devices import ASSUMED_AMPLITUDE, PHASE, device
@@ -20,6 +21,11 @@ from ringbalance.controller.judging.judge import judged_all
 from ringbalance.results.proportion import Proportion
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.papers import at_constant_speed, changed
+
+
+@pytest.fixture(scope="module")
+def small() -> EccentricScene:
+    return bundled("driven_masses_small")
 
 
 def stating(scene: EccentricScene, **widths: tuple[float, bool]) -> EccentricScene:
@@ -110,3 +116,30 @@ def test_a_device_is_run_as_it_is_with_every_setting(paper: EccentricScene) -> N
         assert alone.final_amplitude[0] == outcomes.final_amplitude[1]
         assert alone.inputs[PHASE][0] == outcomes.inputs[PHASE][1]
     assert both[0].final_amplitude[0] != both[1].final_amplitude[0]
+
+
+def test_tuning_gives_the_drives_their_margins_where_they_lack_them(small: EccentricScene) -> None:
+    """A speed control at its edge: the devices are run with it and with half of it."""
+    assert balancer_of(small).trials() == ()
+    edge = RecommendedGains.of(small).speed
+    scene = changed(small, "friction_filter", speed_gain=1.5 * edge.recommended)
+    (trials,) = balancer_of(changed(scene, "run", time_limit=6.0)).trials()
+    settings = trials.settings({trials.axes[0].name: 1.0})
+    assert settings is not None
+    assert settings["friction_filter.speed_gain"] == pytest.approx(edge.recommended)
+    assert trials.settings({trials.axes[0].name: 0.0}) == {}
+
+
+def test_too_few_devices_are_told_after_sixteen(small: EccentricScene) -> None:
+    """In one second none settles; the loops stand beside it as information."""
+    tuning = balancer_of(small.with_values({"run.time_limit": 1.0})).recommend()
+    document = tuning.to_dict()
+    assert (document["verdict"], document["fraction"]["of"], document["fraction"]["count"]) == (
+        "not met",
+        16,
+        0,
+    )
+    assert document["ended"] == {"time_limit": 16}
+    assert not tuning.succeeded
+    assert {loop["key"] for loop in document["loops"]} == set(document["gain"])
+    assert document["longer"] is None

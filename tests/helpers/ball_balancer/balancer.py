@@ -122,6 +122,8 @@ class BallBalancer:
     """
 
     options = frozenset[str]()
+    verdict_draws = (16, 32)
+    watched_to_end = True
     models_used: tuple[Any, ...] = ()
 
     def __init__(self, scene: BallScene) -> None:

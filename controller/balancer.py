@@ -15,6 +15,7 @@ from typing import Any, Final, Protocol, Self
 import numpy as np
 
 from ringbalance.controller.common_rotor import CommonRotor
+from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.trials import Trials
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
@@ -202,6 +203,10 @@ class Remedy:
     """Of the sentence that names it, such as "bore"."""
     changes: Settings
     """By path, SI, as `SceneFile.with_values` takes them."""
+    name: str = ""
+    """Of a thing that can be bought."""
+    continuous: bool = False
+    """Whether a value between this and another of its kind can be had as well."""
 
 
 class _Recommendation(Protocol):
@@ -299,7 +304,22 @@ class Balancer(Protocol):
         ...
 
     def remedies(self) -> tuple[Remedy, ...]:
-        """Changes of the scene to try where too few devices meet its demands, each by itself."""
+        """Changes of the scene to try where too few devices meet its demands, each by itself.
+
+        Those of one kind follow each other with the smallest change first.
+        """
+        ...
+
+    def choices(self) -> tuple[Remedy, ...]:
+        """Things that can be bought for what the scene leaves open; it is answered without them."""
+        ...
+
+    def drawn_input(self, name: str) -> DrawnInput:
+        """What kind of thing an input of `Outcomes.inputs` is."""
+        ...
+
+    def on_scene(self, scene: SceneFile) -> Self:
+        """The same, with the same options, of another scene of its kind."""
         ...
 
     def rotor(self) -> CommonRotor:

@@ -27,7 +27,8 @@ from ringbalance.controller.balancer import (
     settles_within,
 )
 from ringbalance.controller.common_rotor import CommonRotor, rotor_fault
-from ringbalance.controller.eccentric_mass.devices import Device, device
+from ringbalance.controller.drawn_input import MEASURE_INPUT, DrawnInput, drawn_key
+from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device
 from ringbalance.controller.eccentric_mass.loop_rows import loops_document, loops_quantities, loops_status
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.requirements import reach_of
@@ -166,7 +167,7 @@ class EccentricMassBalancer:
         """The gains of the drives with their margins, where the scene's have less: no other gain decides
         whether masses settle."""
         changes = advised(self.scene)[1]
-        if not changes:
+        if all(loop.value <= loop.recommended for loop in RecommendedGains.of(self.scene).loops):
             return ()
         loops = Axis(name="margins of the drives", levels=(0.0, 1.0), first=(0, 1))
         kind = self.scene.balancer
@@ -175,6 +176,22 @@ class EccentricMassBalancer:
     def remedies(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
         return ()
+
+    def choices(self) -> tuple[Remedy, ...]:
+        """See `Balancer`."""
+        return ()
+
+    def drawn_input(self, name: str) -> DrawnInput:
+        """See `Balancer`."""
+        if name == PHASE:
+            return DrawnInput(common=False, measure="")
+        if name.startswith(FITTED):
+            return DrawnInput(common=True, measure=MEASURE_INPUT)
+        return drawn_key(self.scene, name)
+
+    def on_scene(self, scene: SceneFile) -> EccentricMassBalancer:
+        """See `Balancer`."""
+        return EccentricMassBalancer(eccentric_scene(scene))
 
     def rotor(self) -> CommonRotor:
         """At the speed at which the strategy starts; see `Balancer`."""

@@ -30,12 +30,14 @@ from ringbalance.controller.balancer import (
 )
 from ringbalance.controller.common_rotor import CommonRotor
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
+from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.liquid_ring.devices import Spread
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.information import loop_information
+from ringbalance.controller.liquid_ring.remedies import drawn_input, remedies_of, valves_of
 from ringbalance.controller.liquid_ring.trials import trials
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
@@ -182,7 +184,19 @@ class LiquidRingBalancer:
 
     def remedies(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
-        return ()
+        return remedies_of(self.scene, self.model)
+
+    def choices(self) -> tuple[Remedy, ...]:
+        """Valves; see `Balancer`."""
+        return valves_of(self.scene)
+
+    def drawn_input(self, name: str) -> DrawnInput:
+        """See `Balancer`."""
+        return drawn_input(name)
+
+    def on_scene(self, scene: SceneFile) -> LiquidRingBalancer:
+        """See `Balancer`."""
+        return replace(self, scene=liquid_ring_scene(scene))
 
     @property
     def limit(self) -> float:

@@ -31,7 +31,6 @@ from ringbalance.controller.drawn_input import MEASURE_INPUT, DrawnInput, drawn_
 from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device
 from ringbalance.controller.eccentric_mass.loop_rows import loops_document, loops_quantities, loops_status
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
-from ringbalance.controller.eccentric_mass.requirements import reach_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
@@ -42,6 +41,7 @@ from ringbalance.controller.eccentric_mass.scene_records import (
     eccentric_scene,
 )
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.trials import Axis, Trials

@@ -13,10 +13,10 @@ from eccentric_runs import bundled
 from ringbalance.controller.balancer import Draws, balancer_of
 from ringbalance.controller.eccentric_mass.devices import ASSUMED_AMPLITUDE, PHASE, device
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
-from ringbalance.controller.eccentric_mass.requirements import drawn_requirements, reach_of
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.judging.judge import judged_all
 from ringbalance.results.proportion import Proportion
 from ringbalance.scene.origins import InputUncertainty
@@ -94,17 +94,14 @@ def test_devices_whose_imbalance_is_beyond_reach_do_not_settle(paper: EccentricS
 
 
 def test_what_is_required_is_judged_over_the_devices(paper: EccentricScene) -> None:
-    """A residual that none reaches decides, whatever settles; fractions have Wilson's bounds."""
+    """A residual that none reaches decides, whatever settles."""
     scene = at_constant_speed(paper, time_limit=40.0)
     asked = changed(scene, "requirement", residual=1e-9, settling_time=39.0, fraction=0.8)
     (judgement,) = judged_all(balancer_of(asked), [{}], first=8, most=8)
-    rows = [row.document() for row in drawn_requirements(judgement)]
-    every, settled, residual, reach = (row["achieved"] for row in rows)
-    assert (every, residual, reach) == (0.0, 0.0, 1.0)
-    assert settled > 0.5
-    assert rows[0]["verdict"] == judgement.verdict == "not met"
-    assert rows[0]["achieved_interval"] == (Proportion(count=0, of=8).low, Proportion(count=0, of=8).high)
-    assert rows[0]["required"] == 0.8
+    settled, residual = (judgement.fraction_of(each) for each in judgement.demands)
+    assert settled.value > 0.5
+    assert judgement.fraction == residual == Proportion(count=0, of=8)
+    assert (judgement.verdict, judgement.asked) == ("not met", 0.8)
 
 
 def test_a_device_is_run_as_it_is_with_every_setting(paper: EccentricScene) -> None:

@@ -46,12 +46,9 @@ def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Rec
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
     """The scene's own settings beside the recommended ones, both watched longer too, and what else to do."""
     best, own = tuning.recommended, tuning.own
-    stated = own is not None
-    (longer,) = judged_all(balancer, [{}], first=BLOCK, most=BLOCK, further=LONGER) if stated else (None,)
     recommended = judgement_record(best) | {"longer": _watched(tuning.longer, LONGER)}
-    given = None if own is None or longer is None else judgement_record(own)
     return {
-        "own": given and {**given, "longer": longer and _watched(longer, LONGER)},
+        "own": None if own is None else judgement_record(own) | {"longer": _longer(balancer)},
         "recommended": recommended if own is None or best.settings else None,
         "along": {
             "path": tuning.along_name,
@@ -59,6 +56,11 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
         },
         **_advice(balancer, tuning),
     }
+
+
+def _longer(balancer: Balancer) -> Record:
+    (longer,) = judged_all(balancer, [{}], first=BLOCK, most=BLOCK, further=LONGER)
+    return _watched(longer, LONGER)
 
 
 def _advice(balancer: Balancer, tuning: Tuning) -> Record:

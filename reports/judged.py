@@ -46,7 +46,8 @@ def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Rec
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
     """The scene's own settings beside the recommended ones, both watched longer too, and what else to do."""
     best, own = tuning.recommended, tuning.own
-    recommended = judgement_record(best) | {"longer": _watched(tuning.longer, LONGER)}
+    longer = tuning.longer and _watched(tuning.longer, LONGER)
+    recommended = judgement_record(best) | {"longer": longer}
     return {
         "own": None if own is None else judgement_record(own) | {"longer": _longer(balancer)},
         "recommended": recommended if own is None or best.settings else None,

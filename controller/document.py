@@ -13,12 +13,13 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import FURTHER
+from ringbalance.controller.liquid_ring.conventions import conventions
 from ringbalance.controller.simulation import Injection, Sample, Simulation
 from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text, line_warning
 from ringbalance.reduced_model.injection.dynamics import Event, gives_forces
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG, neglected_in_injections
-from ringbalance.results.numbers import given
+from ringbalance.results.numbers import given, plain
 from ringbalance.results.result import Rows, Table, models_table
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray, finite
@@ -75,6 +76,7 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "tolerance": simulation.tolerance,
         "models_used": [asdict(used) for used in simulation.models_used],
         "neglected": asdict(neglected_in_injections(simulation.models_used)),
+        "conventions": [each.document() for each in conventions(simulation)],
         "model_status": {"code": str(simulation.model_status.code), "text": simulation.model_status.text},
         **simulation.rows().document(),
     }
@@ -157,7 +159,11 @@ def simulation_rows(simulation: Simulation) -> Rows:
             ("neglected", neglected_in_injections(simulation.models_used).text),
             ("amplitude (log)", amplitude_line(simulation.time, simulation.amplitude, end=end)),
         ),
-        tables=(_injection_table(simulation.injections), models_table(simulation.models_used)),
+        tables=(
+            _injection_table(simulation.injections),
+            _conventions_table(simulation),
+            models_table(simulation.models_used),
+        ),
     )
 
 
@@ -211,6 +217,11 @@ def _injection_table(injections: tuple[Injection, ...]) -> Table:
         ],
         note=f"and {more} more: see --json" if more > 0 else "",
     )
+
+
+def _conventions_table(simulation: Simulation) -> Table:
+    rows = [(each.name, plain(each.text)) for each in conventions(simulation)]
+    return Table(caption="In the units of the shop", heads=("quantity", "value"), rows=rows)
 
 
 def _regime(injection: Injection) -> str:

@@ -16,18 +16,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import AS_GIVEN, balancer_of
+from ringbalance.controller.balancer import AS_GIVEN, Draws, balancer_of
+from ringbalance.controller.eccentric_mass.band import amplitude_band
+from ringbalance.controller.eccentric_mass.loop_rows import loops_document
 from ringbalance.controller.eccentric_mass.plant import rotor_record
-from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
-from ringbalance.controller.eccentric_mass.tuning import tune_eccentric
+from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reports.pages.plain import decision
 from ringbalance.reports.pictures.fields import shown_field
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene, provenance, versions
 from ringbalance.reports.section import Record, Work
@@ -51,6 +54,8 @@ from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
 Progress = Callable[[str], None]
 
 FORMAT: Final = 1
+_TRACED: Final = 16
+"""Drawn devices of the band of their vibration, the first of the verdict's."""
 LAW_POINTS: Final = 51
 """Fill ratios at which the flow law is drawn."""
 
@@ -275,6 +280,8 @@ def collect_run(
     tell = progress or (lambda _: None)
     ids = [case.id for case in load_cases() if case.paper == scene.balancer]
     with _cases_of_report(ids, scene=paper_scene(), level=level, pool=pool) as judged_cases:
+        tell("drawn devices")
+        summary = decision(balancer_of(scene))
         tell("run")
         study = _STUDIES.get(scene.balancer, _plain_study)(scene)
         verification, kept = judged_cases(tell)
@@ -285,6 +292,7 @@ def collect_run(
         "versions": versions(),
         "scene": scene_record(scene, scene_text, parameters(scene)),
         "seeds": {"run": scene.run.seed},
+        "summary": summary,
         **study,
         "verification": verification,
         "provenance": provenance(),
@@ -301,13 +309,13 @@ def _plain_study(scene: SceneFile) -> Record:
         "closed_loop": {"balanced": run.to_dict()},
         "known": [each.document() for each in balancer.quantities()],
         "run": balancer.rows(run).document(),
-        "requirements": [each.document() for each in balancer.requirements()],
     }
 
 
 def _eccentric_study(scene: EccentricScene) -> Record:
-    """The run, balanced and with its masses locked, its loops and requirements, and the true values."""
-    run = simulate_eccentric(scene)
+    """The run, balanced and with its masses locked, drawn devices, loops, and the true values."""
+    run, balancer = simulate_eccentric(scene), balancer_of(scene)
+    several = balancer.run({}, Draws.block(FRESH, _TRACED), trace=True)
     truth = {
         "unbalance_kg_m": scene.imbalance.mass * scene.imbalance.radius,
         "phase_rad": scene.imbalance.phase,
@@ -318,8 +326,8 @@ def _eccentric_study(scene: EccentricScene) -> Record:
         "closed_loop": {"balanced": run.to_dict()},
         "locked": locked_run(scene).to_dict(),
         "rotor": rotor_record(scene),
-        "tuning": tune_eccentric(scene, runs=0).to_dict(),
-        "requirements": [each.document() for each in eccentric_requirements(scene, run)],
+        "tuning": loops_document(RecommendedGains.of(scene)),
+        "drawn": amplitude_band(several.traced, start=0.0, end=scene.run.time_limit),
     }
 
 

@@ -209,7 +209,7 @@ SCALES: Final[dict[str, tuple[_Scale, ...]]] = {
     "s/m": (("s/µm", 1e-6),),
     "rad": (("°", 180 / math.pi),),
     "rad/s": (("rpm", 30 / math.pi),),
-    "m/s": (("m/s", 1.0),),
+    "m/s": (("mm/s", 1e3), ("m/s", 1.0, 0.1)),
     "kg/m^3": (("kg/m³", 1.0),),
     "m^2/s": (("mm²/s", 1e6),),
     "m/s^2": (("m/s²", 1.0),),

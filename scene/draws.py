@@ -10,6 +10,7 @@ Source: McKay, Beckman and Conover, "A Comparison of Three Methods for Selecting
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final
 from zlib import crc32
 
@@ -20,8 +21,12 @@ from ringbalance.scene.arrays import FloatArray
 
 BLOCK: Final = 64
 """Devices of one Latin hypercube."""
+_KEPT: Final = 4096
+"""Columns, which devices one by one ask for again."""
 _LAST: Final = 1e-12
 """Fraction at either end of a distribution that no device lies in."""
+_NOISE: Final = 3
+"""In the key of a run's noise, which the keys of drawn inputs do not have."""
 
 
 def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
@@ -40,6 +45,13 @@ def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
     return np.asarray(ndtri(quantiles(name, numbers, seed=seed)))
 
 
+def run_noise(seed: int, number: int) -> np.random.Generator:
+    """Random numbers of the sensors in the run of a drawn device."""
+    key = np.random.SeedSequence(entropy=seed, spawn_key=(number, _NOISE))
+    return np.random.Generator(np.random.PCG64(key))
+
+
+@lru_cache(_KEPT)
 def _column(name: str, block: int, seed: int) -> FloatArray:
     key = np.random.SeedSequence(entropy=seed, spawn_key=(block, crc32(name.encode())))
     random = np.random.Generator(np.random.PCG64(key))

@@ -12,7 +12,7 @@ from typing import Annotated, Final, Literal, cast, get_args
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, Shown, needed, standard
+from ringbalance.scene.keys.declaration import UNKNOWN, Listed, Shown, needed, standard
 from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, Bounds, OneLine, number, numbers, quantity
 from ringbalance.scene.units import unit_factor
 
@@ -170,13 +170,13 @@ ExtraLoss = Annotated[
     float,
     number(NOT_NEGATIVE),
     standard(0.0, "any further loss coefficient, on the velocity head in the tube"),
-    UNCERTAIN,
+    UNKNOWN,
     Shown("further loss coefficient"),
 ]
 DrawDownFactor = Annotated[
     float,
     number(POSITIVE),
     standard(1.0, "depth over a port at which gas enters it, over the calculated one, 30 % uncertain"),
-    UNCERTAIN,
+    UNKNOWN,
     Shown("factor on the draw-down depth"),
 ]

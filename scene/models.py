@@ -11,7 +11,16 @@ from typing import Annotated, ClassVar, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.fitted import DrawDownFactor, ExtraLoss, GaugeCorrection, ModelErrors
-from ringbalance.scene.keys.declaration import UNCERTAIN, Listed, Shown, derived, needed, standard, unused
+from ringbalance.scene.keys.declaration import (
+    UNCERTAIN,
+    UNKNOWN,
+    Listed,
+    Shown,
+    derived,
+    needed,
+    standard,
+    unused,
+)
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
@@ -114,7 +123,7 @@ class Disc:
             "measured lambda over that of the geometry, which every chamber's moment is multiplied by; "
             "`ringbalance fit` writes it",
         ),
-        UNCERTAIN,
+        UNKNOWN,
         Shown("measured factor on lambda"),
     ] = None
     geometry: Annotated[ChamberGeometry | None, Shown("geometry of a chamber")] = None
@@ -145,18 +154,18 @@ class Liquid:
         ),
         Shown("temperature", "degC", absent="not given"),
     ]
-    density: Annotated[float, quantity("density", POSITIVE), _OUTRIGHT, UNCERTAIN, Shown("density", "kg/m^3")]
+    density: Annotated[float, quantity("density", POSITIVE), _OUTRIGHT, UNKNOWN, Shown("density", "kg/m^3")]
     kinematic_viscosity: Annotated[
         float,
         quantity("kinematic_viscosity", POSITIVE),
         _OUTRIGHT,
-        UNCERTAIN,
+        UNKNOWN,
         Shown("kinematic viscosity", "mm^2/s"),
     ]
     vapour_pressure: Annotated[
         Pressure,
         derived("that of the known liquid; 0 Pa for a custom one", "absolute"),
-        UNCERTAIN,
+        UNKNOWN,
         Shown("vapour pressure", "kPa", note="absolute"),
     ]
     dissolved_gas: Annotated[
@@ -264,7 +273,7 @@ class Tube:
         float | None,
         number(POSITIVE),
         unused("k is calculated from the tube and the liquid", "prescribes k, as the paper does"),
-        UNCERTAIN,
+        UNKNOWN,
         Shown("drag coefficient k", absent="calculated"),
     ]
     draw_down_factor: DrawDownFactor = 1.0

@@ -71,6 +71,8 @@ class Key:
     presence: Presence
     uncertain: bool = False
     """Whether [uncertainty] may have its half-width."""
+    common: bool = False
+    """Whether all devices of a scene have it alike, so that its uncertainty is lack of knowledge."""
 
 
 @dataclass(frozen=True)
@@ -101,8 +103,13 @@ class Listed:
 class _Uncertain:
     """Marks a quantity whose uncertainty may be given."""
 
+    common: bool
 
-UNCERTAIN = _Uncertain()
+
+UNCERTAIN = _Uncertain(common=False)
+"""It varies from device to device."""
+UNKNOWN = _Uncertain(common=True)
+"""All devices have it alike, and it is not known exactly."""
 
 
 def needed(meaning: str) -> Presence:
@@ -137,7 +144,8 @@ def keys_of(record: type) -> Mapping[str, Key]:
             name: Key(
                 takes=_takes(hint),
                 presence=presence,
-                uncertain=_part(hint, _Uncertain) is not None,
+                uncertain=(mark := _part(hint, _Uncertain)) is not None,
+                common=mark is not None and mark.common,
             )
             for name, hint in hints.items()
             if (presence := _part(hint, Presence)) is not None

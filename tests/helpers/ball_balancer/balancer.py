@@ -15,7 +15,6 @@ from ball_balancer.scene_keys import BallScene
 from ringbalance.controller.balancer import (
     FURTHER,
     REQUIRED_FRACTION,
-    CommonRotor,
     Demand,
     Draws,
     Input,
@@ -29,15 +28,18 @@ from ringbalance.controller.balancer import (
     one_by_one,
     outcomes_of,
     requirements_of,
-    rotor_fault,
     settles_within,
 )
+from ringbalance.controller.common_rotor import CommonRotor, rotor_fault
+from ringbalance.controller.drawn_input import DrawnInput, drawn_key
 from ringbalance.controller.trials import Trials, scaled
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
 from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.narrowing import scene_as
+from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.paths import with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
@@ -123,6 +125,8 @@ class BallBalancer:
     """
 
     options = frozenset[str]()
+    verdict_draws = (16, 32)
+    watched_to_end = True
     models_used: tuple[Any, ...] = ()
 
     def __init__(self, scene: BallScene) -> None:
@@ -203,6 +207,18 @@ class BallBalancer:
     def remedies(self) -> tuple[Remedy, ...]:
         """More oil."""
         return (Remedy(code="drag", changes={"balls.drag": 2.0 * self.scene.balls.drag}),)
+
+    def choices(self) -> tuple[Remedy, ...]:
+        """None."""
+        return ()
+
+    def drawn_input(self, name: str) -> DrawnInput:
+        """A key of its scene."""
+        return drawn_key(self.scene, name)
+
+    def on_scene(self, scene: SceneFile) -> BallBalancer:
+        """Other balls."""
+        return BallBalancer(scene_as(BallScene, scene))
 
     def rotor(self) -> CommonRotor:
         """The scene's."""

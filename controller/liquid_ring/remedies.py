@@ -1,0 +1,163 @@
+"""Changes of a liquid ring's scene to try where too few devices meet what is asked, and valves to choose.
+
+What helps follows from runs alone; here stands what can be built, and where a change has no meaning.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from ringbalance.controller.balancer import Remedy
+from ringbalance.controller.drawn_input import MEASURE_INPUT, DrawnInput
+from ringbalance.controller.liquid_ring.devices import AMPLITUDE, CAVITY, FITTED, LOSS, MOMENT, PHASE
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import Holding, residual_fill_ratio, stalled_fill_ratio
+from ringbalance.scene.keys.derivations import shortest_path
+from ringbalance.scene.keys.schema import LIQUID_RING
+from ringbalance.scene.models import Scene
+from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
+
+_NARROWER: Final = (0.7, 0.5, 0.35)
+_WIDER: Final = (1.4, 2.0)
+"""Times the bore."""
+_SLOW: Final = 0.25
+"""Share of a run's time that valves open for the initial vibration alone, from which a bore is small."""
+_FASTER: Final = (2.0, 4.0)
+"""Times the valve's conductance and over its lag."""
+_PRESSURES: Final = ((0.87, 0.76), (1.15, 1.3))
+_LIMITS: Final = (2.0, 4.0, 6.0)
+_CRESTS: Final = (1.0, 0.96, 0.92)
+"""Times the largest radius of a crest that holds the liquid."""
+_SOLD: Final = (
+    ("Festo MHE2-MS1H-3/2", 0.39e-8, 0.3, 2.0e-3),
+    ("SMC SY3000", 1.1e-8, 0.28, 12e-3),
+    ("Festo MHE4-MS1H-3/2", 1.57e-8, 0.3, 3.5e-3),
+)
+"""Solenoid valves that can be bought: C, m^3/(s Pa), b and lag, s, of the valve alone.
+
+A line and a rotary distributor behind it let less through.
+Source: C and b of the SY3000 from SMC's catalogue EUS11-83 B-UK.  Festo gives standard nominal flows, 100 and
+    400 l/min from 6 to 5 bar gauge, of which C follows by ISO 6358 with b taken as 0.3.  Switching times are
+    those of the makers' catalogues, recalled and not read.
+"""
+_MEASURED: Mapping[str, str] = MappingProxyType(
+    {
+        LOSS: "measure_flow",
+        CAVITY: "measure_flow",
+        MOMENT: "measure_moment",
+        "draw_down_factor": "measure_residual",
+    }
+)
+"""What to measure in place of an error of a model."""
+_VARY: Final = frozenset({AMPLITUDE, PHASE})
+
+
+def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
+    """Every change by itself, those of one kind with the smallest first."""
+    return (
+        *_of_bore(scene, model),
+        *_of_valve(scene),
+        *_of_pressure(scene),
+        *_of_crest(scene, model),
+        Remedy(code="period", changes={"controller.period": scene.controller.period / 2}),
+        *_of_limit(scene),
+    )
+
+
+def valves_of(scene: Scene) -> tuple[Remedy, ...]:
+    """Valves that can be bought for a scene that gives none; none where it does."""
+    gas = scene.gas
+    if gas.conductance is not None:
+        return ()
+    return tuple(
+        Remedy(
+            code="valve",
+            name=name,
+            changes={
+                "gas.conductance": conductance,
+                "gas.critical_ratio": ratio,
+                "gas.valve_lag": lag if gas.valve_lag is None else gas.valve_lag,
+            },
+        )
+        for name, conductance, ratio, lag in _SOLD
+    )
+
+
+def drawn_input(name: str) -> DrawnInput:
+    """What kind of thing an input of drawn devices is, by its name among them."""
+    if table := UNCERTAIN_QUANTITIES.get(name):
+        common = LIQUID_RING.tables[table].keys[name].common
+        return DrawnInput(common=common, measure=_MEASURED.get(name, MEASURE_INPUT))
+    measure = "measure_fitted" if name.startswith(FITTED) else _MEASURED.get(name, "")
+    return DrawnInput(common=name not in _VARY, measure=measure)
+
+
+def _of_bore(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
+    for factor in _NARROWER:
+        yield Remedy(code="bore", changes={"tube.bore": factor * scene.tube.bore})
+    if _open_time(scene, model) > _SLOW * (scene.requirement.settling_time or scene.run.time_limit):
+        for factor in _WIDER:
+            yield Remedy(code="wider_bore", changes={"tube.bore": factor * scene.tube.bore})
+
+
+def _open_time(scene: Scene, model: BalancerModel) -> float:
+    """Valve-open time in which the full tube would correct the initial vibration at equal fills, s."""
+    fill, step = scene.disc.initial_fill, 0.1 * scene.disc.initial_fill
+    flow = model.flow.evaluate(
+        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True
+    )
+    moment = model.moment.pair_moment(fill_ratio=fill + step, opposite_fill_ratio=fill - step)
+    slope = abs(float(moment)) / step * scene.rotor.influence_coefficient
+    rate = slope * scene.tube.area * max(float(flow.velocity), 0.0) / model.chamber_volume
+    return scene.rotor.initial_amplitude / rate if rate > 0.0 else math.inf
+
+
+def _of_valve(scene: Scene) -> Iterator[Remedy]:
+    gas = scene.gas
+    for factor in _FASTER:
+        changes = {}
+        if gas.conductance is not None:
+            changes["gas.conductance"] = factor * gas.conductance
+        if gas.valve_lag:
+            changes["gas.valve_lag"] = gas.valve_lag / factor
+        if changes:
+            yield Remedy(code="faster_valve", changes=changes)
+
+
+def _of_pressure(scene: Scene) -> Iterator[Remedy]:
+    for code, factors in zip(("lower_pressure", "higher_pressure"), _PRESSURES, strict=True):
+        for factor in factors:
+            yield Remedy(code=code, changes={"gas.pressure": factor * scene.gas.pressure})
+
+
+def _of_limit(scene: Scene) -> Iterator[Remedy]:
+    """None where the scene requires a residual: no higher limit reaches that."""
+    if scene.requirement.residual is None and scene.requirement.grade is None:
+        for factor in _LIMITS:
+            changes = {"controller.limit": factor * scene.controller.limit}
+            yield Remedy(code="limit", changes=changes, continuous=True)
+
+
+def _of_crest(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
+    """Where liquid runs back, or gas that could empty a chamber does not lift the liquid to the crest."""
+    disc, tube, law = scene.disc, scene.tube, model.flow
+    held, total = Holding.of(scene, fill_ratio=disc.max_fill_ratio), 2 * disc.initial_fill
+    stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)
+    lifted = stalled <= residual_fill_ratio(scene, law=law)
+    if held.largest_hump_radius is None or (held.holds and lifted):
+        return
+    for factor in _CRESTS:
+        # Rounded down to a tenth of a millimetre: a crest there holds.
+        radius = math.floor(1e4 * factor * held.largest_hump_radius * (1 + 1e-12)) / 1e4
+        path = shortest_path(
+            port_radius=tube.port_radius,
+            hump_radius=radius,
+            separation=max(math.pi - disc.central_angle, 0.0),
+        )
+        changes = {"tube.hump_radius": radius}
+        if path > tube.length:
+            changes["tube.length"] = math.ceil(1e3 * path) / 1e3
+        yield Remedy(code="crest", changes=changes)

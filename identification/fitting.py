@@ -288,10 +288,10 @@ def _fitted(
 def _verdict_text(parameter: Parameter, verdict: Identified, found: Sequence[Combination]) -> str:
     if verdict is Identified.IDENTIFIED:
         return text_of("told_apart_by_data")
-    hopeless = verdict is Identified.STRUCTURALLY
+    never = verdict is Identified.STRUCTURALLY
     within = [c.text for c in found if parameter.name in c.names]
     sentences = [
-        text_of("told_apart_by_none" if hopeless else "hardly_narrowed", verdict=str(verdict)),
+        text_of("told_apart_by_none" if never else "hardly_narrowed", verdict=str(verdict)),
         *([text_of("products_identified", products=" and ".join(within))] if within else []),
         text_of("interval_stated" if parameter.prior else "interval_unknown"),
     ]

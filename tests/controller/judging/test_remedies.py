@@ -12,7 +12,7 @@ import pytest
 
 from ringbalance.controller.balancer import Draws, Outcomes, Remedy, balancer_of, settles_within
 from ringbalance.controller.judging.judge import Judgement, judged
-from ringbalance.controller.judging.remedies import Tried, amplitude_reached, tried_choices, tried_remedies
+from ringbalance.controller.judging.remedies import Remedied, amplitude_reached, tried_choices, tried_remedies
 from ringbalance.controller.liquid_ring.remedies import remedies_of
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.draws import quantiles
@@ -29,6 +29,7 @@ class Machine:
 
     scene: Scene
     offered: tuple[Remedy, ...]
+    verdict_draws: tuple[int, int] = (64, 1024)
 
     def on_scene(self, scene: SceneFile) -> Machine:
         assert isinstance(scene, Scene)
@@ -76,7 +77,7 @@ def limit(factor: float) -> Remedy:
     return Remedy(code="limit", changes={"controller.limit": factor * 50e-9}, continuous=True)
 
 
-def tried(paper_scene: Scene, *offered: Remedy) -> tuple[Tried, ...]:
+def tried(paper_scene: Scene, *offered: Remedy) -> tuple[Remedied, ...]:
     machine: Any = Machine(paper_scene, offered)
     own = judged(machine, {"gain": 1.0}, most=64)
     return tried_remedies(machine, own, search=lambda _: {"gain": 1.0})

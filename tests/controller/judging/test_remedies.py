@@ -16,6 +16,7 @@ from ringbalance.controller.judging.remedies import Remedied, amplitude_reached,
 from ringbalance.controller.liquid_ring.remedies import remedies_of
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.draws import quantiles
+from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile
 
@@ -174,3 +175,12 @@ def test_a_crest_too_low_is_moved_inwards(paper_scene: Scene) -> None:
     assert len(found) == 3
     for changes in found:
         assert low.with_values(changes).tube.hump_radius == changes["tube.hump_radius"] < 0.0375
+
+
+def test_the_bundled_complete_machine_meets_what_it_requires() -> None:
+    """With its own valve and settings, on devices that these were not chosen on."""
+    balancer = balancer_of(load_scene(bundled_scene("grinding_spindle")))
+    found = judged(balancer, {}, most=64)
+    assert found.verdict == "met"
+    assert found.demands[0].stated
+    assert balancer.choices() == ()

@@ -245,7 +245,7 @@ def _gain_margin(gain: Record) -> Drawing:
         ),
         logarithmic("x", within=(k[0], k[-1])),
         logarithmic("y", within=(low, high)),
-        x=("drag coefficient k at equal fills", "1"),
+        x=("loss coefficient k at equal fills", "1"),
         y=("Kc", "s/m"),
         ylim=(low, high),
         columns=4,

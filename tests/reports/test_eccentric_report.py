@@ -130,7 +130,7 @@ def test_what_a_requirement_depends_on_is_named_with_what_to_do(evidence: Record
     changed["requirements"] = [row]
     page = re.sub(r"<[^>]*>", "", render(changed)["report.html"])
     assert "up to 0.600\u202fµm" in page
-    assert "Determine more closely: damping of the rotor." in page
+    assert "Measure damping of the rotor: this decides" in page
     assert "limit of the supervisor" in page
     assert ">supervisor.limit<" not in page
 

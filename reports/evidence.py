@@ -18,7 +18,6 @@ import numpy as np
 
 from ringbalance.controller.balancer import AS_GIVEN, balancer_of
 from ringbalance.controller.eccentric_mass.plant import rotor_record
-from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.controller.eccentric_mass.tuning import tune_eccentric
@@ -28,6 +27,7 @@ from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.reports.pages.plain import decision
 from ringbalance.reports.pictures.fields import shown_field
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene, provenance, versions
 from ringbalance.reports.section import Record, Work
@@ -275,6 +275,8 @@ def collect_run(
     tell = progress or (lambda _: None)
     ids = [case.id for case in load_cases() if case.paper == scene.balancer]
     with _cases_of_report(ids, scene=paper_scene(), level=level, pool=pool) as judged_cases:
+        tell("drawn devices")
+        summary = decision(balancer_of(scene))
         tell("run")
         study = _STUDIES.get(scene.balancer, _plain_study)(scene)
         verification, kept = judged_cases(tell)
@@ -285,6 +287,7 @@ def collect_run(
         "versions": versions(),
         "scene": scene_record(scene, scene_text, parameters(scene)),
         "seeds": {"run": scene.run.seed},
+        "summary": summary,
         **study,
         "verification": verification,
         "provenance": provenance(),
@@ -301,7 +304,6 @@ def _plain_study(scene: SceneFile) -> Record:
         "closed_loop": {"balanced": run.to_dict()},
         "known": [each.document() for each in balancer.quantities()],
         "run": balancer.rows(run).document(),
-        "requirements": [each.document() for each in balancer.requirements()],
     }
 
 
@@ -319,7 +321,6 @@ def _eccentric_study(scene: EccentricScene) -> Record:
         "locked": locked_run(scene).to_dict(),
         "rotor": rotor_record(scene),
         "tuning": tune_eccentric(scene, runs=0).to_dict(),
-        "requirements": [each.document() for each in eccentric_requirements(scene, run)],
     }
 
 

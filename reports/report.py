@@ -19,14 +19,13 @@ import numpy as np
 from ringbalance.reports.evidence import Progress, collect_evidence, collect_run
 from ringbalance.reports.page import DOCUMENTS, case_views, page_content, render_pages
 from ringbalance.reports.pages.cases import TABLES, is_long, table_file
-from ringbalance.reports.pages.first_page import loop_sentences
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Record
 from ringbalance.reports.sections import section_view, sections_of
-from ringbalance.reports.summary import lead_sentence
+from ringbalance.reports.summary import judged_sentences, lead_sentence
 from ringbalance.reports.traced import untraced
 from ringbalance.results.result import csv_text
 from ringbalance.scene import AnyScene, Scene, liquid_ring_scene
@@ -55,25 +54,18 @@ class Report:
 
     @property
     def sound(self) -> bool:
-        """False when a code-verification case failed, or the loop settled under neither law.
-
-        A loop that settles under the paper's law alone is a finding, not a fault.
-        """
-        failed = any(
+        """False when a check of this program failed."""
+        return not any(
             case.get("broken") or (case["kind"] == "code_verification" and case["verdict"] == "failed")
             for case in self.evidence["verification"]
         )
-        return not failed and any(run["settled"] for run in self.evidence["closed_loop"].values())
 
     @property
     def summary(self) -> list[str]:
         """What to say of it in a few sentences, and why it has no pictures where it has none."""
-        balanced, pictures = self.evidence["closed_loop"].get("balanced"), self.evidence["pictures"]
-        lines = (
-            [balanced["status"]]
-            if balanced
-            else [*loop_sentences(self.evidence), lead_sentence(self.evidence)]
-        )
+        pictures, lines = self.evidence["pictures"], judged_sentences(self.evidence)
+        if not self.evidence.get("balancer"):
+            lines.append(lead_sentence(self.evidence))
         return [untraced(line) for line in lines] + ([] if pictures["drawn"] else [pictures["text"]])
 
 

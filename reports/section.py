@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
-from ringbalance.controller.tuning.result import Tuning
-from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.scene import Scene
 from ringbalance.verification.evidence import Level
-from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
-_TUNING_RUNS: Final = 500
-_TERM_RUNS: Final = 10
 Place = Literal["report", "annex"]
 
 
@@ -27,17 +21,6 @@ class Work:
     scene: Scene
     calibration: Calibration
     level: Level
-
-    @cached_property
-    def tuning(self) -> Tuning:
-        """The recommended gain of the scene's controller under the calibrated law."""
-        return _tuning_of(self.scene)
-
-
-@lru_cache(maxsize=4)
-def _tuning_of(scene: Scene) -> Tuning:
-    """One tuning serves every report of a scene within a process."""
-    return tune(scene, calibration_of(scene).model, members=_TUNING_RUNS, runs=_TERM_RUNS)
 
 
 def _nothing(_work: Work) -> None:

@@ -17,6 +17,7 @@ from ringbalance.reports import summary
 from ringbalance.reports.figure import Drawing
 from ringbalance.reports.pages import (
     chamber,
+    consequences,
     drag_coefficient,
     eccentric,
     first_page,
@@ -56,7 +57,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     drag_coefficient.SECTION,
     loop.INJECTIONS,
     paper_figures.SECTION,
-    loop.CONSEQUENCES,
+    consequences.SECTION,
     Section(name="cases", title="Claims: evidence and doubts"),
     eccentric.SECOND_BALANCER,
     Section(name="numerics", title="Numerical verification"),

@@ -1,10 +1,9 @@
-"""Verdicts: on requirements, on whether the limit is within reach; claims and checks counted by theirs."""
+"""Verdicts in words: of devices that meet what is asked; claims and checks counted by theirs."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
 from typing import Final
 
 from ringbalance.reports.prose import series
@@ -27,35 +26,6 @@ _TONES: Final = {
     OPEN: "open",
     UNASKED: "idle",
 }
-LIKELY: Final = 0.95
-"""Fraction of runs that must settle in time, the confidence of every interval in the report."""
-
-
-def above(value: float, bound: float, width: float) -> str:
-    """Whether a value is above a bound by more than a half-width."""
-    if abs(value - bound) <= width:
-        return OPEN
-    return MET if value > bound else MISSED
-
-
-def below(values: Iterable[float], bound: float) -> str:
-    """Whether all of some values are at most a bound, none, or some."""
-    within = [value <= bound for value in values]
-    return MET if all(within) else (OPEN if any(within) else MISSED)
-
-
-def worst(*verdicts: str) -> str:
-    """The worst of some verdicts on requirements."""
-    return next(verdict for verdict in (MISSED, OPEN, MET) if verdict in verdicts)
-
-
-def decided(judged: Sequence[tuple[str, str]]) -> str:
-    """One sentence on requirements, given by name and verdict: how many are met, and which are not."""
-    named = {v: [name for name, verdict in judged if verdict == v] for v in (MISSED, OPEN)}
-    met = len(judged) - sum(map(len, named.values()))
-    said = f"{met} of {len(judged)} requirements {'is' if met == 1 else 'are'} met"
-    parts = [f"{verdict}: {', '.join(names)}" for verdict, names in named.items() if names]
-    return "; ".join([said, *parts]) + "."
 
 
 def is_verdict(text: str) -> bool:
@@ -142,53 +112,16 @@ def is_papers(evidence: Record) -> bool:
     return bool(cases) and not any(elsewhere(case, evidence) for case in cases)
 
 
-def tuning_of(evidence: Record) -> Record:
-    """The tuning's document; empty where nothing was tuned."""
-    return (evidence.get("summary") or {}).get("tuning") or {}
-
-
-def line_verdict(evidence: Record) -> str:
-    """Whether the gas line's smallest correction leaves the limit within reach; met without one.
-
-    Runs of a given line show it, and then it is judged with them.
-    """
-    line = evidence["calibration"].get("gas_line")
-    if not line or any(end.get("smallest_correction_m") is None for end in line["ends"]):
-        return MET
-    if line["given"] and tuning_of(evidence).get("fraction_settled") is not None and settles(evidence) == MET:
-        return MET
-    return below((end["smallest_correction_m"] for end in line["ends"]), line["largest_correction_m"])
-
-
-def runs_settled(tuning: Record) -> str:
-    """How many of the runs settle: a count, which claims nothing finer than their number."""
-    low, high = map(percent, tuning["fraction_settled_95"])
-    return (
-        f"{round(tuning['fraction_settled'] * tuning['runs'])} of {tuning['runs']} runs "
-        f"(95 % confidence: {low} to {high})"
-    )
-
-
-def settles(evidence: Record) -> str:
-    """Whether runs with the recommended settings settle, late or not; met where no runs were made."""
-    tuning = tuning_of(evidence)
-    if not tuning.get("runs") or tuning.get("fraction_settled") is None:
-        return MET
-    if tuning["fraction_settled_95"][1] < LIKELY:
-        return MISSED
-    return MET if tuning["fraction_settled"] >= LIKELY else OPEN
-
-
-def what_enlarges(evidence: Record) -> str:
-    """What makes the residual larger than noise does."""
-    steps = {MISSED: "is", OPEN: "may be"}.get(line_verdict(evidence))
-    told = [f"the smallest correction {steps} too large for the limit"] if steps else []
-    if settles(evidence) != MET:
-        told.append("too few runs settle")
-    return "; ".join([ideal_valve(evidence), *told])
-
-
-def ideal_valve(evidence: Record) -> str:
-    """That runs are those of a valve that acts at once; empty where the scene describes one."""
-    line = evidence["calibration"].get("gas_line") or {"given": True}
-    return "" if line["given"] else "; for a valve that acts at once"
+def judged_sentences(evidence: Record) -> list[str]:
+    """For what fraction of devices the scene's settings work, and what was recommended."""
+    found = evidence.get("summary") or {}
+    told = []
+    for name, words in (("own", "the scene’s settings"), ("recommended", "the recommended settings")):
+        if of := found.get(name):
+            fraction = of["fraction"]
+            low, high = percent(fraction["low"]), percent(fraction["high"])
+            told.append(
+                f"With {words} {percent(fraction['value'])} of {fraction['of']} drawn devices settle and "
+                f"stay ({low} to {high}), {percent(of['asked'])} asked: {of['verdict']}."
+            )
+    return told

@@ -10,6 +10,7 @@ Source: McKay, Beckman and Conover, "A Comparison of Three Methods for Selecting
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final
 from zlib import crc32
 
@@ -20,6 +21,8 @@ from ringbalance.scene.arrays import FloatArray
 
 BLOCK: Final = 64
 """Devices of one Latin hypercube."""
+_KEPT: Final = 4096
+"""Columns, which devices one by one ask for again."""
 _LAST: Final = 1e-12
 """Fraction at either end of a distribution that no device lies in."""
 
@@ -40,6 +43,7 @@ def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
     return np.asarray(ndtri(quantiles(name, numbers, seed=seed)))
 
 
+@lru_cache(_KEPT)
 def _column(name: str, block: int, seed: int) -> FloatArray:
     key = np.random.SeedSequence(entropy=seed, spawn_key=(block, crc32(name.encode())))
     random = np.random.Generator(np.random.PCG64(key))

@@ -41,7 +41,6 @@ SAME: Final = (
         "consequences.gain.-1.moment_per_transferred_mass_m",
     ),
     ("calibration.residual_liquid.usable_pair_moment_kg_m", "calibration.budgets.usable_moment.value"),
-    ("consequences.retuned_proportional_s_per_m", "summary.tuning.gain"),
 )
 """Places of the evidence that hold the same quantity; the liquids of `fifty` are those of a primed tube."""
 _APART: Final = 5e-3

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -34,6 +34,8 @@ RELATIVE_ERROR: Final = 1e-4
 within 3e-5 without inertia."""
 MOST_SAMPLES: Final = 100_000
 """Of one run without a trace."""
+_KEPT: Final = 512
+"""Devices, and devices under a pressure."""
 _OUT_OF_REACH: Final = 2.0
 """Times the limit that remain with the liquid at its best, from which on a run is not carried out: none
 settles, and each would take its whole time limit."""
@@ -77,11 +79,9 @@ class DrawnRuns:
         check_ring(self.scene)
         asked = [self._setting(place, each) for place, each in enumerate(settings)]
         ended = [[_Ended() for _ in draws.numbers] for _ in asked]
-        seed, numbers = self.scene.run.seed, draws.numbers
-        device_at = devices(self.scene, self.model, self.spread, numbers, seed=seed)
         drawn = []
-        for place, number in enumerate(numbers):
-            device = device_at(place) if draws.devices else _as_given(self.scene, self.model, number)
+        for place, number in enumerate(draws.numbers):
+            device = self.device(number) if draws.devices else _as_given(self.scene, self.model, number)
             drawn.append(device)
             for at, done in self._runs(device, asked, further):
                 ended[at][place] = done
@@ -98,7 +98,7 @@ class DrawnRuns:
         """Place of a setting and how the device's run under it ended."""
         moments = MomentTable.of(model=device.model, total=2 * device.scene.disc.initial_fill)
         for _, some in _grouped(asked, lambda each: each.scene.gas.pressure):
-            under = _Under.of(device.under(some[0].scene, of=self.scene), device, modelled=self.terms)
+            under = self._under(device, some[0].scene.gas.pressure)
             if under.unreachable > _OUT_OF_REACH * self.limit:
                 yield from ((each.place, _Ended.at_best(under, limit=self.limit)) for each in some)
                 continue
@@ -123,7 +123,27 @@ class DrawnRuns:
 
     def device(self, number: int) -> Device:
         """One of the devices."""
-        return devices(self.scene, self.model, self.spread, (number,), seed=self.scene.run.seed)(0)
+        return self._devices(number)
+
+    @cached_property
+    def _devices(self) -> Callable[[int], Device]:
+        """By number; the last ones are kept, as a search runs the same again and again."""
+
+        def made(number: int) -> Device:
+            return devices(self.scene, self.model, self.spread, (number,), seed=self.scene.run.seed)(0)
+
+        return lru_cache(_KEPT)(made)
+
+    @cached_property
+    def _under(self) -> Callable[[Device, float], _Under]:
+        """By device and gas pressure of the settings; kept likewise."""
+
+        def made(device: Device, pressure: float) -> _Under:
+            gas = replace(self.scene.gas, pressure=pressure)
+            scene = device.under(replace(self.scene, gas=gas), of=self.scene)
+            return _Under.of(scene, device, modelled=self.terms)
+
+        return lru_cache(_KEPT)(made)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,7 +14,6 @@ from matplotlib.patches import Circle, Rectangle
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.compare import compare
-from ringbalance.controller.eccentric_mass.requirements import DRAWS
 from ringbalance.reports import summary
 from ringbalance.reports.figure import INK, MUTED, Drawing, draw, line, panels
 from ringbalance.reports.mass_figures import (
@@ -27,17 +26,13 @@ from ringbalance.reports.mass_figures import (
 )
 from ringbalance.reports.pages import measured
 from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.plain import requirements_view
+from ringbalance.reports.pages.plain import decision_view
 from ringbalance.reports.pages.standing import CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
 _POLE_ROOM, _NEAR, _WHOLE = 0.75, 0.02, 1.12
 """Half of the poles' magnified picture over their extent, the least extent, and half of the whole picture."""
-
-
-def _summary(_own: Record, evidence: Record) -> Record:
-    return {**requirements_view(evidence), "draws": DRAWS}
 
 
 def _run(_own: Record, evidence: Record) -> Record:
@@ -126,7 +121,9 @@ def _claims(_own: Record, evidence: Record) -> Record:
 
 
 SECTIONS: Final = (
-    Section(name="summary", title="Decision", place="report", show=_summary, template="masses_summary.html"),
+    Section(
+        name="summary", title="Decision", place="report", show=decision_view, template="masses_summary.html"
+    ),
     Section(name="run", title="Run-up and stages", place="report", show=_run, template="masses_run.html"),
     Section(
         name="estimates", title="Estimates", place="report", show=_estimates, template="masses_estimates.html"

@@ -1,9 +1,8 @@
-"""The loop and its tuning: runs under each law and gain, how likely each settles, what a wrong k costs."""
+"""The loop and its tuning: runs under each law, and how many devices settle by when."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -13,40 +12,27 @@ from ringbalance.reports.figure import (
     AMPLITUDE,
     AS_PAPER,
     FOUND,
-    INK,
     MUTED,
-    PAPER,
     REGIME_COLOURS,
-    SURFACE,
     TIME,
     Curve,
     Drawing,
     amplitudes,
-    curve,
     draw,
-    level,
-    logarithmic,
-    nice_span,
-    panels,
-    plain_number,
 )
-from ringbalance.reports.pages.consequences import find_consequences
-from ringbalance.reports.pages.first_page import RETUNED, place_of_run
 from ringbalance.reports.ring_figures import ring_frames, run_with_injections
 from ringbalance.reports.run_figures import early_time, fill_ratios, residual_polar
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.summary import is_papers, runs_settled, tuning_of
-from ringbalance.results.numbers import percent
+from ringbalance.reports.summary import is_papers
 
-_GAINS: Final = {1: "with the scene’s gain", 2: "with the recommended settings"}
-"""Titles of the calibrated law's ensembles, by their place in the evidence."""
+_SETTINGS: Final[dict[str, dict[str, Any]]] = {
+    "own": {**AS_PAPER, "label": "the scene’s settings"},
+    "recommended": {"color": FOUND, "label": "the recommended settings"},
+}
 _LAWS: Final[dict[str, dict[str, Any]]] = {
     "calibrated": {"color": FOUND, "label": "the calibrated law"},
     "paper": {**AS_PAPER, "label": "the paper’s law"},
 }
-_BINS: Final = 16
-_MEMBERS: Final = MappingProxyType({"light": 500, "heavy": 20_000})
-"""Runs of each ensemble, by level: at 500 a probability is known to about four per cent."""
 
 
 def _reach(work: Work) -> Record:
@@ -62,35 +48,15 @@ def _reach(work: Work) -> Record:
 
 def _loop(own: Record, evidence: Record) -> Record:
     runs, limit = _drawn_runs(evidence), evidence["limit_m"]
-    run, tuning = runs.get("calibrated"), tuning_of(evidence)
+    run = runs.get("calibrated")
     disc = (evidence.get("operation") or {}).get("disc")
-    samples = _samples(evidence) if own else []
     return {
-        "retuned": place_of_run(evidence, RETUNED),
-        "runs_settled": runs_settled(tuning) if tuning.get("fraction_settled") is not None else "",
         "amplitude": run_with_injections(runs, _LAWS, limit) if runs else None,
         "rings": ring_frames(run, disc) if run and disc else None,
         "laws": list(runs),
         "polar": residual_polar(run, own) if run and own else None,
-        "settling": _settling_histogram(samples) if samples else None,
-        "samples": samples,
+        "settling": _settling(evidence.get("summary") or {}),
     }
-
-
-def _samples(evidence: Record) -> list[Record]:
-    ensembles = (evidence.get("consequences") or {}).get("ensembles", [])
-    return [
-        {
-            "title": title,
-            "edges_s": ensembles[place]["settling_time_s"]["edges"],
-            "counts": ensembles[place]["settling_time_s"]["counts"],
-            "runs": ensembles[place]["members"],
-            "not_settled": ensembles[place]["probability"]["not_settled"]["value"],
-            "place": place,
-        }
-        for place, title in _GAINS.items()
-        if place < len(ensembles)
-    ]
 
 
 def _drawn_runs(evidence: Record) -> dict[str, Record]:
@@ -99,35 +65,38 @@ def _drawn_runs(evidence: Record) -> dict[str, Record]:
     return {law: runs[law] for law in _LAWS if law in runs and (law != "paper" or is_papers(evidence))}
 
 
-def _settling_histogram(samples: list[Record]) -> Drawing:
-    """Settling times of samples of runs, a panel each, with those that never settle as a bar of their own."""
-    side = 1 / len(samples)
+def _settling(found: Record) -> Drawing | None:
+    """Fraction of drawn devices that has settled by a time, with its bounds; None where none settles."""
+    judged = {name: found[name]["settled"] for name in _SETTINGS if found.get(name)}
+    if not any(each["time_s"] for each in judged.values()):
+        return None
 
     def paint(axes: Axes) -> None:
-        drawn = panels(
-            axes, *((place * side + 0.085, 0.2, side - 0.105, 0.62) for place in range(len(samples)))
-        )
-        for panel, sample in zip(drawn, samples, strict=True):
-            _histogram(panel, sample)
-        drawn[0].set_ylabel("share of all runs in %")
+        for name, each in judged.items():
+            look = _SETTINGS[name]
+            time, low, high = each["time_s"], each["low"], each["high"]
+            axes.step(time, 100 * np.asarray(each["value"]), where="post", **look)
+            axes.fill_between(
+                time,
+                100 * np.asarray(low),
+                100 * np.asarray(high),
+                step="post",
+                color=look["color"],
+                alpha=0.2,
+                linewidth=0,
+            )
+        axes.axhline(100 * found["own"]["asked"], color=MUTED, linewidth=1, linestyle=":", label="asked")
 
-    return draw("settling-histogram", paint, columns=0, wide=True)
-
-
-def _histogram(panel: Axes, sample: Record) -> None:
-    edges, counts = np.asarray(sample["edges_s"], dtype=float), np.asarray(sample["counts"], dtype=float)
-    starts = np.arange(0, counts.size, max(-(-counts.size // _BINS), 1))
-    shares = 100 * np.add.reduceat(counts, starts) / sample["runs"]
-    ends = edges[np.append(starts, counts.size)]
-    panel.bar(ends[:-1], shares, width=np.diff(ends), align="edge", color=FOUND, edgecolor=SURFACE)
-    span = float(ends[-1] - ends[0])
-    place, width, never = ends[-1] + 0.14 * span, 0.1 * span, 100 * sample["not_settled"]
-    panel.bar(place, never, width=width, color=SURFACE, edgecolor=PAPER, hatch="////", linewidth=1)
-    panel.text(place, never + 1.5, percent(sample["not_settled"]), ha="center", color=PAPER)
-    ticks = [tick for tick in nice_span(float(ends[-1])) if ends[0] <= tick <= ends[-1] - 0.05 * span]
-    panel.set_xticks([*ticks, place], [*(plain_number(tick) for tick in ticks), "never"])
-    panel.set_title(sample["title"], loc="left", fontsize="medium", color=INK)
-    panel.set(xlabel="settling time in s", xlim=(ends[0], place + width), ylim=(0, 112))
+    return draw(
+        "settling",
+        paint,
+        x=TIME,
+        y=("settled devices in %", "1"),
+        xlim=(0, None),
+        ylim=(0, 105),
+        columns=3,
+        wide=True,
+    )
 
 
 LOOP: Final = Section(
@@ -208,52 +177,4 @@ def _regimes(run: Record) -> Drawing:
 
 INJECTIONS: Final = Section(
     name="injections", title="The closed loop, injection by injection", show=_injections
-)
-
-
-def _find(work: Work) -> Record:
-    tuned = work.tuning.scene if work.tuning.gain else None
-    model, members = work.calibration.model, _MEMBERS[work.level]
-    return find_consequences(work.scene, model, recommended=tuned, members=members).document()
-
-
-def _consequences(found: Record, _evidence: Record) -> Record:
-    return {"figure": _gain_margin(found["gain"][-1]) if found["gain"] else None}
-
-
-def _gain_margin(gain: Record) -> Drawing:
-    """Gains at which the loop starts to overshoot and to be unstable, over the tube's drag coefficient.
-
-    Args: `gain`: one law's entry of `gain`, SI.
-    """
-    over, scene = gain["over_drag_coefficient"], gain["proportional_s_per_m"]
-    k, overshoot, unstable = (over[key] for key in ("values", "overshoot_gain", "instability_gain"))
-    low, high = 0.8 * min(*overshoot, *unstable, scene), 1.25 * max(*overshoot, *unstable, scene)
-    return draw(
-        "gain-margin",
-        curve(k, overshoot, "overshoot from", color=FOUND),
-        curve(k, unstable, "unstable from", color=PAPER),
-        level(scene, "Kc in the scene", color=MUTED, linewidth=1, linestyle=":"),
-        curve(
-            [gain["drag_coefficient"]],
-            [scene],
-            "this machine",
-            color=INK,
-            linestyle="",
-            marker="D",
-            markersize=5,
-        ),
-        logarithmic("x", within=(k[0], k[-1])),
-        logarithmic("y", within=(low, high)),
-        x=("loss coefficient k at equal fills", "1"),
-        y=("Kc", "s/m"),
-        ylim=(low, high),
-        columns=4,
-        wide=True,
-        height=3.4,
-    )
-
-
-CONSEQUENCES: Final = Section(
-    name="consequences", title="What a wrong k costs", collect=_find, show=_consequences
 )

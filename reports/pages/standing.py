@@ -104,7 +104,7 @@ def _credibility(_own: Record, evidence: Record) -> Record:
         "validated": any(case["kind"] == "validation" for case in checks),
         "unsure": [f"{counts[origin]} {words}" for origin, words in _NOBODYS.items() if counts[origin]],
         "budgets": bool((evidence.get("calibration") or {}).get("budgets")),
-        "drawn": any(row["achieved_interval"] for row in evidence.get("requirements", ())),
+        "drawn": "summary" in evidence,
     }
 
 

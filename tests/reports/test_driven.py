@@ -66,8 +66,8 @@ def test_a_third_balancer_is_reported(balls: Path) -> None:
     assert untrue(pages, evidence) == []
     assert len(traces(pages)) > 5
     text = page_text(pages[0])
-    assert "0 of 3 requirements are met" in text
-    assert "| Balancing moment | at least 120 g mm |" in text.replace("\u202f", " ")
+    assert text.count("not met") >= 2
+    assert evidence["summary"]["own"]["fraction"]["count"] == 0
     assert (balls / "figures" / "run-amplitude.svg").is_file()
     assert (balls / "tables" / "loop_balanced.csv").read_text().startswith("time [s],amplitude [m]")
 

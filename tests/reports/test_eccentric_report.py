@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from check_traces import traces, untrue
 
-from ringbalance.controller.eccentric_mass import requirements
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports.evidence import parameters
 from ringbalance.reports.page import render
+from ringbalance.reports.pages import plain
 from ringbalance.reports.pages.eccentric import SECTIONS
 from ringbalance.reports.report import write_report
 from ringbalance.scene import bundled_scene, load_scene
@@ -44,7 +44,7 @@ def folder(scene: EccentricScene, tmp_path_factory: pytest.TempPathFactory) -> P
     with pytest.MonkeyPatch.context() as patch:
         # The claims of its paper have tests of their own, and so have the intervals of the study.
         patch.setattr(evidence_module, "load_cases", tuple)
-        patch.setattr(requirements, "DRAWS", 5)
+        patch.setattr(plain, "_MOST", 2)
         write_report(scene, out, scene_text='name = "small"\n')
     return out
 
@@ -65,7 +65,7 @@ def test_report_and_annex_are_written_with_their_figures(folder: Path) -> None:
     names = {path.stem for path in (folder / "figures").iterdir()}
     assert names >= {
         *("eccentric-amplitude", "eccentric-run-up", "eccentric-imbalance", "eccentric-friction"),
-        *("eccentric-angles", "sampled-poles", "requirements"),
+        *("eccentric-angles", "sampled-poles"),
     }
 
 
@@ -90,49 +90,8 @@ def test_the_first_page_compares_with_the_locked_rotor(folder: Path, evidence: R
     status = evidence["closed_loop"]["balanced"]["status"]
     assert status.split(":")[0].capitalize() in page
     assert "with the masses locked where they start" in page
-    for row in evidence["requirements"]:
-        assert row["quantity"] in page
-
-
-@pytest.mark.usefixtures("unwritten")
-def test_an_unmet_requirement_is_not_called_met(evidence: Record) -> None:
-    changed = json.loads(json.dumps(evidence))
-    missed = {**changed["requirements"][0], "quantity": "patience", "achieved": None, "verdict": "not met"}
-    changed["requirements"] = [{**missed, "achieved_interval": None, "required_interval": None}]
-    page = render(changed)["report.html"]
-    assert re.search(r"Patience</th>.*?not reached.*?not met", page)
-    assert "0 of 1 requirements are met; not met: patience." in page
-
-
-@pytest.mark.usefixtures("unwritten")
-def test_a_result_that_not_all_drawn_runs_come_to_reads_as_one_sentence(evidence: Record) -> None:
-    changed = json.loads(json.dumps(evidence))
-    row = {**changed["requirements"][0], "quantity": "settling time", "unit": "s", "achieved": 2.32}
-    row.update(verdict="undecided", reached=0.38, lost=["masses.friction_arm"], achieved_interval=None)
-    changed["requirements"] = [row, {**row, "quantity": "patience", "reached": 1.0}]
-    page = re.sub(r"<[^>]*>", "", render(changed)["report.html"])
-    assert "2.32\u202fs with the scene’s values" in page
-    assert "none: of the runs with drawn inputs 38\u202f% get there, the others never do" in page
-    assert "none: with an input at the end of its own interval the run never gets there" in page
-    assert "Of the runs with inputs drawn from their uncertainty 38\u202f% settle." in page
-
-
-@pytest.mark.usefixtures("unwritten")
-def test_what_a_requirement_depends_on_is_named_with_what_to_do(evidence: Record) -> None:
-    changed = json.loads(json.dumps(evidence))
-    row = changed["requirements"][1]
-    row["effects"] = {
-        "rotor.mass": [1e-9, 0.0],
-        "rotor.damping": [5e-7, 0.0],
-        "motor.resistance": [1e-12, 0.0],
-    }
-    row.update(verdict="undecided", lost=[], achieved_interval=[0.0, 6e-7])
-    changed["requirements"] = [row]
-    page = re.sub(r"<[^>]*>", "", render(changed)["report.html"])
-    assert "up to 0.600\u202fµm" in page
-    assert "Measure damping of the rotor: this decides" in page
-    assert "limit of the supervisor" in page
-    assert ">supervisor.limit<" not in page
+    fraction = evidence["summary"]["own"]["fraction"]
+    assert f"{fraction['of']}</span> devices" in page
 
 
 def test_no_value_is_empty(scene: EccentricScene) -> None:

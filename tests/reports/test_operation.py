@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from ringbalance.reports.figure import NARROW, Drawing
-from ringbalance.reports.pages.loop import LOOP, _settling_histogram
+from ringbalance.reports.pages.loop import LOOP
 from ringbalance.reports.pages.operation import SECTION, _disc_section, _letter_radius, _operating_map
-from ringbalance.reports.pages.requirements import requirement_bars
 from ringbalance.reports.pages.standing import CONDITIONS
 from ringbalance.reports.run_figures import _clearest, _reachable, residual_polar
 from ringbalance.reports.section import Work
@@ -100,30 +99,6 @@ def test_the_tornado_begins_with_the_largest_cause() -> None:
     assert bare["tornado"] is None
 
 
-def test_runs_that_never_settle_have_a_bar_of_their_own() -> None:
-    sample = {
-        "title": "as it is",
-        "edges_s": [0.0, 1.0, 2.0],
-        "counts": [3, 1],
-        "runs": 10,
-        "not_settled": 0.6,
-        "time_limit_s": 20.0,
-    }
-    drawing = _settling_histogram([sample])
-    assert {"never", "60\u202f%"} <= set(texts(drawing))
-    heights = [abs(y) for y in bar_heights(drawing)]
-    assert max(heights) == pytest.approx(2 * heights[0], rel=0.02)
-    assert heights[0] == pytest.approx(3 * heights[1], rel=0.05)
-
-
-def bar_heights(drawing: Drawing) -> list[float]:
-    """Heights of the bars, in their order."""
-    bars = re.findall(
-        r'<path d="M [\d.]+ ([\d.]+) L [\d.]+ [\d.]+ L [\d.]+ ([\d.]+)[^"]*z *" clip', flat(drawing)
-    )
-    return [float(a) - float(b) for a, b in bars if float(a) != float(b)]
-
-
 def flat(drawing: Drawing) -> str:
     return re.sub(r"\s+", " ", drawing.svg)
 
@@ -151,20 +126,6 @@ def test_pairs_together_cancel_the_sum_of_what_each_does(pairs: int, corners: in
     assert len(found) == corners
     # The farthest corner of n equal vectors spread over half a turn lies at 1/sin(pi/2n).
     assert np.abs(found).max() == pytest.approx(1 / math.sin(math.pi / 2 / pairs))
-
-
-@pytest.mark.parametrize(
-    ("reached", "high", "number"),
-    [(1.2, 1.3, ""), (8.0, 8.0, "8.0 \u25b8"), (0.1, 3.5, "up to 3.5 \u25b8")],
-)
-def test_a_requirement_is_judged_in_words(reached: float, high: float, number: str) -> None:
-    """A bar or an interval that goes on beyond the axis ends in its number."""
-    row = {"label": "moment", "required": 1.0, "reached": reached, "low": 0.1, "high": high}
-    drawing = requirement_bars([{**row, "at_least": True, "verdict": "met"}])
-    assert drawing is not None
-    told = texts(drawing)
-    assert any(text.endswith(": met") for text in told)
-    assert [text for text in told if "\u25b8" in text] == ([number] if number else [])
 
 
 def test_text_is_no_smaller_than_eight_points_in_print(collected: Record) -> None:

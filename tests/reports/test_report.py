@@ -14,13 +14,14 @@ import pytest
 from check_traces import apart, traces, untrue
 from keep_evidence import kept_document
 
+from ringbalance.controller.judging.judge import judged
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports import saved as saved_module
+from ringbalance.reports.judged import own_record
 from ringbalance.reports.page import case_views, render
-from ringbalance.reports.pages import loop as consequences_module
-from ringbalance.reports.pages.consequences import find_consequences
+from ringbalance.reports.pages import consequences, first_page
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.report import Report, write_report
@@ -44,21 +45,16 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module", autouse=True)
 def few_cases(kept: Path) -> Iterator[None]:
-    """Three cases instead of all, one check, one claim, one heavy; and consequences found once."""
+    """Three cases instead of all, one check, one claim, one heavy; and few devices."""
 
     def cases() -> list[CaseDefinition]:
         return [load_case(name) for name in QUICK]
 
-    def consequences(*arguments: Any, **_: Any) -> Any:
-        if not found:
-            found.append(find_consequences(*arguments, members=20))
-        return found[0]
-
-    found: list[Any] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evidence_module, "load_cases", cases)
         patch.setattr(saved_module, "code_root", lambda: kept)
-        patch.setattr(consequences_module, "find_consequences", consequences)
+        patch.setattr(first_page, "own_record", partial(own_record, most=16))
+        patch.setattr(consequences, "judged", partial(judged, most=16))
         yield
 
 
@@ -112,11 +108,11 @@ def test_the_page_comes_from_the_evidence_file_alone(first: Report) -> None:
     assert len(traces(pages.values())) > 100
 
 
-def test_the_consequences_of_a_wrong_k_are_reported(first: Report) -> None:
-    page, found = (first.page.parent / "annex.html").read_text(), first.evidence["consequences"]
-    assert 'href="#consequences"' in page
-    start = page.index("One run each", page.index('id="consequences"'))
-    assert len(found["runs"]) == page.count("<tr>", start, page.index("Probabilities over")) - 1
+def test_both_laws_are_judged_over_the_same_devices(first: Report) -> None:
+    assert 'href="#consequences"' in (first.page.parent / "annex.html").read_text()
+    of = first.evidence["consequences"]["paper"]["fraction"]["of"]
+    assert of == first.evidence["summary"]["own"]["fraction"]["of"]
+    assert [each["law"] for each in first.evidence["consequences"]["gain"]] == ["paper", "calibrated"]
 
 
 def test_without_opengl_the_page_says_so(first: Report) -> None:
@@ -269,33 +265,20 @@ def test_what_is_in_the_way_of_a_report_is_reported_before_the_work(
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
-@pytest.mark.parametrize(
-    ("failed", "settled", "code"),
-    [
-        (False, (True, True), 0),
-        (False, (False, True), 0),
-        (False, (False, False), 1),
-        (True, (True, True), 1),
-    ],
-)
+@pytest.mark.parametrize(("failed", "code"), [(False, 0), (True, 1)])
 def test_exit_codes(
     whole: Record,
     failed: bool,
-    settled: tuple[bool, bool],
     code: int,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    runs = whole["closed_loop"]
-    loops = {law: runs[law] | {"settled": ok} for law, ok in zip(runs, settled, strict=True)}
     cases = [
         case | {"verdict": "failed"} if failed and case["kind"] == "code_verification" else case
         for case in whole["verification"]
     ]
-    finished = Report(
-        page=tmp_path / "report.html", evidence=whole | {"closed_loop": loops, "verification": cases}
-    )
+    finished = Report(page=tmp_path / "report.html", evidence=whole | {"verification": cases})
     monkeypatch.setattr(cli, "write_report", lambda *_, **__: finished)
     assert cli.report(bundled_scene("liquid_ring_paper"), out=tmp_path) == code
     told = capsys.readouterr()

@@ -38,6 +38,7 @@ def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
     assert present == {section.file for section in (*SECTIONS, *eccentric.SECTIONS, *plain.SECTIONS)} | {
         "report.html",
         "macros.html",
+        "decided.html",
     }
 
 

@@ -1,0 +1,121 @@
+"""What judgements over drawn devices come to, as plain numbers for the evidence."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.balancer import FURTHER, Balancer, Outcomes
+from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all
+from ringbalance.reports.section import Record
+from ringbalance.results.proportion import Proportion
+from ringbalance.scene.describe import usual_unit
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.toml import toml_text
+from ringbalance.scene.units import unit_factor
+
+LONGER: Final = 300.0
+"""s, for which runs are watched again, to show what longer watching changes."""
+_LONGER_DRAWS: Final = 128
+HALF, MOST = 0.5, 0.9
+"""Fractions of all devices whose settling times are told."""
+_POINTS: Final = 50
+"""Most entries of a curve."""
+_BAND: Final = (0.025, 0.5, 0.975)
+"""Quantiles between which 95 % of the devices lie, and their median."""
+_DIGITS: Final = 4
+
+
+def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS, longer: bool = True) -> Record:
+    """The scene's own settings over drawn devices, and what longer watching makes of them."""
+    (own,) = judged_all(balancer, [{}], first=first, most=most)
+    if not longer:
+        return judgement_record(own)
+    (again,) = judged_all(balancer, [{}], first=first, most=min(_LONGER_DRAWS, most), further=LONGER)
+    return judgement_record(own) | {"longer": _watched(again, LONGER)}
+
+
+def judgement_record(judgement: Judgement) -> Record:
+    """One setting over drawn devices; SI."""
+    outcomes = judgement.outcomes
+    return {
+        "settings": dict(judgement.settings),
+        "asked": judgement.asked,
+        "demands": [
+            {
+                "code": each.code,
+                "sense": each.sense,
+                "required": each.required,
+                "unit": each.unit,
+                "stated": each.stated,
+                "fraction": judgement.fraction_of(each).document(),
+                "verdict": judgement.fraction_of(each).verdict(judgement.asked),
+            }
+            for each in judgement.demands
+        ],
+        **_watched(judgement, FURTHER),
+        "half_s": _time(judgement, HALF),
+        "most": MOST,
+        "most_s": _time(judgement, MOST),
+        "usable_moment_kg_m": np.nanquantile(outcomes.usable_moment, _BAND).tolist(),
+        "settled": _settled(outcomes),
+        "ended": dict(Counter(outcomes.ended).most_common()),
+        "clipped": dict(outcomes.clipped),
+    }
+
+
+def _watched(judgement: Judgement, further: float) -> Record:
+    return {
+        "further_s": further,
+        "fraction": judgement.fraction.document(),
+        "verdict": judgement.verdict,
+    }
+
+
+def _time(judgement: Judgement, fraction: float) -> list[float] | None:
+    times = judgement.settling_time(fraction)
+    return None if times is None else list(times)
+
+
+def _settled(outcomes: Outcomes) -> Record:
+    """Fraction of the devices that has settled by a time, with its bounds."""
+    times = np.sort(outcomes.settling_time[outcomes.settled])
+    counts = np.unique(np.linspace(1, times.size, _POINTS).round()) if times.size else np.zeros(0)
+    by = [Proportion(count=int(count), of=outcomes.settled.size) for count in counts]
+    return {
+        "time_s": [float(times[each.count - 1]) for each in by],
+        "value": [each.value for each in by],
+        "low": [each.low for each in by],
+        "high": [each.high for each in by],
+    }
+
+
+def settings_text(rows: Iterable[Record]) -> str:
+    """Settings as a block to put into a scene file."""
+    tables: dict[str, list[str]] = {}
+    for row in rows:
+        table, _, key = row["path"].partition(".")
+        tables.setdefault(table, []).append(f"{key} = {row['text']}")
+    return "\n\n".join("\n".join([f"[{table}]", *lines]) for table, lines in tables.items())
+
+
+def settings_rows(scene: SceneFile, paths: Iterable[str]) -> Iterator[Record]:
+    """Values of a scene as its file would have them, by path; what it leaves out is left out."""
+    for path in paths:
+        table, _, key = path.partition(".")
+        value = getattr(getattr(scene, table), key)
+        if value not in (None, ()):
+            yield {"path": path, "text": toml_text(_written(value, usual_unit(path)))}
+
+
+def _written(value: Any, unit: str) -> Any:
+    if isinstance(value, tuple):
+        return [_written(each, unit) for each in value]
+    if isinstance(value, str | bool | int):
+        return value
+    if unit in ("", "1"):
+        return float(f"{value:.{_DIGITS}g}")
+    return f"{value / unit_factor(unit):.{_DIGITS}g} {unit}"

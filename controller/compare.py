@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Balancer, CommonRotor, Draws, vibrating
+from ringbalance.controller.balancer import Balancer, Draws
+from ringbalance.controller.common_rotor import CommonRotor, vibrating
 from ringbalance.controller.tuning.dead_time import offset_text
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.result import Result, Rows, Table

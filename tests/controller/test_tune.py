@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,15 +13,6 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.cli import main
-from ringbalance.controller.eccentric_mass import balancer
-from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.scene_records import (
-    EccentricScene,
-    eccentric_drawn,
-    eccentric_scene,
-)
-from ringbalance.controller.eccentric_mass.settings import StrategySettings
-from ringbalance.controller.eccentric_mass.tuning import FIRST_RUNS, _eccentric_settling, tune_eccentric
 from ringbalance.controller.liquid_ring.loop_factor import loop_margins, vibration_rates
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.tuning.recommendation import factor_uncertainty
@@ -31,7 +21,6 @@ from ringbalance.controller.tuning.tune import tune
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.scene.uncertain import half_widths, shifted
@@ -256,83 +245,3 @@ def test_a_tuning_states_what_its_runs_leave_out(scene: Scene) -> None:
     assert held["estimated_contribution"] > 0.5
     assert "unless the tube is primed" in held["model"]
     assert document["neglected"]["unknown"] == ("gas filling", "valve lag")
-
-
-# --- eccentric masses ---
-
-
-def washing_machine(*, time_limit: float = 80.0) -> EccentricScene:
-    scene = eccentric_scene(load_scene(bundled_scene("washing_machine")))
-    return replace(scene, run=replace(scene.run, time_limit=time_limit))
-
-
-def once(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The result of the first call, again for each further one."""
-    found: list[Any] = []
-
-    def known(*given: Any, **named: Any) -> Any:
-        if not found:
-            found.append(function(*given, **named))
-        return found[0]
-
-    return known
-
-
-def test_eccentric_masses_get_their_sampled_loops_and_settling_times(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As a document and as text: of the same runs."""
-    monkeypatch.setattr(balancer, "tune_eccentric", once(tune_eccentric))
-    scene = str(bundled_scene("washing_machine"))
-    assert main(["tune", scene, "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert set(answer["gain"]) == {loop["key"] for loop in answer["loops"]}
-    assert answer["settling_time_s"]["p50"] <= answer["settling_time_s"]["p95"] < answer["span_s"]
-    low, high = answer["fraction_settled_95"]
-    assert low < answer["fraction_settled"] <= high
-    assert sum(answer["outcomes"].values()) == answer["runs"]
-    assert "rotor.stiffness" in answer["drawn"]
-    assert main(["tune", scene]) == 0
-    shown = capsys.readouterr().out
-    assert "voltage" in shown
-    assert "95 % of 40 runs settle" in " ".join(shown.split())
-
-
-def test_settling_times_of_eccentric_masses_are_those_of_whole_runs() -> None:
-    """Runs that end early, because they have settled, settle as they do in the whole time."""
-    scene = washing_machine(time_limit=12.0)
-    found = _eccentric_settling(scene, runs=6, told=lambda _: None)
-    times = []
-    for number in range(6):
-        seed = scene.run.seed + number
-        random = np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(0,)))
-        run = simulate_eccentric(
-            eccentric_drawn(scene, random), seed=seed, settings=StrategySettings.of(scene)
-        )
-        times.append(math.inf if run.settling_time is None else run.settling_time)
-    assert found.times.quantiles["p50"] == sorted(times)[2]
-    assert found.times.quantiles["p95"] == sorted(times)[5]
-    assert len(set(times)) > 1
-
-
-def test_too_few_settled_runs_of_eccentric_masses_end_early_and_say_why() -> None:
-    """Quantiles are of all runs: with none settled there is none, and the most frequent reason is given."""
-    found = tune_eccentric(washing_machine(time_limit=1.0))
-    assert found.settling is not None
-    assert found.settling.times.quantiles == {"p50": None, "p95": None}
-    assert (found.settling.times.settled.value, found.settling.times.runs) == (0.0, FIRST_RUNS)
-    assert found.settling.outcomes == {"time_limit": FIRST_RUNS}
-    assert not found.succeeded
-    assert "raise run.time_limit" in found.status
-
-
-def test_drawn_plants_have_the_stated_half_widths() -> None:
-    scene = washing_machine()
-    widths = {each.quantity: each for each in scene.uncertainty}
-    random = np.random.default_rng(3)
-    drawn = [eccentric_drawn(scene, random) for _ in range(2000)]
-    stiffness = np.log([each.rotor.stiffness / scene.rotor.stiffness for each in drawn])
-    arms = np.array([each.masses.friction_arm for each in drawn]) / scene.masses.friction_arm
-    for logs, path in ((stiffness, "rotor.stiffness"), (np.log(arms[:, 0]), "masses.friction_arm")):
-        assert 1.96 * np.std(logs) == pytest.approx(math.log1p(widths[path].half_width), rel=0.06)
-    np.testing.assert_allclose(arms[:, 0], arms[:, 1], rtol=1e-14)

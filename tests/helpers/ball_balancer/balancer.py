@@ -15,7 +15,6 @@ from ball_balancer.scene_keys import BallScene
 from ringbalance.controller.balancer import (
     FURTHER,
     REQUIRED_FRACTION,
-    CommonRotor,
     Demand,
     Draws,
     Input,
@@ -29,9 +28,9 @@ from ringbalance.controller.balancer import (
     one_by_one,
     outcomes_of,
     requirements_of,
-    rotor_fault,
     settles_within,
 )
+from ringbalance.controller.common_rotor import CommonRotor, rotor_fault
 from ringbalance.controller.drawn_input import DrawnInput, drawn_key
 from ringbalance.controller.trials import Trials, scaled
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
@@ -126,6 +125,8 @@ class BallBalancer:
     """
 
     options = frozenset[str]()
+    verdict_draws = (16, 32)
+    watched_to_end = True
     models_used: tuple[Any, ...] = ()
 
     def __init__(self, scene: BallScene) -> None:

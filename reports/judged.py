@@ -11,9 +11,8 @@ import numpy as np
 
 from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all
-from ringbalance.controller.judging.ranking import ranked
-from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
-from ringbalance.controller.judging.search import Along, searched
+from ringbalance.controller.judging.remedies import tried_choices
+from ringbalance.controller.judging.search import Along
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.reports.section import Record
 from ringbalance.results.proportion import Proportion
@@ -55,7 +54,7 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
             "path": tuning.along_name,
             "levels": [_level(each) for each in tuning.along],
         },
-        **_advice(balancer, tuning),
+        **_advice(tuning),
     }
 
 
@@ -64,17 +63,16 @@ def _longer(balancer: Balancer) -> Record:
     return _watched(longer, LONGER)
 
 
-def _advice(balancer: Balancer, tuning: Tuning) -> Record:
+def _advice(tuning: Tuning) -> Record:
     """Remedies and measurements where too few devices meet what is asked, and what can be bought."""
     best, own = tuning.recommended, tuning.own
     if best.verdict == MET:
         enough = own is not None and own.verdict == MET
         measures = () if enough else (Finding(code="nothing_to_measure"),)
         return {"remedies": [], "measures": [each.document() for each in measures]}
-    remedies = tried_remedies(balancer, best, search=searched)
     return {
-        "remedies": [each.document() for each in remedies],
-        "measures": [each.document() for each in ranked(balancer, best).findings()],
+        "remedies": [each.document() for each in tuning.remedies],
+        "measures": [each.document() for each in tuning.ranking.findings()],
     }
 
 

@@ -87,7 +87,7 @@ _NEEDED: Final = "needed_moment"
 
 def _collect(work: Work) -> Record:
     scene, balancer = work.scene, LiquidRingBalancer(work.scene)
-    tuning = balancer.recommend(pressure=True)
+    tuning = balancer.recommend(pressure=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
     return {
         "limit_m": scene.controller.limit,
@@ -173,7 +173,7 @@ def _remedy(row: Record) -> str:
 
 
 def _pressure(found: Record) -> Drawing | None:
-    if not found or not found["along"]["levels"]:
+    if not found.get("along"):
         return None
     return pressure_figure(
         found["along"]["levels"],

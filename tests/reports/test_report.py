@@ -18,7 +18,6 @@ from ringbalance.controller.judging import tune
 from ringbalance.controller.judging.judge import judged, judged_all
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
-from ringbalance.reports import judged as reports_judged
 from ringbalance.reports import report as report_module
 from ringbalance.reports import saved as saved_module
 from ringbalance.reports.page import case_views, render
@@ -56,7 +55,7 @@ def few_cases(kept: Path) -> Iterator[None]:
         patch.setattr(saved_module, "code_root", lambda: kept)
         patch.setattr(tune, "search", lambda *_, **__: ())
         patch.setattr(tune, "judged_all", partial(judged_all, most=16))
-        patch.setattr(reports_judged, "tried_remedies", lambda *_, **__: ())
+        patch.setattr(tune, "tried_remedies", lambda *_, **__: ())
         patch.setattr(first_page, "choice_records", lambda _: [])
         patch.setattr(first_page, "judged", partial(judged, most=16))
         patch.setattr(consequences, "judged", partial(judged, most=16))

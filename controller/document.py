@@ -47,7 +47,6 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "further_time_s": FURTHER,
         "loop_factor": simulation.loop.value,
         "loop_factor_limit": simulation.loop.limit,
-        "largest_staying_loop_factor": simulation.loop.largest_staying,
         "vibration_rate_m_per_s": simulation.loop.rate,
         "stationary_deviation_m": finite(simulation.loop.deviation),
         "time_s": simulation.time.tolist(),

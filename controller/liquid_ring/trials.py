@@ -9,10 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.liquid_ring.dead_time import dead_time
 from ringbalance.controller.liquid_ring.loop_factor import vibration_rates
-from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.trials import Axis, Point, Trials, rounded
-from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
 
@@ -50,21 +49,6 @@ class _Loop:
     def of(cls, scene: Scene, model: BalancerModel) -> _Loop:
         rate = float(np.max(np.mean(vibration_rates(scene, model), axis=1)))
         return cls(rate=rate, dead_time=dead_time(scene, model, rate=rate))
-
-
-def dead_time(scene: Scene, model: BalancerModel, *, rate: float) -> float:
-    """Of an injection of the size of the limit at equal fills, while gas fills the chamber and liquid rises.
-
-    At least the valve's lag and its shortest opening, s.
-    """
-    modelled, total = terms_modelled(run_models(scene=scene, model=model)), 2 * scene.disc.initial_fill
-    least = max(scene.gas.valve_lag or 0.0, scene.controller.minimum_gas_time)
-    if not modelled or rate <= 0.0:
-        return least
-    dynamics = dynamics_of(scene=scene, model=model, modelled=modelled, checked=True)
-    injections = Injections.of(dynamics, model, fill=scene.disc.initial_fill, total=total)
-    lost = injections.dead_time(scene.controller.limit / rate * injections.steady)
-    return max(lost or 0.0, least)
 
 
 def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials, ...]:

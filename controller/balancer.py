@@ -14,6 +14,7 @@ from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
+from ringbalance.controller.common_rotor import CommonRotor
 from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.trials import Trials
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
@@ -21,7 +22,7 @@ from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.faults import SceneError
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
@@ -247,6 +248,11 @@ class Balancer(Protocol):
     options: frozenset[str]
     """Arguments besides the scene that it can be made with, such as "flow_law"."""
 
+    verdict_draws: tuple[int, int]
+    """Devices of a verdict, at first and at the most."""
+    watched_to_end: bool
+    """Whether every run is watched to its time limit, whatever is asked for."""
+
     @property
     def scene(self) -> SceneFile:
         """The scene that it was made of."""
@@ -338,8 +344,8 @@ class Balancer(Protocol):
         """The same with runs that balance for so long, s, and go on when they have settled."""
         ...
 
-    def advised(self) -> tuple[Self, Mapping[str, float]]:
-        """With the settings that its formulas recommend, and those that this changed, SI; no run is made."""
+    def advised(self) -> tuple[Self, Settings]:
+        """With the settings to compare it with, and those that this changed, SI."""
         ...
 
     def recommend(
@@ -480,47 +486,3 @@ def requirements_of(
         Requirement("amplitude at the end", "m", AT_MOST, residual, "the limit", done.final_amplitude),
         Requirement("settling time", "s", AT_MOST, settling_time, "the time allowed", done.settling_time),
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class CommonRotor:
-    """What balancers on one rotor have in common.
-
-    What a balancer knows of a rotor at constant speed is its vibration before balancing and its vibration per
-    unbalance, V = alpha (U_0 + U_balancer).  One rotor therefore means: the same speed, the same complex
-    alpha, the same U_0, the same sensor and the same amplitude to come below.
-    """
-
-    source: str
-    """File of the scene that it is taken from."""
-    speed: float
-    """W, rad/s, above zero."""
-    influence: complex
-    """alpha, m/(kg m)."""
-    unbalance: complex
-    """U_0, kg m."""
-    mass: float | None
-    """M with the balancer, kg; None when the scene does not give it."""
-    noise: float
-    """Standard deviation of the measured vibration, m."""
-    limit: float
-    """Amplitude to come below, m."""
-
-    @property
-    def amplitude(self) -> float:
-        """Vibration before balancing, m zero-to-peak."""
-        return abs(self.influence * self.unbalance)
-
-
-def rotor_fault(scene: SceneFile, path: str, problem: str, allowed: str) -> SceneError:
-    """The error about a rotor, or about a balancer that cannot work on it; `path`: of the value to change."""
-    table, _, key = path.partition(".")
-    return SceneError([Fault(file=scene.file, table=table, key=key, problem=problem, allowed=allowed)])
-
-
-def vibrating(scene: SceneFile, rotor: CommonRotor) -> CommonRotor:
-    """The same rotor. Raises: SceneError: it does not vibrate."""
-    if rotor.amplitude == 0:
-        problem = "it does not vibrate: there is nothing to compare"
-        raise rotor_fault(scene, "rotor", problem, "an unbalance")
-    return rotor

@@ -16,11 +16,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import AS_GIVEN, balancer_of
+from ringbalance.controller.balancer import AS_GIVEN, Draws, balancer_of
+from ringbalance.controller.eccentric_mass.band import amplitude_band
+from ringbalance.controller.eccentric_mass.loop_rows import loops_document
 from ringbalance.controller.eccentric_mass.plant import rotor_record
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
-from ringbalance.controller.eccentric_mass.tuning import tune_eccentric
+from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
@@ -51,6 +54,8 @@ from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
 Progress = Callable[[str], None]
 
 FORMAT: Final = 1
+_TRACED: Final = 16
+"""Drawn devices of the band of their vibration, the first of the verdict's."""
 LAW_POINTS: Final = 51
 """Fill ratios at which the flow law is drawn."""
 
@@ -308,8 +313,9 @@ def _plain_study(scene: SceneFile) -> Record:
 
 
 def _eccentric_study(scene: EccentricScene) -> Record:
-    """The run, balanced and with its masses locked, its loops and requirements, and the true values."""
-    run = simulate_eccentric(scene)
+    """The run, balanced and with its masses locked, drawn devices, loops, and the true values."""
+    run, balancer = simulate_eccentric(scene), balancer_of(scene)
+    several = balancer.run({}, Draws.block(FRESH, _TRACED), trace=True)
     truth = {
         "unbalance_kg_m": scene.imbalance.mass * scene.imbalance.radius,
         "phase_rad": scene.imbalance.phase,
@@ -320,7 +326,8 @@ def _eccentric_study(scene: EccentricScene) -> Record:
         "closed_loop": {"balanced": run.to_dict()},
         "locked": locked_run(scene).to_dict(),
         "rotor": rotor_record(scene),
-        "tuning": tune_eccentric(scene, runs=0).to_dict(),
+        "tuning": loops_document(RecommendedGains.of(scene)),
+        "drawn": amplitude_band(several.traced, start=0.0, end=scene.run.time_limit),
     }
 
 

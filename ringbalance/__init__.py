@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ringbalance.controller.compare import Comparison as Comparison
     from ringbalance.controller.eccentric_mass.run_record import EccentricRun as EccentricRun
     from ringbalance.controller.eccentric_mass.scene_records import EccentricScene as EccentricScene
-    from ringbalance.controller.eccentric_mass.tuning import EccentricTuning as EccentricTuning
     from ringbalance.controller.judging.tuning import Tuning as Tuning
     from ringbalance.controller.rotor import Sensor as Sensor
     from ringbalance.controller.simulation import Simulation as Simulation
@@ -79,7 +78,6 @@ _NAMES = {
     "controller.compare": ("Comparison",),
     "controller.eccentric_mass.run_record": ("EccentricRun",),
     "controller.eccentric_mass.scene_records": ("EccentricScene",),
-    "controller.eccentric_mass.tuning": ("EccentricTuning",),
     "controller.rotor": ("Sensor",),
     "controller.simulation": ("Simulation",),
     "controller.judging.tuning": ("Tuning",),

@@ -11,7 +11,6 @@ from ringbalance.controller.compare import Comparison
 from ringbalance.controller.compare import compare as run_comparison
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.tuning import EccentricTuning
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.loop import Progress
 from ringbalance.controller.rotor import Sensor
@@ -107,39 +106,13 @@ def compare(first: AnyScene, second: AnyScene) -> Comparison:
     return run_comparison(*(balancer_of(checked_scene(scene)) for scene in (first, second)))
 
 
-@overload
-def tune(
-    scene: Scene,
-    *,
-    flow_law: GivesVelocities | None = None,
-    pressure: bool = False,
-    progress: Callable[[str], None] | None = None,
-) -> Tuning: ...
-
-
-@overload
-def tune(
-    scene: EccentricScene,
-    *,
-    flow_law: None = None,
-    pressure: bool = False,
-    progress: Callable[[str], None] | None = None,
-) -> EccentricTuning: ...
-
-
-@overload
-def tune(
-    scene: AnyScene, *, pressure: bool = False, progress: Callable[[str], None] | None = None
-) -> Tuning | EccentricTuning: ...
-
-
 def tune(
     scene: AnyScene,
     *,
     flow_law: GivesVelocities | None = None,
     pressure: bool = False,
     progress: Callable[[str], None] | None = None,
-) -> Tuning | EccentricTuning:
+) -> Tuning:
     """Recommend settings of the controller, chosen by runs of drawn devices and judged on others.
 
     Args: `flow_law`: as in `simulate`. `pressure`: whether the gas pressure is searched even where that of
@@ -150,4 +123,4 @@ def tune(
     tuning = balancer_of(checked_scene(scene), flow_law=flow_law).recommend(
         pressure=pressure, progress=progress
     )
-    return cast("Tuning | EccentricTuning", tuning)
+    return cast("Tuning", tuning)

@@ -25,6 +25,8 @@ _KEPT: Final = 4096
 """Columns, which devices one by one ask for again."""
 _LAST: Final = 1e-12
 """Fraction at either end of a distribution that no device lies in."""
+_NOISE: Final = 3
+"""In the key of a run's noise, which the keys of drawn inputs do not have."""
 
 
 def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
@@ -41,6 +43,12 @@ def quantiles(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
 def deviates(name: str, numbers: Sequence[int], *, seed: int) -> FloatArray:
     """The same of a standard normal distribution."""
     return np.asarray(ndtri(quantiles(name, numbers, seed=seed)))
+
+
+def run_noise(seed: int, number: int) -> np.random.Generator:
+    """Random numbers of the sensors in the run of a drawn device."""
+    key = np.random.SeedSequence(entropy=seed, spawn_key=(number, _NOISE))
+    return np.random.Generator(np.random.PCG64(key))
 
 
 @lru_cache(_KEPT)

@@ -12,8 +12,6 @@ import numpy as np
 
 from ringbalance.controller.balancer import (
     FURTHER,
-    REQUIRED_FRACTION,
-    CommonRotor,
     Demand,
     Draws,
     Input,
@@ -24,28 +22,33 @@ from ringbalance.controller.balancer import (
     Settings,
     TracedRun,
     inputs_of,
-    one_by_one,
     outcomes_of,
-    rotor_fault,
+    requirements_of,
     settles_within,
 )
-from ringbalance.controller.drawn_input import DrawnInput, drawn_key
+from ringbalance.controller.common_rotor import CommonRotor, rotor_fault
+from ringbalance.controller.drawn_input import MEASURE_INPUT, DrawnInput, drawn_key
+from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device
+from ringbalance.controller.eccentric_mass.loop_rows import loops_document, loops_quantities, loops_status
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
-from ringbalance.controller.eccentric_mass.requirements import eccentric_requirements, reach_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
-from ringbalance.controller.eccentric_mass.sampled_loops import advised
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricRotor,
     EccentricScene,
     SpeedPoint,
     eccentric_scene,
 )
-from ringbalance.controller.eccentric_mass.tuning import EccentricTuning, drawn_run, tune_eccentric
-from ringbalance.controller.trials import Trials, scaled
-from ringbalance.results.requirements import Requirement
+from ringbalance.controller.eccentric_mass.settings import StrategySettings
+from ringbalance.controller.eccentric_mass.targets import reach_of
+from ringbalance.controller.judging.tune import tuned
+from ringbalance.controller.judging.tuning import Information, Tuning
+from ringbalance.controller.trials import Axis, Trials
+from ringbalance.results.requirements import AT_MOST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
+from ringbalance.scene.draws import run_noise
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.paths import with_values_at
 
@@ -53,8 +56,6 @@ _FINEST_SHARE: Final = 0.01
 """Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
 _SETTLED_WHIRL: Final = 12.0
 """Time constants of the free whirl after which a run with eccentric masses starts to balance."""
-_FACTORS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Times a gain."""
 _REACH: Final = 10.0
 """Factor up to which a gain is tried."""
 
@@ -68,6 +69,8 @@ class EccentricMassBalancer:
     """
 
     options = frozenset[str]()
+    verdict_draws = (16, 64)
+    watched_to_end = True
     models_used: tuple[Any, ...] = ()
 
     def __init__(self, scene: EccentricScene) -> None:
@@ -100,15 +103,7 @@ class EccentricMassBalancer:
         progress: Progress | None = None,
     ) -> Outcomes:
         """See `Balancer`."""
-        scene = with_values_at(self.scene, settings)
-        seed = scene.run.seed
-        runs = (
-            drawn_run(scene, number)
-            if draws.devices
-            else simulate_eccentric(with_values_at(scene, {"run.seed": seed + number}), progress=progress)
-            for number in draws.numbers
-        )
-        return outcomes_of([_traced(run, scene) for run in runs], trace=trace)
+        return self._runs([settings], draws, trace=trace, progress=progress)[0]
 
     def run_all(
         self,
@@ -118,20 +113,65 @@ class EccentricMassBalancer:
         further: float = FURTHER,  # noqa: ARG002
     ) -> tuple[Outcomes, ...]:
         """See `Balancer`; masses at rest are watched to the end of the run."""
-        return one_by_one(self, settings, draws)
+        return self._runs(settings, draws)
+
+    def _runs(
+        self,
+        settings: Sequence[Settings],
+        draws: Draws,
+        *,
+        trace: bool = False,
+        progress: Progress | None = None,
+    ) -> tuple[Outcomes, ...]:
+        drawn = [self._device(number, drawn=draws.devices) for number in draws.numbers]
+        inputs = {name: np.array([each.inputs[name] for each in drawn]) for name in drawn[0].inputs}
+        found = []
+        for asked in settings:
+            scene = with_values_at(self.scene, asked)
+            strategy = StrategySettings.of(scene)
+            runs = []
+            for number, each in zip(draws.numbers, drawn, strict=True):
+                seed = run_noise(scene.run.seed, number) if draws.devices else scene.run.seed + number
+                plant = with_values_at(each.scene, asked)
+                run = simulate_eccentric(plant, seed=seed, settings=strategy, progress=progress)
+                runs.append(_traced(run, plant))
+            found.append(replace(outcomes_of(runs, trace=trace), numbers=draws.numbers, inputs=inputs))
+        return tuple(found)
+
+    def _device(self, number: int, *, drawn: bool) -> Device:
+        return device(self.scene, number) if drawn else Device(scene=self.scene, inputs={})
 
     def asked_fraction(self) -> float:
-        """See `Balancer`."""
-        return REQUIRED_FRACTION
+        """The scene's."""
+        return self.scene.requirement.fraction
 
     def demands(self) -> tuple[Demand, ...]:
-        """See `Balancer`."""
-        return (settles_within(self.span(), stated=False),)
+        """Settled in time, at the latest when the speed changes, and what may remain where it is stated."""
+        scene, wanted = self.scene, self.scene.requirement
+        until = (scene.steady_until or scene.run.time_limit) - scene.supervisor.start
+        time = until if wanted.settling_time is None else wanted.settling_time
+        settles = settles_within(time, stated=wanted.settling_time is not None)
+        if wanted.residual is None:
+            return (settles,)
+        residual = Demand(
+            code="residual",
+            outcome="final_amplitude",
+            sense=AT_MOST,
+            required=wanted.residual,
+            unit="m",
+            stated=True,
+        )
+        return settles, residual
 
     def trials(self) -> tuple[Trials, ...]:
-        """See `Balancer`; masses settle by the gains of the scene or near them."""
-        values = {each.path: each.value for each in self.settings()}
-        return (scaled("eccentric_mass", values, _FACTORS, first=(1, 2)),)
+        """The gains of the drives with their margins, where the scene's have less: no other gain decides
+        whether masses settle."""
+        changes = advised(self.scene)[1]
+        if all(loop.value <= loop.recommended for loop in RecommendedGains.of(self.scene).loops):
+            return ()
+        loops = Axis(name="margins of the drives", levels=(0.0, 1.0), first=(0, 1))
+        kind = self.scene.balancer
+        return (Trials(kind=kind, axes=(loops,), settings=lambda at: changes if at[loops.name] else {}),)
 
     def remedies(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
@@ -143,6 +183,10 @@ class EccentricMassBalancer:
 
     def drawn_input(self, name: str) -> DrawnInput:
         """See `Balancer`."""
+        if name == PHASE:
+            return DrawnInput(common=False, measure="")
+        if name.startswith(FITTED):
+            return DrawnInput(common=True, measure=MEASURE_INPUT)
         return drawn_key(self.scene, name)
 
     def on_scene(self, scene: SceneFile) -> EccentricMassBalancer:
@@ -217,25 +261,27 @@ class EccentricMassBalancer:
         scene, changes = advised(self.scene)
         return EccentricMassBalancer(scene), changes
 
-    def recommend(
-        self,
-        *,
-        pressure: bool = False,  # noqa: ARG002
-        progress: Callable[[str], None] | None = None,
-    ) -> EccentricTuning:
+    def recommend(self, *, pressure: bool = False, progress: Callable[[str], None] | None = None) -> Tuning:
         """See `Balancer`."""
-        return tune_eccentric(self.scene, told=progress)
+        return tuned(self, information=_information, along=pressure, progress=progress)
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Reach, and the largest gains of the drives; see `Balancer`."""
         reach = Quantity(
             key="reach", name="usable moment in any direction", unit="kg m", value=reach_of(self.scene)
         )
-        return (reach, *tune_eccentric(self.scene, runs=0).rows().quantities)
+        return (reach, *loops_quantities(RecommendedGains.of(self.scene)))
 
     def requirements(self) -> tuple[Requirement, ...]:
         """See `Balancer`."""
-        return eccentric_requirements(self.scene, simulate_eccentric(self.scene))
+        scene = self.scene
+        return requirements_of(
+            self,
+            unbalance=scene.imbalance.mass * scene.imbalance.radius,
+            reach=reach_of(scene),
+            residual=scene.requirement.residual or scene.supervisor.limit,
+            settling_time=self.demands()[0].required,
+        )
 
     def rows(self, run: EccentricRun) -> Rows:
         """See `Balancer`."""
@@ -244,6 +290,15 @@ class EccentricMassBalancer:
     def history(self, run: EccentricRun) -> Mapping[str, Sequence[Any]]:
         """See `Balancer`."""
         return eccentric_history(run)
+
+
+def _information(scene: SceneFile) -> Information:
+    gains = RecommendedGains.of(eccentric_scene(scene))
+    return Information(
+        quantities=loops_quantities(gains),
+        facts=(("loops of the drives", loops_status(gains)),),
+        document=loops_document(gains),
+    )
 
 
 def _traced(run: EccentricRun, scene: EccentricScene) -> TracedRun:

@@ -39,6 +39,8 @@ from ringbalance.controller.eccentric_mass.targets import Targets, target_angles
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.platform.compiled import compiled
 
+Seed = int | np.random.Generator | None
+"""Of random numbers, or these themselves."""
 NOISES = 8
 """Random numbers that one sample takes: four of vibration, two angles, two rates."""
 _LARGEST_WHIRL = 1e3
@@ -68,7 +70,10 @@ class _Profile(NamedTuple):
 
 
 def _recorded(
-    scene: EccentricScene, seed: int | None, progress: Progress, settings: StrategySettings
+    scene: EccentricScene,
+    seed: Seed,
+    progress: Progress,
+    settings: StrategySettings,
 ) -> tuple[Record, Findings, float | None]:
     """Every sample before the first that means nothing, and what the strategy found.
 
@@ -262,7 +267,7 @@ def _keep(record: Record, i: int, memory: StrategyState, state: FloatArray, comm
 def simulate_eccentric(
     scene: EccentricScene,
     *,
-    seed: int | None = None,
+    seed: Seed = None,
     progress: Progress | None = None,
     settings: StrategySettings | None = None,
 ) -> EccentricRun:

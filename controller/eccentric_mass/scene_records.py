@@ -7,9 +7,8 @@ the tables of such a file and its rules; all is loaded for such a file only.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated, ClassVar, Final, Literal
 
@@ -37,6 +36,7 @@ from ringbalance.scene.keys.fields import (
     PositiveLength,
     PositiveMass,
     PositiveTime,
+    ProperFraction,
     Rate,
     Stiffness,
     Teeth,
@@ -56,9 +56,7 @@ from ringbalance.scene.kinds import (
     written,
 )
 from ringbalance.scene.narrowing import scene_as
-from ringbalance.scene.origins import InputUncertainty, SceneFile
-from ringbalance.scene.paths import moved_at
-from ringbalance.scene.uncertain import NORMAL_95
+from ringbalance.scene.origins import SceneFile
 
 Frame = Literal["rotor", "laboratory"]
 
@@ -164,6 +162,35 @@ class EccentricSensor:
     step: Annotated[PositiveTime, standard("1 ms", "time between two samples, the step of the whole loop")]
 
 
+@dataclass(frozen=True, kw_only=True)
+class EccentricRequirement:
+    """What the balancer is wanted for, and in which fraction of drawn devices; None: nothing is required."""
+
+    settling_time: Annotated[
+        PositiveTime | None,
+        unused(
+            "until the speed changes or the run ends",
+            "time, from the start of balancing, within which the run must have settled",
+        ),
+    ] = None
+    residual: Annotated[
+        PositiveLength | None,
+        unused("limit of [supervisor]", "vibration amplitude (zero-to-peak) that may remain at the end"),
+    ] = None
+    fraction: Annotated[
+        ProperFraction,
+        standard(0.9, "fraction of the devices that the scene may be which must meet every requirement"),
+    ] = 0.9
+    phase_range: Annotated[
+        Angle,
+        standard(
+            "180 deg",
+            "the phase of the imbalance lies within this to either side of the scene's; the default is any "
+            "phase",
+        ),
+    ] = math.pi
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class EccentricScene(SceneFile):
     """All that a run with two eccentric masses needs, in SI units."""
@@ -178,6 +205,7 @@ class EccentricScene(SceneFile):
     lqr: Lqr
     fine_tuning: FineTuning
     supervisor: Supervisor
+    requirement: EccentricRequirement = field(default_factory=EccentricRequirement)
 
     balancer: ClassVar[str] = "eccentric_mass"
 
@@ -210,6 +238,7 @@ _TABLES = {
     "lqr": Table.of(Lqr, "the regulator that moves the masses"),
     "fine_tuning": Table.of(FineTuning, "the search by trial for a smaller vibration"),
     "supervisor": Table.of(Supervisor, "the order of the stages, and when each ends"),
+    "requirement": Table.of(EccentricRequirement, "what is required of the balancer"),
 }
 ECCENTRIC_MASS = Schema.of(
     _TABLES,
@@ -217,40 +246,6 @@ ECCENTRIC_MASS = Schema.of(
     scene=EccentricScene,
 )
 """A scene whose balancer is two eccentric masses."""
-
-
-def eccentric_drawn(scene: EccentricScene, random: np.random.Generator) -> EccentricScene:
-    """The scene with every stated input drawn: relative ones log-normal, so that none changes its sign.
-
-    Those that were fitted together are drawn together, positive ones by their logarithms.
-    """
-    together = {each.quantity for each in scene.fitted.quantities}
-    for uncertain in scene.uncertainty:
-        move = _drawn(uncertain, random.standard_normal() / NORMAL_95)
-        if uncertain.quantity in together:
-            continue
-        both = [f"{uncertain.quantity}[{place}]" for place in (0, 1)]
-        alone = [name for name in both if name not in together]
-        for path in [uncertain.quantity] if len(alone) == len(both) else alone:
-            scene = moved_at(scene, path, move)
-    for each, change in zip(scene.fitted.quantities, scene.fitted.drawn(random).tolist(), strict=True):
-        scene = moved_at(scene, each.quantity, partial(_by, change, each.unit in _ANGLES))
-    return scene
-
-
-_ANGLES: Final = ("rad", "mrad", "deg")
-
-
-def _by(change: float, linear: bool, value: float) -> float:
-    """Args: `linear`: whether the quantity may have any sign."""
-    return value + change if linear or value <= 0 else value * math.exp(change / value)
-
-
-def _drawn(uncertain: InputUncertainty, part: float) -> Callable[[float], float]:
-    """Args: `part`: of the half-width, a normal deviate."""
-    if uncertain.relative:
-        return lambda value: value * math.exp(math.log1p(uncertain.half_width) * part)
-    return lambda value: value + uncertain.half_width * part
 
 
 _ROUNDING = 1e-9

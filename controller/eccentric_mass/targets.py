@@ -19,6 +19,8 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.platform.compiled import compiled
 
 
@@ -235,3 +237,12 @@ def correction_ends(correction: Correction, margin: float) -> bool:
     """Whether no further step is worth its time."""
     shown = abs(correction.residual) > _WORTH * margin
     return not shown or correction.share < _LEAST_SHARE or correction.steps >= MOST_STEPS
+
+
+def reach_of(scene: EccentricScene) -> float:
+    """Largest imbalance that the masses cancel, kg m."""
+    moment = PlantParameters.of(scene).moment
+    gap = scene.masses.arc_length / scene.masses.guide_radius
+    # Of an imbalance beyond all reach, what the masses side by side leave is what they lack.
+    beyond = 4 * moment
+    return beyond - target_angles(beyond, 0.0, moment, gap).residual

@@ -14,10 +14,9 @@ from ringbalance.controller.balancer import FURTHER, Balancer, Demand, Draws, Ou
 from ringbalance.results.proportion import Proportion
 from ringbalance.results.requirements import OPEN
 from ringbalance.scene.arrays import BoolArray
-from ringbalance.scene.draws import BLOCK
 
 MOST_DRAWS: Final = 1024
-"""Devices after which a verdict that is still open stays so."""
+"""Devices after which a verdict that is still open stays so, of a balancer whose runs are fast."""
 FRESH: Final = 1 << 20
 """Number of the first device that judges: settings are chosen on the devices from 0 on."""
 
@@ -68,7 +67,7 @@ def judged(
     balancer: Balancer,
     settings: Settings,
     *,
-    most: int = MOST_DRAWS,
+    most: int | None = None,
     further: float = FURTHER,
     progress: Callable[[str], None] | None = None,
 ) -> Judgement:
@@ -80,16 +79,16 @@ def judged_all(
     balancer: Balancer,
     settings: Sequence[Settings],
     *,
-    first: int = BLOCK,
-    most: int = MOST_DRAWS,
+    first: int | None = None,
+    most: int | None = None,
     start: int = FRESH,
     further: float = FURTHER,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Judgement, ...]:
     """Settings over the same devices, twice as many each time until the verdict on each is known.
 
-    Args: `first`, `most`: numbers of devices. `start`: number of the first one. `further`: as
-    `Balancer.run_all`. `progress`: told what is done.
+    Args: `first`, `most`: numbers of devices; default the balancer's. `start`: number of the first one.
+    `further`: as `Balancer.run_all`. `progress`: told what is done.
     """
     asked, demands = balancer.asked_fraction(), balancer.demands()
 
@@ -97,7 +96,8 @@ def judged_all(
         return Judgement(settings=settings[place], asked=asked, demands=demands, outcomes=outcomes)
 
     done: dict[int, Judgement] = {}
-    left, count, more = list(range(len(settings))), 0, min(first, most)
+    fewest, most = first or balancer.verdict_draws[0], most or balancer.verdict_draws[1]
+    left, count, more = list(range(len(settings))), 0, min(fewest, most)
     while left and count < most:
         if progress is not None:
             progress(f"{count} of at most {most} drawn devices")

@@ -245,5 +245,8 @@ def top_level(levels: Sequence[Along]) -> Along:
 
 def searched(balancer: Balancer, *, progress: Progress = lambda _: None) -> Settings:
     """The best settings under the scene's own supply; none where nothing is to be tried."""
-    found = search(balancer, balancer.trials(), progress=progress)
+    offered = balancer.trials()
+    if not any(each.axes for each in offered):
+        return {}
+    found = search(balancer, offered, progress=progress)
     return (found[0].candidate.settings if found else None) or {}

@@ -37,7 +37,7 @@ def tuned(
     if found and (along or best.verdict != MET):
         curve = searched_along(balancer, found[0], progress=told)
         best, found = _better(balancer, best, found, curve, progress=told)
-    (longer,) = judged_all(balancer, [best.settings], first=BLOCK, most=BLOCK, further=LONGER, progress=told)
+    longer = None if balancer.watched_to_end else _longer(balancer, best.settings, progress=told)
     axis = trials[0].along if trials else None
     return Tuning(
         presentation=Presentation(document=tuning_document, rows=tuning_rows),
@@ -57,11 +57,15 @@ def _judged(
     balancer: Balancer, found: Sequence[Tried], *, own: bool, progress: Progress
 ) -> tuple[Judgement | None, Judgement]:
     """Of the scene's own settings and of the best, on the same devices."""
-    settings = _to_judge(found) or [{}]
-    judged = judged_all(balancer, [*([{}] if own else []), *settings], progress=progress)
-    best = _best(judged[1:] if own else judged)
-    given = judged[0] if own else None
+    stated: list[Settings] = [{}] if own or not found else []
+    others = [each for each in _to_judge(found) if each not in stated]
+    judged = judged_all(balancer, stated + others, progress=progress)
+    best, given = _best(judged[len(stated) :] or judged), judged[0] if own else None
     return given, given if given is not None and given.fraction.value > best.fraction.value else best
+
+
+def _longer(balancer: Balancer, settings: Settings, *, progress: Progress) -> Judgement:
+    return judged_all(balancer, [settings], first=BLOCK, most=BLOCK, further=LONGER, progress=progress)[0]
 
 
 def _to_judge(found: Sequence[Tried]) -> list[Settings]:

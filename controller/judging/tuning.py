@@ -35,8 +35,8 @@ class Tuning(PresentedResult):
     recommended: Judgement
     own: Judgement | None
     """Of the scene's own settings on the same devices; None: it gives none."""
-    longer: Judgement
-    """Of the recommended ones, devices watched for `LONGER`."""
+    longer: Judgement | None
+    """Of the recommended ones, devices watched for `LONGER`; None: all are watched to the end of the run."""
     tried: tuple[Tried, ...]
     """The best of every kind of controller, on the devices of the search."""
     along: tuple[Along, ...] = ()

@@ -49,7 +49,9 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "settings": _plain(tuning.recommended.settings),
         "own": None if tuning.own is None else _judgement(tuning.own),
         "further_s": FURTHER,
-        "longer": {"further_s": LONGER, "fraction": tuning.longer.fraction.document()},
+        "longer": None
+        if tuning.longer is None
+        else {"further_s": LONGER, "fraction": tuning.longer.fraction.document()},
         "required": [
             {
                 "code": each.code,
@@ -153,7 +155,9 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
         yield Finding(code="tuned_own_best")
     else:
         yield Finding(code="tuned_own", values={**_values(tuning.own), "verdict": tuning.own.verdict})
-    yield Finding(code="tuned_longer", values={**_values(tuning.longer), "time": LONGER, "first": FURTHER})
+    if tuning.longer is not None:
+        values = {**_values(tuning.longer), "time": LONGER, "first": FURTHER}
+        yield Finding(code="tuned_longer", values=values)
     if best.verdict != MET and (causes := _causes(best)):
         yield Finding(code="tuned_causes", values={"causes": causes})
     if tuning.remedies == () and tuning.along and best.verdict != MET:

@@ -14,7 +14,6 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.balancer import (
     FURTHER,
-    CommonRotor,
     Demand,
     Draws,
     Input,
@@ -29,13 +28,15 @@ from ringbalance.controller.balancer import (
     requirements_of,
     settles_within,
 )
+from ringbalance.controller.common_rotor import CommonRotor
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
 from ringbalance.controller.drawn_input import DrawnInput
+from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.liquid_ring.devices import Spread
-from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns, run_noise
+from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.information import loop_information
 from ringbalance.controller.liquid_ring.remedies import drawn_input, remedies_of, valves_of
 from ringbalance.controller.liquid_ring.trials import trials
@@ -54,6 +55,7 @@ from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUs
 from ringbalance.results.requirements import AT_LEAST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
+from ringbalance.scene.draws import BLOCK, run_noise
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
@@ -70,6 +72,8 @@ class LiquidRingBalancer:
     """A disc with chambers that a gas drives liquid between; options as in `ringbalance.simulate`."""
 
     options = frozenset({"flow_law", "controller", "sensor", "modelled"})
+    verdict_draws = (BLOCK, MOST_DRAWS)
+    watched_to_end = False
     scene: Scene
     _: KW_ONLY
     flow_law: Any = None

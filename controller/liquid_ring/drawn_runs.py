@@ -25,6 +25,7 @@ from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
+from ringbalance.scene.draws import run_noise
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.paths import with_values_at
@@ -39,8 +40,6 @@ _KEPT: Final = 512
 _OUT_OF_REACH: Final = 2.0
 """Times the limit that remain with the liquid at its best, from which on a run need not be carried
 out: none settles, and each would take its whole time limit."""
-_NOISE: Final = 3
-"""In the key of a run's noise, which the keys of drawn inputs do not have."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -249,12 +248,6 @@ def _why(under: _Under, run: np.void, limit: float) -> Outcome:
     if run["lost"] > 0:
         return Outcome.HOVERING
     return Outcome.GAS_TIME_TOO_SHORT if run["cause"] == IDLE else Outcome.TIME_LIMIT
-
-
-def run_noise(seed: int, number: int) -> np.random.Generator:
-    """Random numbers of the sensor in the run of a drawn device."""
-    key = np.random.SeedSequence(entropy=seed, spawn_key=(number, _NOISE))
-    return np.random.Generator(np.random.PCG64(key))
 
 
 def _as_given(scene: Scene, model: BalancerModel, number: int) -> Device:

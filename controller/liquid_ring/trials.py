@@ -14,6 +14,7 @@ from ringbalance.controller.liquid_ring.loop_factor import vibration_rates
 from ringbalance.controller.trials import Axis, Point, Trials, rounded
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
+from ringbalance.scene.paths import raw_value_at
 
 PRESSURE: Final = "gas.pressure"
 _GAIN: Final = Axis(
@@ -76,13 +77,11 @@ def _settings(
 ) -> Mapping[str, Any] | None:
     if loop.rate <= 0.0:
         return None
-    found: dict[str, Any] = {}
-    if PRESSURE in point and point[PRESSURE] != scene.gas.pressure:
-        found[PRESSURE] = point[PRESSURE]
-    if kind != scene.controller.kind:
-        found["controller.kind"] = kind
-    if limit < scene.controller.limit:
-        found["controller.limit"] = limit
+    found: dict[str, Any] = {
+        PRESSURE: point.get(PRESSURE, scene.gas.pressure),
+        "controller.kind": kind,
+        "controller.limit": min(limit, scene.controller.limit),
+    }
     if _GAIN.name in point:
         found["controller.proportional"] = rounded(point[_GAIN.name] / loop.rate)
         part = point[_INTEGRAL.name]
@@ -90,7 +89,7 @@ def _settings(
     if _OFFSET.name in point:
         offset = round(point[_OFFSET.name] * loop.dead_time / _OFFSET_STEP) * _OFFSET_STEP
         found["controller.gas_time_offset"] = (round(offset, 6),) if offset else None
-    return found
+    return {path: value for path, value in found.items() if value != raw_value_at(scene, path)}
 
 
 def _pressures(scene: Scene) -> Axis:

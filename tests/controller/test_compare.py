@@ -10,7 +10,8 @@ from dataclasses import replace
 import pytest
 
 from ringbalance.cli import main
-from ringbalance.controller.balancer import Balancer, CommonRotor, balancer_of, takes
+from ringbalance.controller.balancer import Balancer, balancer_of, takes
+from ringbalance.controller.common_rotor import CommonRotor
 from ringbalance.controller.compare import compare
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric

@@ -22,7 +22,7 @@ from ringbalance.scene import bundled_scene, load_scene
 
 Record = dict[str, Any]
 UNCERTAIN = ("rotor.stiffness", "imbalance.mass", "masses.friction_arm")
-"""Inputs that the pages name: each is run at both ends of its interval."""
+"""Inputs that the pages name."""
 
 
 @pytest.fixture(scope="module")

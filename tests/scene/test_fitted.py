@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.eccentric_mass.scene_records import eccentric_drawn, eccentric_scene
+from ringbalance.controller.eccentric_mass.devices import device
+from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.scene import SceneError, bundled_scene
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
 from ringbalance.scene.uncertain import NORMAL_95, half_widths
+from ringbalance.verification.papers import changed
 
 BORE = {"quantity": "tube.bore", "unit": "mm", "standard_deviation": 0.02, "correlations": [1.0, 0.9]}
 LOSS = {
@@ -79,11 +81,9 @@ def test_eccentric_inputs_are_drawn_together() -> None:
         {"quantity": "rotor.damping", "unit": "N*s/m", "standard_deviation": 0.4, "correlations": [1, 0.95]},
         {"quantity": "imbalance.phase", "unit": "deg", "standard_deviation": 2.0, "correlations": [0.95, 1]},
     )
-    scene = eccentric_scene(
-        scene_from(content=content(*quantities, name="driven_masses_small"), file="a.toml")
-    )
-    random = np.random.default_rng(3)
-    draws = [eccentric_drawn(scene, random) for _ in range(2000)]
+    read = scene_from(content=content(*quantities, name="driven_masses_small"), file="a.toml")
+    scene = changed(eccentric_scene(read), "requirement", phase_range=0.0)
+    draws = [device(scene, number).scene for number in range(1024)]
     damping = np.log([each.rotor.damping / scene.rotor.damping for each in draws])
     phase = np.array([each.imbalance.phase - scene.imbalance.phase for each in draws])
     assert np.std(damping) == pytest.approx(0.4 / scene.rotor.damping, rel=0.1)

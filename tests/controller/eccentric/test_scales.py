@@ -10,10 +10,11 @@ import pytest
 from eccentric_runs import bundled, true_imbalance
 from scipy.stats import binom, chi2
 
+from ringbalance.controller.eccentric_mass.devices import device
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
-from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_drawn
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
@@ -52,8 +53,7 @@ def test_an_estimation_takes_no_longer_than_its_information() -> None:
 
 def ellipse(scene: EccentricScene, number: int) -> tuple[float, float]:
     """Squared error of a drawn plant's imbalance over the stated covariance, with the rotor and without."""
-    random = np.random.default_rng(np.random.SeedSequence(number, spawn_key=(1,)))
-    plant = eccentric_drawn(scene, random)
+    plant = device(changed(scene, "requirement", phase_range=0.0), number).scene
     run = simulate_eccentric(plant, seed=number, settings=StrategySettings.of(scene))
     told = simulate_eccentric(scene).to_dict()["estimates"]
     noise = np.asarray(told["imbalance_covariance"][-1])

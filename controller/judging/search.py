@@ -243,10 +243,12 @@ def top_level(levels: Sequence[Along]) -> Along:
     return levels[_top(dict(enumerate(levels)))]
 
 
-def searched(balancer: Balancer, *, progress: Progress = lambda _: None) -> Settings:
-    """The best settings under the scene's own supply; none where nothing is to be tried."""
+def searched(
+    balancer: Balancer, *, along: float | None = None, progress: Progress = lambda _: None
+) -> Settings:
+    """The best settings; none where nothing is to be tried. Args: `along`: as `search`."""
     offered = balancer.trials()
-    if not any(each.axes for each in offered):
+    if along is None and not any(each.axes for each in offered):
         return {}
-    found = search(balancer, offered, progress=progress)
+    found = search(balancer, offered, along=along, progress=progress)
     return (found[0].candidate.settings if found else None) or {}

@@ -230,9 +230,15 @@ class BallBalancer:
         """No formula recommends anything."""
         return self, {}
 
-    def recommend(self, *, pressure: bool = False, progress: Callable[[str], None] | None = None) -> Tuning:
+    def recommend(
+        self,
+        *,
+        pressure: bool = False,
+        remedies: bool | None = False,
+        progress: Callable[[str], None] | None = None,
+    ) -> Tuning:
         """The drag under which most devices settle."""
-        return tuned(self, along=pressure, progress=progress)
+        return tuned(self, along=pressure, remedies=remedies, progress=progress)
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Both balls side by side, their size left out."""

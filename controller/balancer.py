@@ -74,6 +74,9 @@ class Draws:
     numbers: tuple[int, ...]
     devices: bool = True
     """Whether the inputs are drawn; False: each is as the scene says, and the noise alone differs."""
+    whole: bool = True
+    """Whether every run is carried out; False: one that is known not to settle ends with the least vibration
+    that the device can come to."""
 
     @classmethod
     def first(cls, count: int, *, devices: bool = True) -> Draws:
@@ -81,9 +84,9 @@ class Draws:
         return cls(numbers=tuple(range(count)), devices=devices)
 
     @classmethod
-    def block(cls, start: int, count: int) -> Draws:
+    def block(cls, start: int, count: int, *, whole: bool = True) -> Draws:
         """Devices `start` to `start + count - 1`."""
-        return cls(numbers=tuple(range(start, start + count)))
+        return cls(numbers=tuple(range(start, start + count)), whole=whole)
 
 
 AS_GIVEN: Final = Draws.first(1, devices=False)
@@ -341,8 +344,8 @@ class Balancer(Protocol):
         """The same with runs that balance for so long, s, and go on when they have settled."""
         ...
 
-    def advised(self) -> tuple[Self, Mapping[str, float]]:
-        """With the settings that its formulas recommend, and those that this changed, SI; no run is made."""
+    def advised(self) -> tuple[Self, Settings]:
+        """With the settings to compare it with, and those that this changed, SI."""
         ...
 
     def recommend(

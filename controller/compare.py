@@ -12,12 +12,11 @@ import numpy as np
 
 from ringbalance.controller.balancer import Balancer, Draws
 from ringbalance.controller.common_rotor import CommonRotor, vibrating
-from ringbalance.controller.tuning.dead_time import offset_text
+from ringbalance.controller.judging.tuning_rows import setting_text
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
-from ringbalance.scene.describe import in_usual_unit, usual_unit
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.origins import SceneFile
 
@@ -47,7 +46,7 @@ class Side:
 
     scene: SceneFile
     """As it was run, on the common rotor and tuned, with the seed of the first run."""
-    tuned: Mapping[str, float]
+    tuned: Mapping[str, Any]
     """Scene keys that tuning has changed, with their values, SI."""
     results: tuple[_RunResult, ...]
     """One for each seed."""
@@ -80,10 +79,9 @@ class Side:
     @property
     def tuned_text(self) -> str:
         """What tuning has changed, as a scene file has it."""
-        changes = [_written(key, value) for key, value in self.tuned.items() if not key.startswith(_OFFSETS)]
-        if offsets := [value for key, value in self.tuned.items() if key.startswith(_OFFSETS)]:
-            changes.append(offset_text(offsets))
-        return ", ".join(changes) or "as it is"
+        return (
+            ", ".join(f"{key} {setting_text(key, value)}" for key, value in self.tuned.items()) or "as it is"
+        )
 
     def quantities(self, prefix: str) -> tuple[Quantity, ...]:
         """Medians over its runs, from the smallest to the largest. Args: `prefix`: of the keys."""
@@ -246,16 +244,6 @@ _WORDS: Final = {
     "energy": ("energy", "J"),
     "worst_amplitude": ("largest amplitude on the way", "m"),
 }
-_OFFSETS: Final = "controller.gas_time_offset."
-_UNITS: Final = {
-    "friction_filter.drive_speed": ("rpm", 30 / math.pi),
-}
-"""Of the keys that tuning may change: the usual unit in scene files, and how many of it one in SI is."""
-
-
-def _written(key: str, value: float) -> str:
-    unit, factor = _UNITS.get(key) or (usual_unit(key), in_usual_unit(key, 1.0))
-    return f'{key} = "{factor * value:.4g} {unit}"' if unit else f"{key} = {value:.4g}"
 
 
 def _table(

@@ -32,6 +32,7 @@ from ringbalance.controller.common_rotor import CommonRotor
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
 from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.judging.judge import MOST_DRAWS
+from ringbalance.controller.judging.search import searched
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.liquid_ring.devices import Spread
@@ -40,12 +41,10 @@ from ringbalance.controller.liquid_ring.information import loop_information
 from ringbalance.controller.liquid_ring.remedies import drawn_input, remedies_of, valves_of
 from ringbalance.controller.liquid_ring.trials import trials
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.rotor import Sensor, chamber_letters, wrapped
+from ringbalance.controller.rotor import Sensor, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
 from ringbalance.controller.trials import Trials
-from ringbalance.controller.tuning.recommendation import factor_uncertainty
-from ringbalance.controller.tuning.search import recommended
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import gives_forces
@@ -57,7 +56,6 @@ from ringbalance.results.requirements import AT_LEAST, Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.draws import BLOCK, run_noise
-from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
@@ -309,16 +307,10 @@ class LiquidRingBalancer:
         run = replace(self.scene.run, time_limit=span)
         return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
 
-    def advised(self) -> tuple[LiquidRingBalancer, Mapping[str, float]]:
-        """The gain that `tune` recommends for the target-vector algorithm, and its valve offsets."""
-        # Valve-open times of the trial algorithm are the scene's.
-        if self.scene.controller.kind == "trial":
-            return self, {}
-        best = recommended(self.scene, self.model, factor_uncertainty(self.scene, self.model))
-        if best is None:
-            return self, {}
-        changes = _changes(self.scene.controller, best.scene.controller, chambers=self.scene.disc.chambers)
-        return replace(self, scene=best.scene), changes
+    def advised(self) -> tuple[LiquidRingBalancer, Mapping[str, Any]]:
+        """With the settings that serve most of a few drawn devices."""
+        changes = searched(self)
+        return replace(self, scene=with_values_at(self.scene, changes)), changes
 
     def recommend(
         self,
@@ -370,14 +362,3 @@ def _of_own_law(law: object, run: Simulation) -> Iterator[Finding]:
         yield Finding(code="own_law_lacks", values={"names": names})
     if rows and not gives_forces(run.model.flow):
         yield Finding(code="own_law_without_forces", values={"terms": rows})
-
-
-def _changes(before: ControllerSettings, after: ControllerSettings, *, chambers: int) -> dict[str, float]:
-    """Scene keys that tuning has changed, with their values, SI."""
-    changes = {}
-    if after.proportional != before.proportional:
-        changes["controller.proportional"] = after.proportional
-    if after.gas_time_offset != before.gas_time_offset:
-        offsets = zip(chamber_letters(chambers), after.offsets(chambers), strict=True)
-        changes |= {f"controller.gas_time_offset.{letter}": offset for letter, offset in offsets}
-    return changes

@@ -88,7 +88,8 @@ def tried_remedies(
     """What the remedies of a balancer come to, the best first.
 
     Of one kind, alternatives are tried from the smallest change on until one meets, none meets at all, or
-    fewer devices meet than before; where no device of the scene as it is does, until one kind meets.  Where none meets by itself, the best two together follow.
+    fewer devices meet than before; where no device of the scene as it is does, until one kind meets.  Where
+    none meets by itself, the best two together follow.
     Args: `own`: judgement of the best settings of the scene as it is. `search`: best settings.
     """
     kinds: dict[str, list[Remedy]] = {}

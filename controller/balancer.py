@@ -14,7 +14,7 @@ from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
-from ringbalance.controller.common_rotor import CommonRotor
+from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.trials import Trials
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
@@ -247,6 +247,8 @@ class Balancer(Protocol):
 
     verdict_draws: tuple[int, int]
     """Devices of a verdict, at first and at the most."""
+    energy_kind: str
+    """Code of the sentence that says what its runs count as energy."""
     watched_to_end: bool
     """Whether every run is watched to its time limit, whatever is asked for."""
 
@@ -322,15 +324,24 @@ class Balancer(Protocol):
         """The same, with the same options, of another scene of its kind."""
         ...
 
-    def rotor(self) -> CommonRotor:
-        """The rotor alone. Raises: SceneError: it stands still, or never vibrates steadily."""
+    def rotor(self, number: int | None = None) -> CommonRotor:
+        """The rotor alone. Args: `number`: of a drawn device; default as the scene says.
+
+        Raises: SceneError: it stands still, or never vibrates steadily.
+        """
         ...
 
-    def on_rotor(self, rotor: CommonRotor | None) -> Self:
-        """This balancer on a rotor at constant speed in its steady vibration; None: on its own.
+    def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> Self:
+        """This balancer on a rotor at constant speed in its steady vibration, with nothing required but to
+        come below that rotor's limit.
 
-        Raises: SceneError: the rotor cannot be this balancer's.
+        Args: `rotors`: of the drawn devices; default its own. Raises: SceneError: the rotor cannot be this
+            balancer's.
         """
+        ...
+
+    def sampling_time(self) -> float:
+        """Time from one sample of the vibration to the next, s."""
         ...
 
     def span(self) -> float:
@@ -339,10 +350,6 @@ class Balancer(Protocol):
 
     def lasting(self, span: float) -> Self:
         """The same with runs that balance for so long, s, and go on when they have settled."""
-        ...
-
-    def advised(self) -> tuple[Self, Mapping[str, float]]:
-        """With the settings that its formulas recommend, and those that this changed, SI; no run is made."""
         ...
 
     def recommend(

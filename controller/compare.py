@@ -236,7 +236,8 @@ def compare(
     """Put two balancers on the rotor of the first, choose settings for each, and run both as drawn devices.
 
     Of the second its balancer alone counts.
-    Args: `most`: devices. Raises: SceneError: a balancer that cannot work on that rotor.
+    Args: `most`: after so many a difference that cannot be told is left open.
+    Raises: SceneError: a balancer that cannot work on that rotor.
     """
     told = progress or (lambda _: None)
     rotor = vibrating(first.scene, first.rotor())

@@ -353,12 +353,17 @@ class Balancer(Protocol):
         ...
 
     def recommend(
-        self, *, pressure: bool = False, progress: Callable[[str], None] | None = None
+        self,
+        *,
+        pressure: bool = False,
+        remedies: bool | None = False,
+        progress: Callable[[str], None] | None = None,
     ) -> _Recommendation:
         """Settings, judged by runs over the draws.
 
         Args: `pressure`: whether what `Trials.along` names, such as the supply's pressure, is searched even
-            where the scene's own suffices.
+            where the scene's own suffices. `remedies`: whether `remedies` are tried where what is required is
+            not met, and `choices`; None: the former alone.
         """
         ...
 

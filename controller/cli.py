@@ -21,6 +21,7 @@ def tune(
     law: str = "calibrated",
     json: bool = False,
     pressure: bool = False,
+    remedies: bool = False,
     save: Path | None = None,
     tolerance: str | None = None,
     models: Models | None = None,
@@ -32,6 +33,8 @@ def tune(
         law: of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.
         json: print one JSON document instead of tables.
         pressure: search the gas pressure of a liquid ring even where the scene's meets what is required.
+        remedies: try valves that can be bought, too, for a scene that gives none; changes of the scene are
+            tried wherever what is required is not met.
         save: write the scene with the recommended settings.
         tolerance: in place of the scene's, such as "0.5 %" or 0.005.
         models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
@@ -50,7 +53,7 @@ def tune(
         check_file(save)
     balancer = balancer_under(law, with_tolerance(load_scene(scene), tolerance=tolerance, models=models))
     with activity("tune", "runs ...") as shown:
-        found = balancer.recommend(pressure=pressure, progress=shown.show)
+        found = balancer.recommend(pressure=pressure, remedies=remedies or None, progress=shown.show)
     if save is not None:
         write_whole(save, file_text(found.recommended_scene, to=save.parent))
     if json:

@@ -14,7 +14,9 @@ from ringbalance.scene.arrays import FloatArray
 
 ZONES: Final = ((3.0, "A"), (4.0, "B"), (5.0, "C"), (math.inf, "D"))
 """Largest peak sensitivity of each zone of ISO 14839-3: A as new, B acceptable, C not for long."""
-_ANGLES: Final[FloatArray] = np.concatenate([np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi, 1600)])
+_ANGLES: Final[FloatArray] = np.concatenate(
+    [np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi - 1e-6, 1600)]
+)
 """Of z on the unit circle, rad."""
 
 
@@ -60,13 +62,18 @@ def amplification_factor(*, mass: float, stiffness: float, damping: float) -> fl
 def peak_sensitivity(*, loop_factor: float, integral: float = 0.0, derivative: float = 0.0) -> float:
     """Largest |1/(1 + L)| on the unit circle, L = h (1 + (i/2)(z + 1)/(z - 1) + q (1 - 1/z))/(z - 1).
 
-    2/(2 - h) with P alone, up to h = 2.  i = dt/Ti (`integral`), q = Td/dt (`derivative`).  The loop has to
-    be stable.
+    2/(2 - h) with P alone, up to h = 2.  i = dt/Ti (`integral`), q = Td/dt (`derivative`).  A residual that
+    turns round at every sample, h > 1, drops its integral, and as its amplitude has no sign the loop is
+    L = -h (1 + q (1 - 1/z))/(z + 1).
     Source: ISO 14839-3:2006, which judges the loops of magnetic bearings by it; used here for comparison.
     """
     z = np.exp(1j * _ANGLES)
-    shape = 1.0 + integral / 2.0 * (z + 1.0) / (z - 1.0) + derivative * (1.0 - 1.0 / z)
-    return float(np.max(np.abs(1.0 / (1.0 + loop_factor * shape / (z - 1.0)))))
+    shape = 1.0 + derivative * (1.0 - 1.0 / z)
+    if loop_factor > 1.0:
+        loop = -loop_factor * shape / (z + 1.0)
+    else:
+        loop = loop_factor * (shape + integral / 2.0 * (z + 1.0) / (z - 1.0)) / (z - 1.0)
+    return float(np.max(np.abs(1.0 / (1.0 + loop))))
 
 
 def zone(sensitivity: float) -> str:

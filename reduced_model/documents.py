@@ -128,7 +128,7 @@ def _check(check: ElementCheck) -> dict[str, Any]:
 def paper_columns(calibration: Calibration, fill_ratio: FloatArray) -> Mapping[str, FloatArray]:
     """What the liquid-ring paper gives for wall pressure and moment at fill ratios.
 
-    Returns: "wall_pressure_paper_Pa" and "moment_paper_kg_m", shape (n,), by the paper's own volume.
+    Returns: "wall_pressure_paper_Pa" and "moment_paper_kg_m", shape (n,).
     """
     pressure, moment = paper_closed_forms(calibration.scene, fill_ratio)
     return {"wall_pressure_paper_Pa": pressure, "moment_paper_kg_m": moment}

@@ -227,12 +227,11 @@ def line_warning(answers: tuple[LineAnswer, ...]) -> str:
     which = shown = ""
     if above[0].end != "given":
         which = " over its default range" if len(above) > 1 else f" if {above[0].end}"
-        shown = ", and runs of a scene without a line do not show it"
+        shown = ", and runs with an ideal valve do not show this"
     return (
         f"the smallest correction that the gas line can deliver{which}, {_sizes(above)} um, is "
-        f"above {1e6 * above[0].largest_correction:.2g} um: no run is sure to reach the limit of "
-        f"{1e6 * above[0].limit:.2g} um{shown}; take a {_better(answers)} valve, less dead volume "
-        "or a higher limit"
+        f"above {1e6 * above[0].largest_correction:.2g} um: the limit of {1e6 * above[0].limit:.2g} um "
+        f"cannot be guaranteed{shown}; take a {_better(answers)} valve, less dead volume or a higher limit"
     )
 
 

@@ -57,12 +57,12 @@ DOCUMENTS: Final[Mapping[str, Record]] = MappingProxyType(
     {
         ANNEX: {
             "place": "annex",
-            "kind": "Verification annex",
+            "kind": "Annex",
             "other": {"file": "report.html", "title": "The report"},
         },
         "report.html": {
             "place": "report",
-            "kind": "Verification report",
+            "kind": "Design report",
             "other": {"file": ANNEX, "title": "Annex: evidence and details"},
         },
     }

@@ -1,4 +1,4 @@
-"""Figures of a liquid ring's loop: a run with its injections, the ring itself, devices settled over time."""
+"""Figures of a liquid ring's loop: a run with its injections, and the ring itself at its stages."""
 
 from __future__ import annotations
 
@@ -11,27 +11,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Wedge
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import ArrayLike
 
 from ringbalance.reports.figure import (
     INK,
     MAP,
     MUTED,
     SURFACE,
-    TIME,
     Drawing,
-    Paint,
     amplitudes,
-    curve,
     draw,
-    line,
     panels,
     plain_number,
 )
 from ringbalance.reports.prose import series
 from ringbalance.reports.section import Record
 from ringbalance.results.numbers import shown
-from ringbalance.results.proportion import Proportion
 from ringbalance.scene.arrays import FloatArray
 
 _MICROMETRE: Final = 1e6
@@ -44,7 +38,6 @@ _FRAMES: Final = 7
 _WHOLE: Final = (0.09, 0.15, 0.89, 0.68)
 _PARTS: Final = (0.09, 0.15, 0.6, 0.68), (0.72, 0.15, 0.26, 0.68)
 """Boxes of the axes."""
-_POINTS: Final = 400
 
 
 def injections_until(run: Record) -> float:
@@ -156,52 +149,3 @@ def _ring(panel: Axes, fills: Mapping[str, float], disc: Record) -> None:
     panel.add_patch(Circle((0, 0), inner, fill=False, color=INK, linewidth=0.8))
     panel.set(xlim=(-1.05 * outer, 1.05 * outer), ylim=(-1.05 * outer, 1.05 * outer), aspect="equal")
     panel.set_axis_off()
-
-
-def settled_over_time(
-    samples: Mapping[str, ArrayLike], time_limit: float, *, asked: float | None = None
-) -> Drawing:
-    """Fraction of drawn devices that have settled, over time, with its 95 % band.
-
-    Args: `samples`: by title, of every device the time from which on it is settled, s; not a number, or
-    infinite: never.
-    """
-    paints = [
-        paint
-        for place, (title, times) in enumerate(samples.items())
-        for paint in _settled(title, np.asarray(times, dtype=np.float64), time_limit, line(place)["color"])
-    ]
-    if asked is not None:
-        paints.append(lambda axes: axes.axhline(100 * asked, color=MUTED, linestyle=":", label="asked for"))
-    return draw(
-        "settled-over-time",
-        *paints,
-        x=TIME,
-        y=("devices settled in %", "1"),
-        xlim=(0, _drawn_until(samples, time_limit)),
-        ylim=(0, 103),
-        columns=3,
-        wide=True,
-        height=3.0,
-    )
-
-
-def _settled(title: str, times: FloatArray, time_limit: float, colour: str) -> list[Paint]:
-    at = np.linspace(0.0, time_limit, _POINTS)
-    at = np.unique(np.concatenate([at, times[np.isfinite(times) & (times <= time_limit)]]))
-    within = [Proportion(count=int(np.count_nonzero(times <= time)), of=times.size) for time in at]
-    value, low, high = (
-        100 * np.array([getattr(each, key) for each in within]) for key in ("value", "low", "high")
-    )
-
-    def band(axes: Axes) -> None:
-        axes.fill_between(at, low, high, step="post", color=colour, alpha=0.2, linewidth=0)
-
-    return [band, curve(at, value, title, color=colour, drawstyle="steps-post")]
-
-
-def _drawn_until(samples: Mapping[str, ArrayLike], time_limit: float) -> float:
-    """A little past the last one that settles, s."""
-    every = np.concatenate([np.asarray(times, dtype=np.float64).ravel() for times in samples.values()])
-    ended = every[np.isfinite(every) & (every <= time_limit)]
-    return float(min(time_limit, 1.2 * ended.max())) if ended.size else time_limit

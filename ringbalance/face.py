@@ -111,16 +111,19 @@ def tune(
     *,
     flow_law: GivesVelocities | None = None,
     pressure: bool = False,
+    remedies: bool | None = False,
     progress: Callable[[str], None] | None = None,
 ) -> Tuning:
     """Recommend settings of the controller, chosen by runs of drawn devices and judged on others.
 
     Args: `flow_law`: as in `simulate`. `pressure`: whether the gas pressure is searched even where that of
-        the scene meets what is required. `progress`: called with what is being done.
+        the scene meets what is required. `remedies`: whether changes of the scene are tried where it is not
+        met, and valves that can be bought where it gives none; None: the former alone. `progress`: called
+        with what is being done.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a flow law for eccentric masses.
     """
     tuning = balancer_of(checked_scene(scene), flow_law=flow_law).recommend(
-        pressure=pressure, progress=progress
+        pressure=pressure, remedies=remedies, progress=progress
     )
     return cast("Tuning", tuning)

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import (
+    AS_GIVEN,
     FURTHER,
     Demand,
     Draws,
@@ -31,6 +32,7 @@ from ringbalance.controller.drawn_input import MEASURE_INPUT, DrawnInput, drawn_
 from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device, on_rotor
 from ringbalance.controller.eccentric_mass.loop_rows import loops_document, loops_quantities, loops_status
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
+from ringbalance.controller.eccentric_mass.remedies import advised_remedies
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
@@ -58,6 +60,8 @@ _SETTLED_WHIRL: Final = 12.0
 """Time constants of the free whirl after which a run with eccentric masses starts to balance."""
 _REACH: Final = 10.0
 """Factor up to which a gain is tried."""
+_ADVISING: Final = 4
+"""Devices whose runs say what would mend them."""
 
 
 class EccentricMassBalancer:
@@ -175,8 +179,9 @@ class EccentricMassBalancer:
         return (Trials(kind=kind, axes=(loops,), settings=lambda at: changes if at[loops.name] else {}),)
 
     def remedies(self) -> tuple[Remedy, ...]:
-        """See `Balancer`."""
-        return ()
+        """What the scene's own run and those of some of its devices advise; see `Balancer`."""
+        ran = [self.run({}, draws, trace=True) for draws in (AS_GIVEN, Draws.first(_ADVISING))]
+        return advised_remedies(self.scene, [each.run for outcomes in ran for each in outcomes.traced])
 
     def choices(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
@@ -255,9 +260,15 @@ class EccentricMassBalancer:
             replace(self.scene, run=replace(self.scene.run, time_limit=limit)), self._rotors
         )
 
-    def recommend(self, *, pressure: bool = False, progress: Callable[[str], None] | None = None) -> Tuning:
+    def recommend(
+        self,
+        *,
+        pressure: bool = False,
+        remedies: bool | None = False,
+        progress: Callable[[str], None] | None = None,
+    ) -> Tuning:
         """See `Balancer`."""
-        return tuned(self, information=_information, along=pressure, progress=progress)
+        return tuned(self, information=_information, along=pressure, remedies=remedies, progress=progress)
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Reach, and the largest gains of the drives; see `Balancer`."""

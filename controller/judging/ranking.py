@@ -67,10 +67,8 @@ class Deciding:
 class Ranking:
     """Drawn inputs by what they decide."""
 
-    inputs: tuple[Deciding, ...]
-    """The one that decides most first."""
-    asked: float
-    """Fraction of the devices."""
+    inputs: tuple[Deciding, ...] = ()
+    """The one that decides most first; none where all or none of the devices meet what is asked."""
 
     @property
     def worth_measuring(self) -> tuple[Deciding, ...]:
@@ -81,7 +79,7 @@ class Ranking:
         """What to measure, or that nothing is."""
         found = self.worth_measuring
         yield from (each.finding for each in found)
-        if not found:
+        if self.inputs and not found:
             yield Finding(code="nothing_to_measure")
 
     def document(self) -> list[dict[str, Any]]:
@@ -90,10 +88,10 @@ class Ranking:
 
 
 def ranked(balancer: Balancer, judgement: Judgement) -> Ranking:
-    """The inputs of judged devices; empty where all or none of them meet what is asked."""
+    """The inputs of judged devices."""
     met, places = judgement.meets, judgement.outcomes.inputs
     if met.all() or not met.any():
-        return Ranking(inputs=(), asked=judgement.asked)
+        return Ranking()
     outcome, found = met.astype(np.float64), []
     for name, place in places.items():
         drawn, half = balancer.drawn_input(name), np.abs(place - 0.5) < 0.25
@@ -107,7 +105,7 @@ def ranked(balancer: Balancer, judgement: Judgement) -> Ranking:
                 middle=Proportion(count=int(np.count_nonzero(met[half])), of=int(np.count_nonzero(half))),
             )
         )
-    return Ranking(inputs=tuple(sorted(found, key=lambda each: -each.index)), asked=judgement.asked)
+    return Ranking(inputs=tuple(sorted(found, key=lambda each: -each.index)))
 
 
 def first_order_index(outcome: Sequence[float] | FloatArray, place: npt.ArrayLike) -> float:

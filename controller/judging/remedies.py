@@ -28,13 +28,13 @@ _FIRST: Final = 16
 _TOO_FEW: Final = 0.5
 """Fraction of the devices, as a share of the one asked for, below which it is."""
 _MOST: Final = 256
-"""Devices that judge a remedy."""
+"""Devices that judge a remedy at the most."""
 _DIGITS: Final = 2
 """Of a value between two alternatives."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Tried:
+class Remedied:
     """Remedies that were made together, and what they come to."""
 
     remedies: tuple[Remedy, ...]
@@ -71,7 +71,10 @@ class Tried:
             "code": self.code,
             "name": self.remedies[0].name,
             "changes": dict(self.changes),
-            "settings": dict(self.judgement.settings),
+            "settings": {
+                path: list(value) if isinstance(value, tuple) else value
+                for path, value in self.judgement.settings.items()
+            },
             "fraction": self.judgement.fraction.document(),
             "verdict": self.judgement.verdict,
             "half_settle_s": half[0] if half else None,
@@ -81,7 +84,7 @@ class Tried:
 
 def tried_remedies(
     balancer: Balancer, own: Judgement, *, search: Search, told: Told | None = None
-) -> tuple[Tried, ...]:
+) -> tuple[Remedied, ...]:
     """What the remedies of a balancer come to, the best first.
 
     Of one kind, alternatives are tried from the smallest change on until one meets, or fewer devices meet
@@ -98,7 +101,7 @@ def tried_remedies(
     return tuple(sorted(rows, key=lambda row: row.order))
 
 
-def tried_choices(balancer: Balancer, *, search: Search, told: Told | None = None) -> tuple[Tried, ...]:
+def tried_choices(balancer: Balancer, *, search: Search, told: Told | None = None) -> tuple[Remedied, ...]:
     """What things that can be bought make of a scene that leaves them open."""
     trial = _Trial(balancer=balancer, search=search, told=told or (lambda _: None))
     return tuple(row for each in balancer.choices() if (row := trial.of([each])) is not None)
@@ -120,7 +123,7 @@ class _Trial:
     search: Search
     told: Told
 
-    def of(self, remedies: Sequence[Remedy]) -> Tried | None:
+    def of(self, remedies: Sequence[Remedy]) -> Remedied | None:
         """Remedies made together; None: the scene refuses them."""
         changes = _merged(remedies)
         try:
@@ -130,14 +133,16 @@ class _Trial:
             settings = self.search(changed)
             first = judged_all(changed, [settings], first=_FIRST, most=_FIRST)[0]
             too_few = first.verdict == MISSED and first.fraction.value < _TOO_FEW * first.asked
-            judgement = first if too_few else judged(changed, settings, most=_MOST)
+            judgement = (
+                first if too_few else judged(changed, settings, most=min(_MOST, changed.verdict_draws[1]))
+            )
         except SceneError:
             return None
-        return Tried(remedies=tuple(remedies), judgement=judgement, size=_size(self.balancer, changes))
+        return Remedied(remedies=tuple(remedies), judgement=judgement, size=_size(self.balancer, changes))
 
-    def series(self, alternatives: Sequence[Remedy], own: Proportion) -> Iterator[Tried]:
+    def series(self, alternatives: Sequence[Remedy], own: Proportion) -> Iterator[Remedied]:
         """Alternatives of one kind, from the smallest change on."""
-        before: Tried | None = None
+        before: Remedied | None = None
         for each in alternatives:
             row = self.of([each])
             if row is None:
@@ -151,7 +156,7 @@ class _Trial:
                 return
             before = row
 
-    def _between(self, missed: Tried, met: Tried) -> Iterator[Tried]:
+    def _between(self, missed: Remedied, met: Remedied) -> Iterator[Remedied]:
         """The change half-way, by ratios, from one that misses to one that meets."""
         one, other = missed.remedies[0], met.remedies[0]
         changes = {
@@ -162,7 +167,7 @@ class _Trial:
         if row is not None:
             yield row
 
-    def pair(self, rows: Sequence[Tried]) -> Iterator[Tried]:
+    def pair(self, rows: Sequence[Remedied]) -> Iterator[Remedied]:
         """The best two of different kinds together."""
         best = sorted(rows, key=lambda row: row.order)
         for one, other in combinations(best, 2):

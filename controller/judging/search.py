@@ -240,7 +240,9 @@ def top_level(levels: Sequence[Along]) -> Along:
     return levels[_top(dict(enumerate(levels)))]
 
 
-def searched(balancer: Balancer, *, progress: Progress = lambda _: None) -> Settings:
-    """The best settings under the scene's own supply; none where nothing is to be tried."""
-    found = search(balancer, balancer.trials(), progress=progress)
+def searched(
+    balancer: Balancer, *, along: float | None = None, progress: Progress = lambda _: None
+) -> Settings:
+    """The best settings; none where nothing is to be tried. Args: `along`: as `search`."""
+    found = search(balancer, balancer.trials(), along=along, progress=progress)
     return (found[0].candidate.settings if found else None) or {}

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from ringbalance.controller.balancer import Balancer, Settings
 from ringbalance.controller.judging.judge import Judgement, judged_all
-from ringbalance.controller.judging.search import Along, Progress, Tried, search, searched_along, top_level
+from ringbalance.controller.judging.ranking import Ranking, ranked
+from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
+from ringbalance.controller.judging.search import (
+    Along,
+    Progress,
+    Tried,
+    search,
+    searched,
+    searched_along,
+    top_level,
+)
 from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.judging.tuning_rows import LONGER, tuning_document, tuning_rows
 from ringbalance.results.requirements import MET
@@ -21,12 +32,15 @@ def tuned(
     *,
     information: Callable[[SceneFile], Information] = lambda _: Information(),
     along: bool = False,
+    remedies: bool | None = False,
     progress: Progress | None = None,
 ) -> Tuning:
     """Settings of a balancer by runs.
 
     Args: `information`: of the scene with the recommended settings. `along`: whether the axis that the
         balancer names is searched in any case; else only where the scene's level of it does not suffice.
+        `remedies`: whether those are tried where what is required is not met, and choices that the scene
+        leaves open; None: the former alone.
     """
     told = progress or (lambda _: None)
     trials = balancer.trials()
@@ -39,6 +53,9 @@ def tuned(
         best, found = _better(balancer, best, found, curve, progress=told)
     longer = None if balancer.watched_to_end else _longer(balancer, best.settings, progress=told)
     axis = trials[0].along if trials else None
+    level = None if axis is None else best.settings.get(axis.name)
+    settings = partial(searched, along=level)
+    mends = remedies is not False and best.verdict != MET
     return Tuning(
         presentation=Presentation(document=tuning_document, rows=tuning_rows),
         given=balancer.scene,
@@ -50,6 +67,10 @@ def tuned(
         along_name=axis.name if axis else "",
         along_unit=axis.unit if axis else "1",
         information=information(with_values_at(balancer.scene, best.settings)),
+        ranking=ranked(balancer, best) if best.verdict != MET else Ranking(),
+        remedies=tried_remedies(balancer, best, search=settings, told=told) if mends else (),
+        choices=tried_choices(balancer, search=settings, told=told) if remedies else (),
+        open_choice=bool(balancer.choices()),
     )
 
 

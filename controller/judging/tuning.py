@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ringbalance.controller.judging.judge import Judgement
+from ringbalance.controller.judging.ranking import Ranking
+from ringbalance.controller.judging.remedies import Remedied
 from ringbalance.controller.judging.search import Along, Tried
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Facts, PresentedResult
@@ -45,8 +47,14 @@ class Tuning(PresentedResult):
     """Path of its key."""
     along_unit: str = "1"
     information: Information = Information()
-    remedies: tuple[Any, ...] = ()
-    ranking: Any = None
+    remedies: tuple[Remedied, ...] = ()
+    """What remedies come to, the best first; tried where what is required is not met."""
+    ranking: Ranking = field(default_factory=Ranking)
+    """Which input decides; where what is required is not met."""
+    choices: tuple[Remedied, ...] = ()
+    """What things that can be bought make of a scene that leaves them open."""
+    open_choice: bool = False
+    """Whether it does."""
 
     @property
     def scene(self) -> Any:

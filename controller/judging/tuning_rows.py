@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from ringbalance.controller.balancer import FURTHER, Settings
 from ringbalance.controller.judging.judge import Judgement
+from ringbalance.controller.judging.remedies import Remedied, amplitude_reached
 from ringbalance.controller.judging.search import Along
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.results.numbers import given, percent
@@ -33,7 +34,14 @@ def tuning_rows(tuning: Tuning) -> Rows:
         quantities=(*_fractions(tuning), *tuning.information.quantities),
         findings=tuple(_findings(tuning)),
         facts=tuning.information.facts,
-        tables=(_settings_table(tuning), _required_table(tuning), _along_table(tuning), _tried_table(tuning)),
+        tables=(
+            _settings_table(tuning),
+            _required_table(tuning),
+            _along_table(tuning),
+            _tried_table(tuning),
+            _remedies_table("Remedies, each with its best settings", tuning.remedies),
+            _remedies_table("Valves that can be bought, each with its best settings", tuning.choices),
+        ),
     )
 
 
@@ -76,6 +84,9 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
             }
             for each in tuning.tried
         ],
+        "remedies": [each.document() for each in tuning.remedies],
+        "valves": [each.document() for each in tuning.choices],
+        "ranking": tuning.ranking.document(),
         "clipped": dict(tuning.recommended.outcomes.clipped),
         **tuning.information.document,
         **tuning.rows().document(),
@@ -161,8 +172,47 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
         yield Finding(code="tuned_longer", values=values)
     if best.verdict != MET and (causes := _causes(best)):
         yield Finding(code="tuned_causes", values={"causes": causes})
-    if tuning.remedies == () and tuning.along and best.verdict != MET:
+    if not tuning.remedies and tuning.along and best.verdict != MET:
         yield Finding(code="tuned_no_level", values={"key": tuning.along_name})
+    yield from _mending(tuning)
+
+
+def _mending(tuning: Tuning) -> Iterator[Finding]:
+    """The best remedy, what to measure, and what the answer leaves open."""
+    best, clipped = tuning.recommended, tuning.recommended.outcomes.clipped
+    for each in tuning.remedies[:1]:
+        code = "remedy_meets" if each.met else "remedy_best"
+        values = {**_values(each.judgement), "what": _changes_text(each.changes)}
+        yield Finding(code=code, values=values, change=each.changes)
+    yield from tuning.ranking.findings()
+    states = any(each.stated and each.outcome == "final_amplitude" for each in best.demands)
+    if best.verdict != MET and states and (reached := amplitude_reached(best)) is not None:
+        yield Finding(code="amplitude_reached", values={"amplitude": reached, "asked": best.asked})
+    if tuning.open_choice:
+        yield Finding(code="ideal_valve")
+    if clipped:
+        values = {"count": float(sum(clipped.values())), "of": best.fraction.of, "inputs": list(clipped)}
+        yield Finding(code="inputs_clipped", values=values)
+
+
+def _changes_text(changes: Settings) -> str:
+    return ", ".join(f"{path} {setting_text(path, value)}" for path, value in changes.items())
+
+
+def _remedies_table(caption: str, tried: Sequence[Remedied]) -> Table:
+    rows = [
+        (
+            each.remedies[0].name or each.code.replace("_", " "),
+            _changes_text(each.changes),
+            _share_text(each.judgement),
+            each.judgement.verdict,
+            *(given(time, "s", digits=3) for time in times_of(each.judgement).values()),
+            _changes_text(each.judgement.settings),
+        )
+        for each in tried
+    ]
+    heads = ("remedy", "change", "devices that meet all", "verdict", "half within", "90 % within", "settings")
+    return Table(caption=caption, heads=heads, rows=rows)
 
 
 def _values(judgement: Judgement) -> dict[str, Value]:

@@ -306,13 +306,19 @@ class LiquidRingBalancer:
         run = replace(self.scene.run, time_limit=span)
         return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
 
-    def recommend(self, *, pressure: bool = False, progress: Callable[[str], None] | None = None) -> Tuning:
+    def recommend(
+        self,
+        *,
+        pressure: bool = False,
+        remedies: bool | None = False,
+        progress: Callable[[str], None] | None = None,
+    ) -> Tuning:
         """See `Balancer`."""
 
         def information(scene: SceneFile) -> Information:
             return loop_information(liquid_ring_scene(scene), self.model)
 
-        return tuned(self, information=information, along=pressure, progress=progress)
+        return tuned(self, information=information, along=pressure, remedies=remedies, progress=progress)
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Those of its calibration; see `Balancer`."""

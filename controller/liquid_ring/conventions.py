@@ -74,8 +74,7 @@ def _loop(run: Simulation) -> Iterator[Quantity]:
         return
     peak = balancing.peak_sensitivity(
         loop_factor=factor,
-        # A residual that turns round has its integral dropped each time.
-        integral=0.0 if factor > 1.0 else controller.period / (controller.integral_time or math.inf),
+        integral=controller.period / (controller.integral_time or math.inf),
         derivative=controller.derivative_time / controller.period,
     )
     name = f"peak sensitivity of the loop (zone {balancing.zone(peak)} of ISO 14839-3)"

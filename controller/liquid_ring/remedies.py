@@ -1,6 +1,7 @@
 """Changes of a liquid ring's scene to try where too few devices meet what is asked, and valves to choose.
 
-What helps follows from runs alone; here stands what can be built, and where a change has no meaning.
+What helps follows from runs alone; here stands what can be built, and where a change has no meaning.  The gas
+pressure is none of them: the search of the settings answers for it.
 """
 
 from __future__ import annotations
@@ -10,9 +11,12 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Final
 
+import numpy as np
+
 from ringbalance.controller.balancer import Remedy
 from ringbalance.controller.drawn_input import MEASURE_INPUT, DrawnInput
 from ringbalance.controller.liquid_ring.devices import AMPLITUDE, CAVITY, FITTED, LOSS, MOMENT, PHASE
+from ringbalance.controller.liquid_ring.loop_factor import vibration_rates
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import Holding, residual_fill_ratio, stalled_fill_ratio
 from ringbalance.scene.keys.derivations import shortest_path
@@ -20,14 +24,13 @@ from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
-_NARROWER: Final = (0.7, 0.5, 0.35)
+_NARROWER: Final = (0.7, 0.5, 0.35, 0.25)
 _WIDER: Final = (1.4, 2.0)
 """Times the bore."""
 _SLOW: Final = 0.25
 """Share of a run's time that valves open for the initial vibration alone, from which a bore is small."""
 _FASTER: Final = (2.0, 4.0)
 """Times the valve's conductance and over its lag."""
-_PRESSURES: Final = ((0.87, 0.76), (1.15, 1.3))
 _LIMITS: Final = (2.0, 4.0, 6.0)
 _CRESTS: Final = (1.0, 0.96, 0.92)
 """Times the largest radius of a crest that holds the liquid."""
@@ -60,7 +63,6 @@ def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
     return (
         *_of_bore(scene, model),
         *_of_valve(scene),
-        *_of_pressure(scene),
         *_of_crest(scene, model),
         Remedy(code="period", changes={"controller.period": scene.controller.period / 2}),
         *_of_limit(scene),
@@ -104,14 +106,8 @@ def _of_bore(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:
 
 
 def _open_time(scene: Scene, model: BalancerModel) -> float:
-    """Valve-open time in which the full tube would correct the initial vibration at equal fills, s."""
-    fill, step = scene.disc.initial_fill, 0.1 * scene.disc.initial_fill
-    flow = model.flow.evaluate(
-        fill_ratio=fill, opposite_fill_ratio=fill, gas_pressure=scene.gas.pressure, primed=True
-    )
-    moment = model.moment.pair_moment(fill_ratio=fill + step, opposite_fill_ratio=fill - step)
-    slope = abs(float(moment)) / step * scene.rotor.influence_coefficient
-    rate = slope * scene.tube.area * max(float(flow.velocity), 0.0) / model.chamber_volume
+    """Valve-open time in which the full tube would correct the initial vibration, s."""
+    rate = float(np.max(np.mean(vibration_rates(scene, model), axis=1)))
     return scene.rotor.initial_amplitude / rate if rate > 0.0 else math.inf
 
 
@@ -125,12 +121,6 @@ def _of_valve(scene: Scene) -> Iterator[Remedy]:
             changes["gas.valve_lag"] = gas.valve_lag / factor
         if changes:
             yield Remedy(code="faster_valve", changes=changes)
-
-
-def _of_pressure(scene: Scene) -> Iterator[Remedy]:
-    for code, factors in zip(("lower_pressure", "higher_pressure"), _PRESSURES, strict=True):
-        for factor in factors:
-            yield Remedy(code=code, changes={"gas.pressure": factor * scene.gas.pressure})
 
 
 def _of_limit(scene: Scene) -> Iterator[Remedy]:

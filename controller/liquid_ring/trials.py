@@ -24,7 +24,7 @@ _OFFSET: Final = Axis(
     name="offset over dead time", levels=(0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0), first=(0, 2, 4)
 )
 _INTEGRAL: Final = Axis(
-    name="period over integral time", levels=(0.0, 0.05, 0.1, 0.2, 0.35, 0.5), first=(0, 3)
+    name="period over integral time", levels=(0.0, 0.05, 0.1, 0.2, 0.35, 0.5), first=(1, 3)
 )
 _PRESSURES: Final = tuple(float(f) for f in np.round(1.1 ** np.arange(-12, 13), 3))
 """Times the scene's."""

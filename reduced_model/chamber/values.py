@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ringbalance.mesh.chamber_table import chamber_table
 from ringbalance.mesh.faceting import drawing_error
 from ringbalance.mesh.geometry import (
+    chamber_volume,
     half_angle,
     head_square,
     liquid_first_moment,
@@ -76,7 +77,7 @@ _QUADRATURE: Final = 1e-10
 
 
 def paper_closed_forms(scene: Scene, fill_ratio: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Wall pressure, Pa, and moment, kg m, by the liquid-ring paper, with the paper's own volume.
+    """Wall pressure, Pa, of the chamber's volume, and moment, kg m, with the paper's own volume.
 
     Source: Eqs. 3, 4, 7 and 12.
     """
@@ -84,7 +85,10 @@ def paper_closed_forms(scene: Scene, fill_ratio: npt.ArrayLike) -> tuple[FloatAr
     volume = np.asarray(fill_ratio) * paper.chamber_volume_paper(disc=disc)
     radius = paper.surface_radius_paper(disc=disc, liquid_volume=volume)
     pressure = paper.wall_pressure_paper(
-        disc=disc, density=rho, angular_velocity=scene.rotor.speed, liquid_volume=volume
+        disc=disc,
+        density=rho,
+        angular_velocity=scene.rotor.speed,
+        liquid_volume=np.asarray(fill_ratio) * chamber_volume(disc=disc),
     )
     moment = paper.moment_paper(disc=disc, density=rho, surface_radius=radius)
     # A root and its square differ by rounding, of which an empty chamber shall have nothing.

@@ -93,7 +93,7 @@ def _drag(tube: Record, point: Record, printed: float) -> Drawing:
         ),
         _reynolds_axis(tube["reynolds"][-1] / velocity[-1]),
         x=_VELOCITY,
-        y=("drag coefficient k", "1"),
+        y=("loss coefficient k", "1"),
         xlim=(velocity[0], velocity[-1]),
         ylim=(bottom, top),
         columns=4,

@@ -409,7 +409,7 @@ def _tube_labels(
     found = [
         label_at(f"from chamber {letters[0]}", points[0], shift=(-96, 112)),
         label_at(f"to chamber {opposite}", points[-1], shift=(72, 112)),
-        label_at("hump", points[told["hump"]], shift=(0, -96)),
+        label_at("siphon crest", points[told["hump"]], shift=(0, -96)),
     ]
     empty = np.flatnonzero(~full)
     if empty.size:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ringbalance.mesh.chamber import chamber_mesh, default_cells
 from ringbalance.mesh.export import write_vtu
-from ringbalance.mesh.geometry import surface_radius
+from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.mesh.liquid_body import Level, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.physics.pressure.solve import (
@@ -71,7 +71,7 @@ def _profile(scene: Scene, fill_ratio: float, radius: FloatArray, pressure: Floa
     Source: Eq. 12 of the liquid-ring paper.
     """
     disc = scene.disc
-    volume = fill_ratio * paper.chamber_volume_paper(disc=disc)
+    volume = fill_ratio * chamber_volume(disc=disc)
     implied = math.sqrt(disc.outer_radius**2 - 2 * volume / (disc.axial_width * disc.central_angle))
     drawn = np.linspace(implied, disc.outer_radius, radius.size)
     factor = scene.liquid.density * scene.rotor.speed**2 / 2

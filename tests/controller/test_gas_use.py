@@ -122,7 +122,7 @@ def test_a_line_that_is_not_given_is_a_range(calibrated: BalancerModel, scene: S
     # What moves while the chamber vents is in proportion, what moves while the front passes the crest is not.
     assert 2 < (slow.smallest_correction or 0.0) / (fast.smallest_correction or 1.0) < 5
     assert slow.above_limit
-    assert "no run is sure to reach the limit" in line_warning((slow, fast))
+    assert "cannot be guaranteed" in line_warning((slow, fast))
     assert "not in the scene" in line_text((slow, fast))
 
 

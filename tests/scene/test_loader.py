@@ -36,6 +36,7 @@ BUNDLED = (
     "silicone_oil_100cst",
     "perfluorinated_oil",
     "six_chamber",
+    "grinding_spindle",
 )
 DRIVEN = ("eccentric_mass_paper", "washing_machine", "driven_masses_small")
 """Tested in test_eccentric_scene.py."""

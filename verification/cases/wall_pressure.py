@@ -117,7 +117,7 @@ def _eq_12(scene: Scene, disc: Disc, fill: FloatArray) -> FloatArray:
         disc=disc,
         density=scene.liquid.density,
         angular_velocity=scene.rotor.speed,
-        liquid_volume=fill * paper.chamber_volume_paper(disc=disc),
+        liquid_volume=fill * chamber_volume(disc=disc),
     )
 
 

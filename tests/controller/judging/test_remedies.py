@@ -12,10 +12,11 @@ import pytest
 
 from ringbalance.controller.balancer import Draws, Outcomes, Remedy, balancer_of, settles_within
 from ringbalance.controller.judging.judge import Judgement, judged
-from ringbalance.controller.judging.remedies import Tried, amplitude_reached, tried_choices, tried_remedies
+from ringbalance.controller.judging.remedies import Remedied, amplitude_reached, tried_choices, tried_remedies
 from ringbalance.controller.liquid_ring.remedies import remedies_of
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.draws import quantiles
+from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import SceneFile
 
@@ -29,6 +30,7 @@ class Machine:
 
     scene: Scene
     offered: tuple[Remedy, ...]
+    verdict_draws: tuple[int, int] = (64, 1024)
 
     def on_scene(self, scene: SceneFile) -> Machine:
         assert isinstance(scene, Scene)
@@ -76,7 +78,7 @@ def limit(factor: float) -> Remedy:
     return Remedy(code="limit", changes={"controller.limit": factor * 50e-9}, continuous=True)
 
 
-def tried(paper_scene: Scene, *offered: Remedy) -> tuple[Tried, ...]:
+def tried(paper_scene: Scene, *offered: Remedy) -> tuple[Remedied, ...]:
     machine: Any = Machine(paper_scene, offered)
     own = judged(machine, {"gain": 1.0}, most=64)
     return tried_remedies(machine, own, search=lambda _: {"gain": 1.0})
@@ -173,3 +175,12 @@ def test_a_crest_too_low_is_moved_inwards(paper_scene: Scene) -> None:
     assert len(found) == 3
     for changes in found:
         assert low.with_values(changes).tube.hump_radius == changes["tube.hump_radius"] < 0.0375
+
+
+def test_the_bundled_complete_machine_meets_what_it_requires() -> None:
+    """With its own valve and settings, on devices that these were not chosen on."""
+    balancer = balancer_of(load_scene(bundled_scene("grinding_spindle")))
+    found = judged(balancer, {}, most=64)
+    assert found.verdict == "met"
+    assert found.demands[0].stated
+    assert balancer.choices() == ()

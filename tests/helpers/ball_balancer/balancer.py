@@ -259,6 +259,7 @@ class BallBalancer:
         self,
         *,
         pressure: bool = False,  # noqa: ARG002
+        remedies: bool | None = False,  # noqa: ARG002
         progress: Callable[[str], None] | None = None,
     ) -> BallTuning:
         """The drag of five between its bounds that settles most devices."""

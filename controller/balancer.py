@@ -18,7 +18,7 @@ from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.trials import Trials
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
-from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
+from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import BoolArray, FloatArray
@@ -372,10 +372,6 @@ class Balancer(Protocol):
         wherever that lies."""
         ...
 
-    def requirements(self) -> tuple[Requirement, ...]:
-        """What the scene demands of it, and what its runs come to."""
-        ...
-
     def rows(self, run: Any) -> Rows:
         """One of its traced runs as `simulate` prints it.
 
@@ -478,20 +474,4 @@ def outcomes_of(runs: Sequence[TracedRun], *, trace: bool) -> Outcomes:
         unbalance=np.array([each.unbalance for each in runs]),
         ended=tuple(each.ended for each in runs),
         traced=tuple(runs) if trace else (),
-    )
-
-
-def requirements_of(
-    balancer: Balancer, *, unbalance: float, reach: float, residual: float, settling_time: float
-) -> tuple[Requirement, ...]:
-    """What one run of the scene as it says comes to, of what any balancer is asked for; SI.
-
-    Args: `unbalance`: to be cancelled. `reach`: largest that can be, wherever it lies. `residual`: amplitude
-        that may be left. `settling_time`: within which the run must settle.
-    """
-    (done,) = balancer.run({}, AS_GIVEN, trace=True).traced
-    return (
-        Requirement("balancing moment", "kg m", AT_LEAST, unbalance, "the unbalance to cancel", reach),
-        Requirement("amplitude at the end", "m", AT_MOST, residual, "the limit", done.final_amplitude),
-        Requirement("settling time", "s", AT_MOST, settling_time, "the time allowed", done.settling_time),
     )

@@ -24,7 +24,6 @@ from ringbalance.controller.balancer import (
     TracedRun,
     inputs_of,
     outcomes_of,
-    requirements_of,
     settles_within,
 )
 from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
@@ -47,7 +46,7 @@ from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.trials import Axis, Trials
-from ringbalance.results.requirements import AT_MOST, Requirement
+from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.draws import run_noise
@@ -276,17 +275,6 @@ class EccentricMassBalancer:
             key="reach", name="usable moment in any direction", unit="kg m", value=reach_of(self.scene)
         )
         return (reach, *loops_quantities(RecommendedGains.of(self.scene)))
-
-    def requirements(self) -> tuple[Requirement, ...]:
-        """See `Balancer`."""
-        scene = self.scene
-        return requirements_of(
-            self,
-            unbalance=scene.imbalance.mass * scene.imbalance.radius,
-            reach=reach_of(scene),
-            residual=scene.requirement.residual or scene.supervisor.limit,
-            settling_time=self.demands()[0].required,
-        )
 
     def rows(self, run: EccentricRun) -> Rows:
         """See `Balancer`."""

@@ -24,7 +24,6 @@ from ringbalance.controller.balancer import (
     TracedRun,
     inputs_of,
     outcomes_of,
-    requirements_of,
     settles_within,
 )
 from ringbalance.controller.common_rotor import CommonRotor, Rotors
@@ -50,7 +49,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, BalancerModel, completed_model, lacking
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
-from ringbalance.results.requirements import AT_LEAST, Requirement
+from ringbalance.results.requirements import AT_LEAST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.draws import BLOCK, run_noise
@@ -323,18 +322,6 @@ class LiquidRingBalancer:
     def quantities(self) -> tuple[Quantity, ...]:
         """Those of its calibration; see `Balancer`."""
         return calibrate(self.scene).rows().quantities
-
-    def requirements(self) -> tuple[Requirement, ...]:
-        """See `Balancer`."""
-        wanted, rotor = self.scene.requirement, self.scene.rotor
-        reach = next(each.value for each in self.quantities() if each.key == "reach")
-        return requirements_of(
-            self,
-            unbalance=wanted.correction_moment or abs(rotor.initial_unbalance),
-            reach=reach or 0.0,
-            residual=wanted.residual or self.scene.controller.limit,
-            settling_time=wanted.settling_time or self.span(),
-        )
 
     def rows(self, run: Simulation) -> Rows:
         """See `Balancer`."""

@@ -27,14 +27,12 @@ from ringbalance.controller.balancer import (
     inputs_of,
     one_by_one,
     outcomes_of,
-    requirements_of,
     settles_within,
 )
 from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.drawn_input import DrawnInput, drawn_key
 from ringbalance.controller.trials import Trials, scaled
 from ringbalance.controller.tuning.settling import SettlingTimes, summary
-from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
@@ -279,17 +277,6 @@ class BallBalancer:
         """Both balls side by side, their size left out."""
         reach = 2 * self.scene.balls.mass * self.scene.balls.race_radius
         return (Quantity(key="reach", name="usable moment in any direction", unit="kg m", value=reach),)
-
-    def requirements(self) -> tuple[Requirement, ...]:
-        """Those that any balancer has."""
-        scene, (reach,) = self.scene, self.quantities()
-        return requirements_of(
-            self,
-            unbalance=scene.rotor.unbalance,
-            reach=reach.value or 0.0,
-            residual=scene.vibration.limit,
-            settling_time=self.span(),
-        )
 
     def rows(self, run: BallRun) -> Rows:
         """Its amplitude and how it ended."""

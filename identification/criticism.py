@@ -37,6 +37,7 @@ from ringbalance.identification.likelihood import Block, Problem, basis_of
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.identification.other_laws import by_other_machines, by_other_tubes
 from ringbalance.identification.readings import ComparedColumn, Reading, compared_columns, other_readings
+from ringbalance.results.rows import text_of
 from ringbalance.scene.arrays import BoolArray, FloatArray, StringArray
 
 LEVEL: Final = 0.05
@@ -113,12 +114,11 @@ class Criticism:
         failed = [each.text for each in self.findings if each.fails]
         if failed:
             more = len(failed) - _MOST_NAMED
-            rest = [f"and {more} more such findings"] if more > 0 else []
-            return "the fit does not describe the data: " + "; ".join([*failed[:_MOST_NAMED], *rest])
+            rest = [text_of("more_findings", count=more)] if more > 0 else []
+            return text_of("residuals_against_fit", findings="; ".join([*failed[:_MOST_NAMED], *rest]))
         if not self.findings:
-            return "too few measurements to tell whether the fit describes them"
-        tests = f"{len(self.findings)} tests, {100 * LEVEL:g} % level"
-        return f"nothing in the residuals speaks against the fit ({tests})"
+            return text_of("residuals_too_few")
+        return text_of("residuals_sound", tests=len(self.findings), level=LEVEL)
 
     @classmethod
     def of(cls, fit: LinearFit) -> Criticism:
@@ -143,7 +143,7 @@ def _sizes(fit: LinearFit) -> Iterator[_ResidualTest]:
         if bool(np.all(fit.known_noise[rows])):
             square, freedom = float(np.sum(fit.residuals[rows] ** 2)), fit.freedom(rows)
             times = math.sqrt(square / freedom)
-            text = f"residuals of {block} are {times:.2g} times as large as the stated noise"
+            text = text_of("residuals_too_large", block=block, times=times)
             yield _ResidualTest(test="size", block=block, p_value=float(chi2.sf(square, freedom)), text=text)
 
 
@@ -153,7 +153,7 @@ def _runs(fit: LinearFit) -> Iterator[_ResidualTest]:
         plus = int(np.count_nonzero(signs))
         if min(plus, signs.size - plus) > 1:
             runs = 1 + int(np.count_nonzero(signs[1:] != signs[:-1]))
-            text = f"residuals of {block} keep their sign: {runs} runs in {signs.size} measurements"
+            text = text_of("residuals_keep_sign", block=block, runs=runs, count=signs.size)
             p_value = _runs_probability(plus, signs.size - plus, runs)
             yield _ResidualTest(test="runs", block=block, p_value=p_value, text=text)
 
@@ -177,14 +177,13 @@ def _runs_probability(plus: int, minus: int, runs: int) -> float:
 NEEDED: Final = float((ndtri(0.9) - ndtri(LEVEL / 2)) ** 2)
 """Separation of laws that are told apart: 9 of 10 normal statistics show it at the 5 % level."""
 Outcome = Literal["other", "between", "fitted", "undecided"]
-_SAID: Final[Mapping[Outcome, str]] = {
-    "other": "the data prefer {} to the fitted law, so that the fitted values may be wrong by more than "
-    "their intervals",
-    "between": "the data lie between the fitted law and {}",
-    "fitted": "the data prefer the fitted law to {}",
-    "undecided": "these data cannot tell the fitted law from {}",
+_CODES: Final[Mapping[Outcome, str]] = {
+    "other": "other_law_preferred",
+    "between": "between_laws",
+    "fitted": "fitted_law_preferred",
+    "undecided": "laws_not_told_apart",
 }
-"""By outcome; with the other law, or all those of one outcome."""
+"""Of what is said, the gravest first; of the other law, or of all those of one outcome."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,7 +208,7 @@ class LawComparison:
     @property
     def text(self) -> str:
         """What the data say."""
-        return _SAID[self.outcome].format(self.other)
+        return text_of(_CODES[self.outcome], law=self.other)
 
     @classmethod
     def of(cls, fit: LinearFit, *, other: str, residuals: FloatArray) -> LawComparison:
@@ -228,10 +227,10 @@ class LawComparison:
 
 def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, str]]:
     """What the data say of all of them, one sentence for each outcome, the gravest first."""
-    for outcome, sentence in _SAID.items():
+    for outcome, code in _CODES.items():
         others = [each.other for each in comparisons if each.outcome == outcome]
         if others:
-            yield outcome, sentence.format(" or ".join(filter(None, (", ".join(others[:-1]), others[-1]))))
+            yield outcome, text_of(code, law=" or ".join(filter(None, (", ".join(others[:-1]), others[-1]))))
 
 
 LEAST_SHARE: Final = 0.5
@@ -252,9 +251,7 @@ class _Explained:
     @property
     def text(self) -> str:
         """What it means."""
-        percent = f"{100 * max(self.share, 0.0):.2g} %"
-        name = Path(self.file).name
-        return f"the fit explains {percent} of the variance of {name} and calls the rest noise"
+        return text_of("hardly_explained", share=max(self.share, 0.0), file=Path(self.file).name)
 
 
 def _shares_explained(best: Optimum) -> Iterator[_Explained]:
@@ -328,9 +325,7 @@ class Review:
         if not self._read_wrongly:
             return self.criticism.text
         residuals = [] if self.criticism.describes else [self.criticism.text]
-        return "the fit does not describe the data as they are read: " + "; ".join(
-            [*self._read_wrongly, *residuals]
-        )
+        return text_of("read_against_fit", findings="; ".join([*self._read_wrongly, *residuals]))
 
     @property
     def sentences(self) -> tuple[str, ...]:

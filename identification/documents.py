@@ -186,7 +186,7 @@ def _findings(result: FitResult) -> Iterator[Finding]:
     yield from (_noise_finding(each) for each in result.noise)
     yield from _pairs(result)
     yield from _far_rows(result)
-    yield from (Finding(code="pulled", values={"text": each}) for each in result.pulled)
+    yield from result.pulled
 
 
 def _of_parameter(found: FittedParameter) -> Iterator[Finding]:

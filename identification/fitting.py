@@ -28,6 +28,7 @@ from ringbalance.identification.parameters import (
     path_of,
     values_of,
 )
+from ringbalance.results.rows import Finding, text_of
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import Origin
@@ -153,11 +154,10 @@ class FitResult:
     """For criticism and for the choice of the next measurement."""
 
     @property
-    def pulled(self) -> tuple[str, ...]:
-        """Held inputs that the data pull out of what is stated of them, each in one sentence."""
+    def pulled(self) -> tuple[Finding, ...]:
+        """Held inputs that the data pull out of what is stated of them."""
         return tuple(
-            f"the data pull {name} off by {abs(pull):.2g} of its stated uncertainties (95 %), and it was not "
-            "fitted: fit it, or look at what is stated of it"
+            Finding(code="pulled", values={"name": name, "pull": abs(pull)})
             for name, pull in self.pulls.items()
             if abs(pull) > 1
         )
@@ -287,19 +287,15 @@ def _fitted(
 
 def _verdict_text(parameter: Parameter, verdict: Identified, found: Sequence[Combination]) -> str:
     if verdict is Identified.IDENTIFIED:
-        return "identified by the data"
+        return text_of("told_apart_by_data")
+    never = verdict is Identified.STRUCTURALLY
     within = [c.text for c in found if parameter.name in c.names]
-    only = f"; the data identify {' and '.join(within)}" if within else ""
-    rest = (
-        "its interval is that of the scene's [uncertainty]"
-        if parameter.prior
-        else "nothing else is known of it"
-    )
-    reason = {
-        Identified.STRUCTURALLY: "no data of these kinds can tell it apart",
-        Identified.PRACTICALLY: "these data hardly narrow it down",
-    }[verdict]
-    return f"{verdict}: {reason}{only}; {rest}"
+    sentences = [
+        text_of("told_apart_by_none" if never else "hardly_narrowed", verdict=str(verdict)),
+        *([text_of("products_identified", products=" and ".join(within))] if within else []),
+        text_of("interval_stated" if parameter.prior else "interval_unknown"),
+    ]
+    return "; ".join(sentences)
 
 
 def _noises(best: Optimum) -> tuple[Noise, ...]:

@@ -19,6 +19,7 @@ from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.kinds.registry import KINDS, kinds_of
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.parameters import both_sides
+from ringbalance.results.rows import Value, text_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.narrowing import AnyScene
 
@@ -44,14 +45,13 @@ class NextMeasurement:
     def text(self) -> str:
         """One sentence."""
         best = self.gains[0]
-        share = "a finite one" if best.ratio == 0 else f"{100 * best.ratio:.2g} % of its width"
-        if best.ratio <= _WORTHWHILE:
-            return f"{best.candidate} would narrow the interval of {self.parameter} to {share}"
-        best_one = f" (the best, {best.candidate}, to {share})" if best.ratio <= _AT_ALL else ""
-        return (
-            f"no single measurement would narrow the interval of {self.parameter} much{best_one}; a direct "
-            "measurement of it, or of what its error goes together with, belongs into [uncertainty]"
-        )
+        told: dict[str, Value] = {"parameter": self.parameter}
+        if best.ratio > _AT_ALL:
+            return text_of("no_measurement_narrows", **told)
+        told |= {"candidate": best.candidate, "share": best.ratio}
+        if best.ratio > _WORTHWHILE:
+            return text_of("best_narrows_little", **told)
+        return text_of("measurement_narrows" if best.ratio else "measurement_bounds", **told)
 
 
 def next_measurement(result: FitResult, parameter: str | None = None) -> NextMeasurement:

@@ -29,6 +29,7 @@ from ringbalance.controller.rotor import chamber_letters
 from ringbalance.identification.kinds.kind import Column, Observations
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum
+from ringbalance.results.rows import text_of
 from ringbalance.scene.arrays import FloatArray
 
 FAR: Final = 5.0
@@ -77,10 +78,10 @@ def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
 
 
 def _text(file: str, column: Column, middle: float, ratio: float) -> str:
-    here = f"{column.head} in {Path(file).name} is {column.written(middle)} in the middle of its values"
+    here = {"column": column.head, "file": Path(file).name, "middle": column.written(middle)}
     if ratio == 1.0:
-        return f"{here}, as the scene has it"
-    return f"{here}, {ratio:.2g} times the {column.written(middle / ratio)} of the scene"
+        return text_of("column_as_in_scene", **here)
+    return text_of("column_off_scene", **here, ratio=ratio, known=column.written(middle / ratio))
 
 
 _LONGEST_TIME: Final = 10.0
@@ -289,9 +290,12 @@ def _asked(problem: Problem, code: str, chosen: Sequence[int], far: Collection[t
 
 def _reading(problem: Problem, code: str, chosen: Sequence[int], gain: float, *, named: bool) -> Reading:
     files = tuple(problem.blocks[i].observations.file for i in chosen)
-    names = " and ".join(Path(file).name for file in files)
-    verdict = "would fit decisively better: " if named else ""
-    text = f"{names}: {MISREADINGS[code].words} {verdict}({gain:+.3g} of the log likelihood)"
+    text = text_of(
+        "read_otherwise_better" if named else "read_otherwise",
+        files=" and ".join(Path(file).name for file in files),
+        reading=MISREADINGS[code].words,
+        gain=f"{gain:+.3g}",
+    )
     return Reading(code=code, files=files, gain=gain, named=named, text=text)
 
 

@@ -21,6 +21,7 @@ from ringbalance.identification.fitting import FitResult, FittedParameter
 from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.parameters import START, path_of, values_of
+from ringbalance.results.rows import text_of
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.fitted import ERROR_NAME, MODEL, NO_UNIT, ModelError
@@ -78,7 +79,7 @@ def save_result(
             for each in result.parameters
             for doubt in each.doubts
         ),
-        *(MeasuredFinding(about="value", text=_short(each)) for each in result.pulled),
+        *(MeasuredFinding(about="value", text=_short(each.text)) for each in result.pulled),
         *(MeasuredFinding(about="combination", text=_combination(each)) for each in result.combinations),
         *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
     ]
@@ -315,7 +316,7 @@ def _found_from(text: str, *, folder: Path, to: Path) -> str:
 
 
 def _combination(found: Combination) -> str:
-    return f"the data identify {found.text} within {100 * found.relative_uncertainty:.2g} %"
+    return text_of("product_identified", product=found.text, uncertainty=found.relative_uncertainty)
 
 
 def _correlations(result: FitResult) -> Iterator[str]:
@@ -323,7 +324,7 @@ def _correlations(result: FitResult) -> Iterator[str]:
     for i, j in combinations(range(len(names)), 2):
         value = float(result.correlations[i, j])
         if abs(value) > _TOGETHER:
-            yield f"the errors of {names[i]} and {names[j]} go together (correlation {value:.2f})"
+            yield text_of("errors_correlated", first=names[i], second=names[j], correlation=value)
 
 
 def _short(text: str) -> str:

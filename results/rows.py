@@ -133,6 +133,11 @@ class Finding:
         }
 
 
+def text_of(code: str, **values: Value) -> str:
+    """The sentence of a code, for a terminal."""
+    return Finding(code=code, values=values).text
+
+
 @dataclass(frozen=True, kw_only=True)
 class Sentence:
     """What stands in `sentences.toml` under a code."""

@@ -17,6 +17,7 @@ from ringbalance.reports.pictures.fields import shown_field, shown_fill, tube_fi
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.style import PICTURE
 from ringbalance.results.numbers import given, shown
+from ringbalance.results.rows import Finding, Value
 from ringbalance.scene import Scene
 
 Record = dict[str, Any]
@@ -158,28 +159,21 @@ def _captions(scene: Scene, tube: Record | None) -> dict[str, tuple[str, str]]:
     fill, most = given(shown_fill(scene), "1"), given(scene.disc.max_fill_ratio, "1")
     speed = shown(scene.rotor.speed, "rad/s", digits=5)
     hump = scene.tube.hump_radius
-    path = "straight across" if hump is None else f"over its siphon crest at a radius of {given(hump, 'm')}"
+    path = _sentence("tube_straight") if hump is None else _sentence("tube_over_crest", radius=hump)
     of_tube = {} if tube is None else {"tube": _tube_caption(tube)}
     return of_tube | {
         "disc": (
-            f"The disc cut open across its shaft: chambers {letters[0]} to {letters[-1]}, each with a ring "
-            f"of liquid on its outer wall; a tube leads from one chamber {path} to the opposite one.",
-            f"The disc at a fill ratio of {fill} in every chamber, front half cut away. Colour: depth below "
-            f"the free surface. The connecting tube of the first pair is drawn schematically, {path}.",
+            _sentence("disc_shown", first=letters[0], last=letters[-1], path=path),
+            _sentence("disc_caption", fill=fill, path=path),
         ),
-        "pressure": (
-            "The liquid in one chamber with a corner cut out: pressure rises from nothing on the free "
-            "surface to its largest value on the outer wall.",
-            f"Gauge pressure of the liquid in one chamber by finite elements in three dimensions, at the "
-            f"largest fill ratio of {most} and {speed}, gravity left out. White lines join equal pressures.",
-        ),
+        "pressure": (_sentence("pressure_shown"), _sentence("pressure_caption", fill=most, speed=speed)),
     }
 
 
 def _tube_caption(tube: Record) -> tuple[str, str]:
-    return (
-        "The connecting tube on its disc, half a turn over the siphon crest, coloured by pressure: "
-        f"{tube['text']}.",
-        f"The tube at equal fills under {tube['gas']}, coloured by gauge pressure: {tube['text']}. Its "
-        "radius is that of the calculation, straight along each leg; its turn about the shaft is schematic.",
-    )
+    answer = tube["text"]
+    return _sentence("tube_shown", answer=answer), _sentence("tube_caption", gas=tube["gas"], answer=answer)
+
+
+def _sentence(code: str, **values: Value) -> str:
+    return Finding(code=code, values=values).sentence()

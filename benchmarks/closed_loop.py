@@ -1,4 +1,4 @@
-"""Noisy closed-loop runs with all terms of an injection, beside scipy's solve_ivp; ensembles as they grow.
+"""Noisy closed-loop runs with all terms of an injection, beside scipy's solve_ivp; more and more of them.
 
     python benchmarks/closed_loop.py [--json] [--repeats 3] [--members 1000] [--largest 8000]
 
@@ -7,10 +7,11 @@ two valves a command, and the motion of every pair that was driven.  The rival i
 oneself: a plain Python loop with the injections of `moving_injection`, solve_ivp with events, by the method
 and tolerance that is fastest over the injections of a run among those that keep each fill within 1e-6.  It
 takes for granted that a pair is at rest and vented at the next sample, keeps no record and looks after no
-residual fill.  Ours are runs of `simulate_ensemble`, each with its own flow, moment, rotor and noise, and all
-of that.  Before the time is taken, a run without noise must agree; the error of a member's fills is shown.
+residual fill.  Ours are drawn devices, each with a law, a rotor and noise of its own, which
+are made for it, and all of that.  Before the time is taken, a run without noise must agree; the error of
+their fills is shown.
 Times are of the processor, with one thread, the least of several rounds; the growth is measured after
-everything has been compiled, so that the peak memory of the process shows what an ensemble adds.
+everything has been compiled, so that the peak memory of the process shows what more of them add.
 """
 
 from __future__ import annotations
@@ -33,12 +34,9 @@ import numpy as np
 from moving_injection import FILL_ERROR, METHODS, TOLERANCES, WANTED, Rival, least, ours, piped_scene
 
 from ringbalance.controller.algorithms.built_in import vector_shares
-from ringbalance.controller.ensemble import (
-    RELATIVE_ERROR,
-    ensemble_dynamics,
-    simulate_ensemble,
-    simulate_members,
-)
+from ringbalance.controller.balancer import AS_GIVEN, Draws
+from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
+from ringbalance.controller.liquid_ring.drawn_runs import RELATIVE_ERROR
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import Dynamics
@@ -59,12 +57,11 @@ END_ERROR = 1e-9
 
 FIRST_CALL = """
 import time
-from ringbalance.controller.ensemble import simulate_ensemble
-from ringbalance.reduced_model.law.paper_law import paper_model
+from ringbalance.controller.balancer import AS_GIVEN, balancer_of
 from ringbalance.scene.loader import bundled_scene, load_scene
-scene = load_scene(bundled_scene("liquid_ring_paper"))
+balancer = balancer_of(load_scene(bundled_scene("liquid_ring_paper")), flow_law="paper")
 start = time.process_time()
-simulate_ensemble(scene, paper_model(scene), 1, 0)
+balancer.run({}, AS_GIVEN)
 print(time.process_time() - start)
 """
 
@@ -181,11 +178,11 @@ def fastest(rival: Rival, dynamics: Dynamics, asked: list[tuple[float, float]]) 
 def check_same(scene: Scene, model: BalancerModel, carried: Carried) -> None:
     """Make sure that both sides do the same work. Raises: RuntimeError: they do not end alike."""
     still = replace(scene, sensor=replace(scene.sensor, amplitude_noise=0.0, phase_noise=0.0))
-    end, samples = plain_run(still, model, carried, 0)
-    member = simulate_members(still, model)
-    error = abs(abs(end) - float(member.final_amplitude[0]))
-    if samples != member.samples[0] or error > END_ERROR:
-        raise RuntimeError(f"{samples} and {member.samples[0]} samples, {error:.1e} m apart at the end")
+    end, _ = plain_run(still, model, carried, 0)
+    (own,) = LiquidRingBalancer(still).run({}, AS_GIVEN).final_amplitude
+    error = abs(abs(end) - float(own))
+    if error > END_ERROR:
+        raise RuntimeError(f"{error:.1e} m apart at the end")
 
 
 def rival_run(scene: Scene, model: BalancerModel, carried: Carried) -> None:
@@ -207,7 +204,7 @@ def growth(ensemble: Callable[[int], object], *, first: int, largest: int) -> li
 
 
 def compile_seconds() -> list[float]:
-    """Processor time, s, of a machine's first ensemble, compiling, and of the first of a later process."""
+    """Processor time, s, of a machine's first run, compiling, and of the first of a later process."""
     with tempfile.TemporaryDirectory() as folder:
         kept = os.environ | {"NUMBA_CACHE_DIR": folder}
         call = partial(subprocess.run, env=kept, capture_output=True, text=True, check=True)
@@ -225,9 +222,6 @@ def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
     )
     model = calibrate(scene).model
     dynamics = dynamics_of(scene=scene, model=model, modelled=(INERTIA, FILLING, LAG, HELD))
-    plant = ensemble_dynamics(scene, model).plant(total=2 * scene.disc.initial_fill)
-    if not all(plant[name][0] > 0 for name in ("inertia", "line", "lifts", "valve_lag")):
-        raise RuntimeError("the ensemble leaves out what is to be compared")
     carried = Carried(rival=Rival(scene, model), total=2 * scene.disc.initial_fill)
     check_same(scene, model, carried)
     carried.asked.clear()
@@ -240,8 +234,11 @@ def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
     carried.asked.clear()
     theirs = least(partial(rival_run, scene, model, carried), repeats) / RIVAL_RUNS
     injections = len(carried.asked) / (repeats * RIVAL_RUNS)
-    simulate_ensemble(scene, model, 1, 0)
-    one = partial(simulate_ensemble, scene, model, seed=0, workers=1)
+
+    def one(size: int) -> object:
+        return LiquidRingBalancer(scene).run({}, Draws.first(size))
+
+    one(1)
     own = least(lambda: one(members), repeats) / members
     return {
         "solve_ivp_s": theirs,
@@ -253,7 +250,7 @@ def compare(repeats: int, members: int, largest: int) -> dict[str, object]:
         "ratio": theirs / own,
         "wanted": WANTED,
         "growth": growth(one, first=largest // 8, largest=largest),
-        "first_ensemble_s": compile_seconds(),
+        "first_run_s": compile_seconds(),
     }
 
 

@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.ensemble import RELATIVE_ERROR
+from ringbalance.controller.liquid_ring.drawn_runs import RELATIVE_ERROR
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.physics.gas import flow_shape
 from ringbalance.reduced_model.calibration import calibrate

@@ -74,6 +74,9 @@ class Draws:
     numbers: tuple[int, ...]
     devices: bool = True
     """Whether the inputs are drawn; False: each is as the scene says, and the noise alone differs."""
+    whole: bool = True
+    """Whether every run is carried out; False: one that is known not to settle ends with the least vibration
+    that the device can come to."""
 
     @classmethod
     def first(cls, count: int, *, devices: bool = True) -> Draws:
@@ -81,9 +84,9 @@ class Draws:
         return cls(numbers=tuple(range(count)), devices=devices)
 
     @classmethod
-    def block(cls, start: int, count: int) -> Draws:
+    def block(cls, start: int, count: int, *, whole: bool = True) -> Draws:
         """Devices `start` to `start + count - 1`."""
-        return cls(numbers=tuple(range(start, start + count)))
+        return cls(numbers=tuple(range(start, start + count)), whole=whole)
 
 
 AS_GIVEN: Final = Draws.first(1, devices=False)

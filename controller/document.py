@@ -15,7 +15,7 @@ import numpy as np
 from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.liquid_ring.conventions import conventions
 from ringbalance.controller.simulation import Injection, Sample, Simulation
-from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text, line_warning
+from ringbalance.reduced_model.gas_line import line_document, line_ends, line_text
 from ringbalance.reduced_model.injection.dynamics import Event, gives_forces
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG, neglected_in_injections
@@ -47,7 +47,6 @@ def simulation_document(simulation: Simulation) -> dict[str, Any]:
         "further_time_s": FURTHER,
         "loop_factor": simulation.loop.value,
         "loop_factor_limit": simulation.loop.limit,
-        "largest_staying_loop_factor": simulation.loop.largest_staying,
         "vibration_rate_m_per_s": simulation.loop.rate,
         "stationary_deviation_m": finite(simulation.loop.deviation),
         "time_s": simulation.time.tolist(),
@@ -139,7 +138,7 @@ _DECADES: Final = 3.0
 def simulation_rows(simulation: Simulation) -> Rows:
     """Quantities, findings, injections and terms of a run."""
     gas = simulation.gas.finding
-    scene, line = simulation.scene, line_warning(simulation.gas_line)
+    scene = simulation.scene
     model = simulation.model_status
     closed = [i.time + i.duration for i in simulation.injections]
     # Until shortly after the last valve has closed.
@@ -150,7 +149,6 @@ def simulation_rows(simulation: Simulation) -> Rows:
         findings=(
             *simulation.findings,
             *(() if gas is None else (gas,)),
-            *(Finding(code="gas_line", values={"text": line}) for _ in (line,) if line),
             *(Finding(code="out_of_range", values={"text": model.text}) for _ in (model,) if not model.ok),
         ),
         facts=(

@@ -12,7 +12,8 @@ import numpy as np
 
 from ringbalance.controller.algorithms.built_in import BELOW_MINIMUM, NO_SAMPLE
 from ringbalance.controller.balancer import FURTHER
-from ringbalance.controller.liquid_ring.loop_factor import STAYING_DEVIATIONS, LoopFactor
+from ringbalance.controller.liquid_ring.dead_time import dead_time
+from ringbalance.controller.liquid_ring.loop_factor import LoopFactor
 from ringbalance.controller.liquid_ring.plant import (
     LEAST_PRESSURE,
     NEARLY_EMPTY,
@@ -22,8 +23,6 @@ from ringbalance.controller.liquid_ring.plant import (
 from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING, SAMPLES
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.simulation import NOISE_DEVIATIONS, Injection, Outcome, Sample, noise_floor
-from ringbalance.controller.tuning.dead_time import standing_finding
-from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.results.rows import Finding, Value, sentences
@@ -229,9 +228,7 @@ def _noise(facts: Facts) -> Iterator[Finding]:
     if NOISE_DEVIATIONS * sigma > facts.scene.controller.limit:
         yield Finding(code="sensor_noise_too_high", values={"noise": sigma})
     elif deviation is not None and math.isfinite(deviation):
-        yield Finding(
-            code="noise_sustained", values={"deviation": deviation, "deviations": STAYING_DEVIATIONS}
-        )
+        yield Finding(code="noise_sustained", values={"deviation": deviation})
 
 
 def _smaller_steps(facts: Facts) -> Iterator[Finding]:
@@ -245,7 +242,7 @@ def _smaller_steps(facts: Facts) -> Iterator[Finding]:
     elif settings.kind == "trial":
         yield Finding(code="trial_steps_too_long", values=turns)
     else:
-        gain = recommended_gain(facts.scene, facts.plant.model, loop=facts.loop)
+        gain = 1.0 / facts.loop.rate if facts.loop.rate else 0.0
         if facts.loop.value is None or not 0 < gain < settings.proportional:
             yield Finding(code="gain_too_high", values=turns)
         else:
@@ -262,8 +259,16 @@ def _larger_gain(facts: Facts, code: str) -> Finding:
 
 
 def _dead_time(facts: Facts) -> list[Finding]:
-    found = None if facts.own_algorithm else standing_finding(facts.scene, facts.plant.model)
-    return [] if found is None else [found]
+    """That an amplitude above the limit stands still, as its valve-open time moves nothing."""
+    scene, loop = facts.scene, facts.loop
+    if facts.own_algorithm or scene.controller.kind == "trial" or loop.rate == 0.0:
+        return []
+    lost = dead_time(scene, facts.plant.model, rate=loop.rate)
+    rest = max(lost - min(scene.controller.offsets(scene.disc.chambers)), 0.0)
+    per_time = loop.rate if scene.controller.kind == "law_based" else 1.0 / scene.controller.proportional
+    if rest * per_time <= scene.controller.limit:
+        return []
+    return [Finding(code="dead_time", values={"standing_amplitude": rest * per_time, "dead_time": lost})]
 
 
 def _pushed(facts: Facts) -> Finding:

@@ -18,7 +18,7 @@ from ringbalance.reduced_model.documents import (
     paper_columns,
     velocity_status,
 )
-from ringbalance.reduced_model.gas_line import line_text, line_warning
+from ringbalance.reduced_model.gas_line import line_text
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.results.numbers import believed, given, rounded
 from ringbalance.results.result import Rows, Table, models_table
@@ -118,7 +118,7 @@ def _of_budget(calibration: Calibration, key: str, budget: Budget) -> Quantity:
 
 
 def _findings(calibration: Calibration) -> Iterator[Finding]:
-    scene, status, line = calibration.scene, calibration.chamber.status, line_warning(calibration.gas_line)
+    scene, status = calibration.scene, calibration.chamber.status
     if not status.ok:
         yield Finding(code="out_of_range", values={"text": status.text})
     yield from _mesh_findings(scene)
@@ -127,8 +127,6 @@ def _findings(calibration: Calibration) -> Iterator[Finding]:
         yield calibration.holding.finding
     if calibration.instability is not None and calibration.instability.finding is not None:
         yield calibration.instability.finding
-    if line:
-        yield Finding(code="gas_line", values={"text": line})
     yield from _direction(calibration)
     if not scene.uncertainty:
         yield Finding(code="uncertainty_unstated")

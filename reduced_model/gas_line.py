@@ -9,9 +9,6 @@ the liquid's mass.
 
 from __future__ import annotations
 
-import cmath
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -21,7 +18,6 @@ from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Gas, Scene
 
 DEFAULT_CONDUCTANCES: Final = (0.2e-8, 1e-8)
@@ -64,21 +60,10 @@ class LineAnswer:
     what it moves runs back."""
     smallest_correction: float | None
     """Change of the vibration by the shortest opening, m."""
-    limit: float
-    """Of the vibration, m."""
-    largest_correction: float
-    """The `largest_correction` at which the limit is sure to be reached, m."""
     dead_time: float | None = None
     """Valve-open time that an injection of the size of the limit loses against the steady velocity, s."""
     holds: bool = True
     """Whether what an injection moves stays moved with the gas off."""
-    standing_amplitude: float | None = None
-    """Amplitude up to which no injection by the scene's gain and offsets transfers liquid, m."""
-
-    @property
-    def above_limit(self) -> bool:
-        """Whether the smallest correction is so large that the limit is not sure to be reached."""
-        return self.smallest_correction is not None and self.smallest_correction > self.largest_correction
 
 
 def line_ends(scene: Scene) -> tuple[_LineEnd, ...]:
@@ -124,16 +109,6 @@ def _holds(model: BalancerModel) -> bool:
     return not isinstance(law, CalibratedLaw | PaperLaw) or law.holds(law.max_fill_ratio / 2)
 
 
-def largest_correction(limit: float, *, chambers: int) -> float:
-    """Smallest correction s up to which a limit of the vibration is sure to be reached, m.
-
-    A correction by s leaves |a - s| of a share a of the vibration, which is less than a from s/2 on: each of
-    two neighbouring chambers can leave s/2, and both together the vector of two such shares. Above it runs
-    may still settle, as corrections larger than s have any size.
-    """
-    return 2 * limit / _largest_standing([1.0] * chambers)
-
-
 def _vibration(scene: Scene, model: BalancerModel, moved: float) -> float:
     """By which a fill ratio that has moved between equal fills changes the vibration, m."""
     fill = model.flow.max_fill_ratio / 2
@@ -141,55 +116,18 @@ def _vibration(scene: Scene, model: BalancerModel, moved: float) -> float:
     return abs(float(moment)) * scene.rotor.influence_coefficient
 
 
-def _at_equal_fills(scene: Scene, dead_time: float, *, rate: float) -> float | None:
-    """`standing_amplitude`, m; None for the trial algorithm, which has no gain."""
-    settings, n = scene.controller, scene.disc.chambers
-    if settings.kind == "trial":
-        return None
-    # The two offsets of a pair belong to the fills about the equal ones.
-    lost = max(dead_time - math.fsum(settings.offsets(n)) / n, 0.0)
-    return standing_amplitude(settings, [lost] * n, rates=[rate] * n)
-
-
-def standing_amplitude(
-    settings: ControllerSettings, times: Sequence[float], *, rates: Sequence[float]
-) -> float:
-    """Largest amplitude, m, at which no share of the controller's vector is above a time that moves nothing.
-
-    By the gain alone; the law-based algorithm asks for the time in which the law moves the residual.
-    Args: `times`: s, of all chambers. `rates`: of the vibration with each chamber driven, m/s.
-    """
-    if settings.kind == "law_based":
-        return _largest_standing([time * rate for time, rate in zip(times, rates, strict=True)])
-    return _largest_standing(times) / settings.proportional
-
-
-def _largest_standing(times: Sequence[float]) -> float:
-    """Largest vector of which no chamber's share is above its time, in the unit of the times.
-
-    Args: `times`: of all chambers in the order of the letters.
-    """
-    turn = cmath.rect(1.0, 2 * math.pi / len(times))
-    if len(times) == 2:
-        return max(times)
-    return max(abs(one + other * turn) for one, other in zip(times, [*times[1:], times[0]], strict=True))
-
-
 def _answer(scene: Scene, end: _LineEnd, model: BalancerModel) -> LineAnswer:
     line, limit, holds = end.line, scene.controller.limit, _holds(model)
     volume = (1 - model.flow.max_fill_ratio / 2) * model.chamber_volume + (scene.gas.dead_volume or 0.0)
     injections = _injections(scene, line, model) if holds else None
-    opening = correction = dead = standing = None
+    opening = correction = dead = None
     if injections is not None and injections.shortest is not None:
         opening = max(injections.shortest, end.valve_lag)
         moved = injections.moved(opening)
         correction = _vibration(scene, model, moved)
         # Under extreme laws the shortest injection may move nothing: then no vibration belongs to a way.
         if correction > 0:
-            amount = limit * moved / correction
-            dead = injections.dead_time(amount)
-            if dead is not None:
-                standing = _at_equal_fills(scene, dead, rate=limit / amount * injections.steady)
+            dead = injections.dead_time(limit * moved / correction)
     return LineAnswer(
         end=end.name,
         conductance=line.conductance,
@@ -200,11 +138,8 @@ def _answer(scene: Scene, end: _LineEnd, model: BalancerModel) -> LineAnswer:
         venting_time=float(line.venting_time(line.supply_pressure, volume=volume)),
         shortest_opening=opening,
         smallest_correction=correction,
-        limit=limit,
-        largest_correction=largest_correction(limit, chambers=scene.disc.chambers),
         dead_time=dead,
         holds=holds,
-        standing_amplitude=standing,
     )
 
 
@@ -219,52 +154,11 @@ def line_text(answers: tuple[LineAnswer, ...]) -> str:
     return f"{whose}: smallest correction {' or '.join(each)}"
 
 
-def line_warning(answers: tuple[LineAnswer, ...]) -> str:
-    """Empty where the line can deliver corrections small enough for the limit."""
-    above = [answer for answer in answers if answer.above_limit]
-    if not above:
-        return _standing_warning(answers[0])
-    which = shown = ""
-    if above[0].end != "given":
-        which = " over its default range" if len(above) > 1 else f" if {above[0].end}"
-        shown = ", and runs with an ideal valve do not show this"
-    return (
-        f"the smallest correction that the gas line can deliver{which}, {_sizes(above)} um, is "
-        f"above {1e6 * above[0].largest_correction:.2g} um: the limit of {1e6 * above[0].limit:.2g} um "
-        f"cannot be guaranteed{shown}; take a {_better(answers)} valve, less dead volume or a higher limit"
-    )
-
-
-def _better(answers: Sequence[LineAnswer]) -> str:
-    """Which end of a range corrects by less: a fast line may move more in the shortest time it can do."""
-    sizes = {answer.end: answer.smallest_correction or 0.0 for answer in answers}
-    return "slower" if sizes.get("fast", 0.0) > sizes.get("slow", math.inf) else "faster"
-
-
-def _standing_warning(answer: LineAnswer) -> str:
-    """Empty for a line of the default range, which runs do not model."""
-    still = answer.standing_amplitude or 0.0
-    if answer.end != "given" or still <= answer.limit:
-        return ""
-    return (
-        f"up to {1e6 * still:.2g} um an injection by the controller's gain alone transfers no liquid, it "
-        f"only fills gas or lifts liquid to the crest, for {1e3 * (answer.dead_time or 0.0):.3g} ms: "
-        "`ringbalance tune` recommends controller.gas_time_offset"
-    )
-
-
-def _sizes(answers: Sequence[LineAnswer]) -> str:
-    """In um, the smaller one first."""
-    return " to ".join(f"{1e6 * size:.2g}" for size in sorted(a.smallest_correction or 0.0 for a in answers))
-
-
 def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
     """For JSON, in SI."""
     return {
         "given": answers[0].end == "given",
         "holds": answers[0].holds,
-        "limit_m": answers[0].limit,
-        "largest_correction_m": answers[0].largest_correction,
         "ends": [
             {
                 "end": answer.end,
@@ -277,13 +171,10 @@ def line_document(answers: tuple[LineAnswer, ...]) -> dict[str, Any]:
                 "shortest_opening_s": answer.shortest_opening,
                 "smallest_correction_m": answer.smallest_correction,
                 "dead_time_s": answer.dead_time,
-                "standing_amplitude_m": answer.standing_amplitude,
-                "above_limit": answer.above_limit,
             }
             for answer in answers
         ],
         "text": line_text(answers),
-        "warning": line_warning(answers),
     }
 
 

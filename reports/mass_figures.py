@@ -44,6 +44,7 @@ _DRAWN: Final[dict[str, Any]] = {"color": FOUND, "alpha": 0.2, "linewidth": 0}
 _SHORTEST: Final = 0.09
 """Fraction of the time axis that the name of a stage needs."""
 _MILLIMETRE: Final = 1e3
+_NARROW_HEIGHT: Final = 2.4
 _RPM: Final = 30 / math.pi
 _LAG_TOP: Final = 300
 """Lag, deg, above which an angle is a lead."""
@@ -104,7 +105,7 @@ def run_up(run: Record, locked: Record, rotor: Record, drawn: Record | None = No
     ends = min(speeds[1].min(), critical), max(speeds[1].max(), critical)
 
     def paint(axes: Axes) -> None:
-        top, below = panels(axes, (0.09, 0.42, 0.89, 0.49), (0.09, 0.11, 0.89, 0.27))
+        top, below = panels(axes, (0.09, 0.43, 0.89, 0.47), (0.09, 0.135, 0.89, 0.25))
         values = [_MILLIMETRE * np.asarray(each["amplitude_m"]) for each in (locked, run)]
         curves = zip(speeds, values, (_LOCKED, _BALANCED), strict=True)
         if drawn is not None:
@@ -127,7 +128,7 @@ def run_up(run: Record, locked: Record, rotor: Record, drawn: Record | None = No
         if drawn is not None:
             axes.fill_between([], [], [], label="drawn devices", **_DRAWN)
 
-    return draw("eccentric-run-up", paint, columns=4, wide=True, height=4.4)
+    return draw("eccentric-run-up", paint, columns=4, wide=True, height=3.5)
 
 
 def _while_speed_changes(run: Record, drawn: Record) -> tuple[FloatArray, Record]:
@@ -155,6 +156,7 @@ def mass_angles(run: Record) -> Drawing:
         y=("angle", "°"),
         xlim=(0, _until(run)),
         columns=4,
+        height=_NARROW_HEIGHT,
     )
 
 
@@ -199,6 +201,7 @@ def _estimate(
         xlim=(0, _until(run)),
         ylim=(min(0.0, -0.1 * largest), 1.5 * largest or 1.0),
         columns=4,
+        height=_NARROW_HEIGHT,
     )
 
 

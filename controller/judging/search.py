@@ -36,7 +36,7 @@ _SETTLED: Final = 0.9
 """Of the devices that the best settings serve: by when these have settled decides between equals."""
 _ROUNDS: Final = 6
 """In which neighbours are tried."""
-CURVE: Final = Draws.block(64, 64)
+CURVE: Final = Draws.block(64, 64, whole=False)
 """Devices of the answer along an axis: neither those of the choice nor those of the verdict."""
 
 
@@ -161,7 +161,7 @@ def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: int = 0) 
         if not running:
             break
         settings = [field[i].settings or {} for i in running]
-        ran = balancer.run_all(settings, Draws.block(first, last - first))
+        ran = balancer.run_all(settings, Draws.block(first, last - first, whole=False))
         for i, outcomes in zip(running, ran, strict=True):
             before = running[i]
             whole = before.judgement.outcomes.joined(outcomes) if before else outcomes
@@ -169,6 +169,9 @@ def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: int = 0) 
             running[i] = Tried(candidate=field[i], judgement=judged)
         most = max(max(each.count for each in running.values() if each), leading * last / DEVICES)
         behind = max(_BEHIND * last, 2.0)
+        if most == 0:
+            # None settles: one of them goes on, to say why.
+            running = dict(list(running.items())[:1])
         running = {i: each for i, each in running.items() if each and each.count >= most - behind}
     return [each for each in running.values() if each]
 
@@ -244,5 +247,8 @@ def searched(
     balancer: Balancer, *, along: float | None = None, progress: Progress = lambda _: None
 ) -> Settings:
     """The best settings; none where nothing is to be tried. Args: `along`: as `search`."""
-    found = search(balancer, balancer.trials(), along=along, progress=progress)
+    offered = balancer.trials()
+    if along is None and not any(each.axes for each in offered):
+        return {}
+    found = search(balancer, offered, along=along, progress=progress)
     return (found[0].candidate.settings if found else None) or {}

@@ -39,8 +39,8 @@ MOST_SAMPLES: Final = 100_000
 _KEPT: Final = 512
 """Devices, and devices under a pressure."""
 _OUT_OF_REACH: Final = 2.0
-"""Times the limit that remain with the liquid at its best, from which on a run is not carried out: none
-settles, and each would take its whole time limit."""
+"""Times the limit that remain with the liquid at its best, from which on a run need not be carried
+out: none settles, and each would take its whole time limit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,7 +85,7 @@ class DrawnRuns:
         for place, number in enumerate(draws.numbers):
             device = self.device(number) if draws.devices else _as_given(self.scene, self.model, number)
             drawn.append(device)
-            for at, done in self._runs(device, asked, further):
+            for at, done in self._runs(device, asked, further, whole=draws.whole):
                 ended[at][place] = done
         return tuple(_outcomes(rows, drawn) for rows in ended)
 
@@ -95,13 +95,13 @@ class DrawnRuns:
         return _Setting(place=place, scene=scene, controller=controller_of(scene, self.model))
 
     def _runs(
-        self, device: Device, asked: Sequence[_Setting], further: float
+        self, device: Device, asked: Sequence[_Setting], further: float, *, whole: bool
     ) -> Iterator[tuple[int, _Ended]]:
         """Place of a setting and how the device's run under it ended."""
         moments = MomentTable.of(model=device.model, total=2 * device.scene.disc.initial_fill)
         for _, some in _grouped(asked, lambda each: each.scene.gas.pressure):
             under = self._under(device, some[0].scene.gas.pressure)
-            if under.unreachable > _OUT_OF_REACH * self.limit:
+            if not whole and under.unreachable > _OUT_OF_REACH * self.limit:
                 yield from ((each.place, _Ended.at_best(under, limit=self.limit)) for each in some)
                 continue
             for settings, alike in _grouped(

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -21,7 +21,6 @@ import numpy as np
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, split_change
-from ringbalance.controller.liquid_ring.plant import LEAST_PRESSURE, NEARLY_EMPTY, starting_pressure
 from ringbalance.controller.loop_records import RUN, MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -29,13 +28,8 @@ from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stall
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
-STAYING_DEVIATIONS: Final = 3.0
-"""Stationary standard deviations that the limit must hold: a sample then is within it with 99.7 %."""
 _FILL_STEP: Final = 1e-4
 """Half the distance over which the slope of a moment is taken, as a fraction of the range of fills."""
-_HALVINGS: Final = 40
-_SPARE: Final = 1.1
-"""Times the pressure at which the liquid only just moves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,8 +44,6 @@ class LoopFactor:
     """Whether h keeps its value; an algorithm that learns comes to one."""
     limit: float
     """2 cos d, from which a small residual grows."""
-    largest_staying: float
-    """Largest h whose stationary deviation is a third of the amplitude limit."""
     deviation: float | None
     """Stationary standard deviation of the amplitude under the sensor's noise, m; None: it has none."""
 
@@ -59,11 +51,6 @@ class LoopFactor:
     def unstable(self) -> bool:
         """Whether a small residual grows."""
         return self.fixed and self.value is not None and self.value >= self.limit
-
-    @property
-    def stays(self) -> bool:
-        """Whether an amplitude that is within its limit is expected to stay there."""
-        return (self.value if self.fixed and self.value is not None else 1.0) <= self.largest_staying
 
     @property
     def lag_margin(self) -> float | None:
@@ -89,9 +76,6 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any])
         derivative = controller.derivative_time / scene.controller.period
     if isinstance(controller, LawBased):
         value = scene.rotor.influence_coefficient / abs(controller.influence)
-    largest = _largest_staying(
-        limit=scene.controller.limit, noise=noise, integral=integral, derivative=derivative
-    )
     deviation = _stationary_deviation(
         loop_factor=1.0 if value is None or isinstance(controller, LawBased) else value,
         noise=noise,
@@ -104,7 +88,6 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any])
         value=value,
         fixed=isinstance(controller, TargetVector),
         limit=2.0 * max(math.cos(error), 0.0),
-        largest_staying=largest * max(math.cos(error), 0.0),
         deviation=None if value is None else deviation,
     )
 
@@ -120,17 +103,6 @@ def usable_fill(scene: Scene, model: BalancerModel) -> float:
     start, law = scene.disc.initial_fill, model.flow
     stalled = stalled_fill_ratio(law=law, total=2 * start, gas_pressure=scene.gas.pressure)
     return min(max(residual_fill_ratio(scene, law=law), stalled), start)
-
-
-def with_driving_gas(scene: Scene, model: BalancerModel) -> Scene:
-    """The scene, its gas pressure raised where it stalls a chamber above its residual fill."""
-    total, law = 2.0 * scene.disc.initial_fill, model.flow
-    fill = max(residual_fill_ratio(scene, law=law), total - law.max_fill_ratio + NEARLY_EMPTY)
-    above = max(scene.gas.pressure, LEAST_PRESSURE)
-    found = starting_pressure(law=law, fill=fill, opposite_fill=total - fill, primed=False, above=above)
-    if found is None or found <= above:
-        return scene
-    return replace(scene, gas=replace(scene.gas, pressure=_SPARE * found))
 
 
 def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
@@ -222,19 +194,6 @@ def _stationary_deviation(
     return noise * math.sqrt(max(float(variance.real), 0.0))
 
 
-def _largest_staying(*, limit: float, noise: float, integral: float = 0.0, derivative: float = 0.0) -> float:
-    """Largest loop factor, at most 2, with which the limit holds three stationary standard deviations."""
-
-    low, high = 0.0, math.nextafter(2.0, 0.0)
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2.0
-        found = _stationary_deviation(
-            loop_factor=middle, noise=noise, integral=integral, derivative=derivative
-        )
-        low, high = (middle, high) if STAYING_DEVIATIONS * found <= limit else (low, middle)
-    return low
-
-
 _FREQUENCIES: Final = np.concatenate([np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi, 1600)])
 """Angles of z on the unit circle, rad."""
 
@@ -253,29 +212,11 @@ class Margins:
     """By which the gain may then grow or fall, (2 + disk)/(2 - disk)."""
     disk_phase: float
     """By which the phase may then turn, 2 atan(disk/2), rad."""
-    gain_uncertainty: float
-    """Expanded uncertainty (95 %) of the loop factor, relative."""
-    phase_uncertainty: float
-    """The same of the lag angle, rad."""
-
-    @property
-    def left_gain_factor(self) -> float:
-        """Gain factor that is left at the edge of both uncertainties; below 1 the loop may be unstable."""
-        kept = max(math.cos(min(self.phase_uncertainty, math.pi / 2)), 0.0)
-        return self.gain_factor * kept / (1.0 + self.gain_uncertainty)
-
-    @property
-    def left_phase(self) -> float:
-        """Phase that is left there, rad; below 0 the loop may be unstable."""
-        grown = min((1.0 + self.gain_uncertainty) / self.gain_factor, 1.0)
-        return math.acos(grown) - self.phase_uncertainty
 
 
 def loop_margins(
     *,
     loop_factor: float,
-    gain_uncertainty: float = 0.0,
-    phase_uncertainty: float = 0.0,
     integral: float = 0.0,
     derivative: float = 0.0,
 ) -> Margins:
@@ -300,6 +241,4 @@ def loop_margins(
         disk=disk,
         disk_gain_factor=math.inf if disk >= 2.0 else (2.0 + disk) / (2.0 - disk),
         disk_phase=2.0 * math.atan(disk / 2.0),
-        gain_uncertainty=gain_uncertainty,
-        phase_uncertainty=phase_uncertainty,
     )

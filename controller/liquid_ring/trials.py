@@ -9,12 +9,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.liquid_ring.dead_time import dead_time
 from ringbalance.controller.liquid_ring.loop_factor import vibration_rates
-from ringbalance.controller.terms import dynamics_of, run_models, terms_modelled
 from ringbalance.controller.trials import Axis, Point, Trials, rounded
-from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
+from ringbalance.scene.paths import raw_value_at
 
 PRESSURE: Final = "gas.pressure"
 _GAIN: Final = Axis(
@@ -52,21 +52,6 @@ class _Loop:
         return cls(rate=rate, dead_time=dead_time(scene, model, rate=rate))
 
 
-def dead_time(scene: Scene, model: BalancerModel, *, rate: float) -> float:
-    """Of an injection of the size of the limit at equal fills, while gas fills the chamber and liquid rises.
-
-    At least the valve's lag and its shortest opening, s.
-    """
-    modelled, total = terms_modelled(run_models(scene=scene, model=model)), 2 * scene.disc.initial_fill
-    least = max(scene.gas.valve_lag or 0.0, scene.controller.minimum_gas_time)
-    if not modelled or rate <= 0.0:
-        return least
-    dynamics = dynamics_of(scene=scene, model=model, modelled=modelled, checked=True)
-    injections = Injections.of(dynamics, model, fill=scene.disc.initial_fill, total=total)
-    lost = injections.dead_time(scene.controller.limit / rate * injections.steady)
-    return max(lost or 0.0, least)
-
-
 def trials(scene: Scene, model: BalancerModel, *, limit: float) -> tuple[Trials, ...]:
     """Of the scene's kind of controller first. Args: `limit`: by which runs are judged, m."""
 
@@ -92,13 +77,11 @@ def _settings(
 ) -> Mapping[str, Any] | None:
     if loop.rate <= 0.0:
         return None
-    found: dict[str, Any] = {}
-    if PRESSURE in point and point[PRESSURE] != scene.gas.pressure:
-        found[PRESSURE] = point[PRESSURE]
-    if kind != scene.controller.kind:
-        found["controller.kind"] = kind
-    if limit < scene.controller.limit:
-        found["controller.limit"] = limit
+    found: dict[str, Any] = {
+        PRESSURE: point.get(PRESSURE, scene.gas.pressure),
+        "controller.kind": kind,
+        "controller.limit": min(limit, scene.controller.limit),
+    }
     if _GAIN.name in point:
         found["controller.proportional"] = rounded(point[_GAIN.name] / loop.rate)
         part = point[_INTEGRAL.name]
@@ -106,7 +89,7 @@ def _settings(
     if _OFFSET.name in point:
         offset = round(point[_OFFSET.name] * loop.dead_time / _OFFSET_STEP) * _OFFSET_STEP
         found["controller.gas_time_offset"] = (round(offset, 6),) if offset else None
-    return found
+    return {path: value for path, value in found.items() if value != raw_value_at(scene, path)}
 
 
 def _pressures(scene: Scene) -> Axis:

@@ -100,7 +100,7 @@ def _sampled_poles(loops: Sequence[Record]) -> Drawing:
     whole = max(_WHOLE, float(np.abs(points).max()) * _WHOLE)
 
     def paint(axes: Axes) -> None:
-        everything, near = panels(axes, (0.075, 0.13, 0.4, 0.72), (0.575, 0.13, 0.4, 0.72))
+        everything, near = panels(axes, (0.075, 0.15, 0.4, 0.74), (0.575, 0.15, 0.4, 0.74))
         for panel, centre, reach in ((everything, (0.0, 0.0), whole), (near, middle, half)):
             panel.add_patch(Circle((0, 0), 1, fill=False, color=INK, linewidth=1))
             for index, group in enumerate(groups):
@@ -113,7 +113,7 @@ def _sampled_poles(loops: Sequence[Record]) -> Drawing:
         for index, loop in enumerate(loops):
             axes.plot([], [], linestyle="", label=loop["name"], **line(index, size=6))
 
-    return draw("sampled-poles", paint, columns=3, wide=True, height=4.0)
+    return draw("sampled-poles", paint, columns=3, wide=True, height=3.3)
 
 
 def _claims(_own: Record, evidence: Record) -> Record:

@@ -56,7 +56,7 @@ def test_a_calibration_loads_no_flow_solver_and_no_mesh_files() -> None:
 
 
 def test_a_compiler_would_be_seen() -> None:
-    assert "numba" in loaded("import ringbalance.controller.ensemble")
+    assert "numba" in loaded("import ringbalance.controller.compiled_loop")
 
 
 def test_a_heavy_start_would_be_seen() -> None:

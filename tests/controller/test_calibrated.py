@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ringbalance import bundled_scene, load_scene
+from ringbalance.controller.liquid_ring.devices import Spread, devices
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.members import MemberUncertainty
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import Event
@@ -100,7 +100,7 @@ def test_a_slow_rotor_siphons_its_correction_away(paper_scene: Scene) -> None:
     assert "run back" in run.status
 
 
-def test_the_moment_is_as_uncertain_as_the_measured_factor(
+def test_devices_differ_in_the_measured_factor_of_the_moment(
     paper_scene: Scene, calibrated: BalancerModel
 ) -> None:
     measured = replace(
@@ -108,7 +108,6 @@ def test_the_moment_is_as_uncertain_as_the_measured_factor(
         disc=replace(paper_scene.disc, lambda_factor=0.8),
         uncertainty=(InputUncertainty(quantity="lambda_factor", half_width=0.04, relative=False),),
     )
-    known = replace(measured, uncertainty=())
-    with_factor, without = (MemberUncertainty.of(asked, calibrated) for asked in (measured, known))
-    assert with_factor.moment == pytest.approx(np.hypot(without.moment, 0.05))
-    assert "lambda's factor" in with_factor.sources[1]
+    made = devices(measured, calibrated, Spread.of(measured, calibrated), range(64), seed=0)
+    factors = [made(place).scene.disc.lambda_factor or 0.0 for place in range(64)]
+    assert np.std(factors) == pytest.approx(0.04 / 1.96, rel=0.1)

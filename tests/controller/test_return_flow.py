@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
-from ringbalance.controller.ensemble import simulate_members
+from ringbalance.controller.balancer import AS_GIVEN, balancer_of
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, Simulation
 from ringbalance.reduced_model.calibration import calibrated_model
@@ -229,19 +229,18 @@ def test_a_vibration_within_its_limit_needs_no_crest(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("crest", ["", "36 mm", "44 mm"])
-def test_a_member_of_an_ensemble_is_the_single_run(tmp_path: Path, crest: str) -> None:
+def test_an_untraced_run_is_the_traced_one(tmp_path: Path, crest: str) -> None:
     loop = LOOP.format(kind="target_vector")
     scene = scene_of(tmp_path, crest=crest, time_limit=6.0, more=loop)
     if crest != "44 mm":
         scene = replace(scene, rotor=replace(scene.rotor, initial_amplitude=4e-6))
     model = calibrated_model(scene)
     run = simulate(scene, model)
-    found = simulate_members(scene, model, size=1)
+    found = balancer_of(scene).run({}, AS_GIVEN)
     assert found.settled[0] == run.settled
-    assert found.drifted[0] == (run.outcome is Outcome.DRIFTING)
-    # A member's injection ends within 1e-6 in fill of a single run's; a fill of 1e-6 is 1e-10 m here.
+    assert (found.ended[0] == "drifting") == (run.outcome is Outcome.DRIFTING)
+    # An untraced run's injection ends within 1e-6 in fill of a single run's; a fill of 1e-6 is 1e-10 m here.
     assert found.final_amplitude[0] == pytest.approx(run.amplitude[-1], abs=1e-9)
-    assert found.samples[0] == len(run.samples)
 
 
 def test_calibrate_says_what_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,8 @@ import pytest
 
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
-from ringbalance.controller.ensemble import member_noise, simulate_members
 from ringbalance.controller.liquid_ring.loop_factor import (
     LoopFactor,
-    _largest_staying,
     _stationary_deviation,
     balanced_fills,
     loop_factor,
@@ -25,7 +22,6 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.controller.tuning.recommendation import recommended_gain
 from ringbalance.reduced_model.injection.pair import Motion, PairState, opened, pass_time
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
@@ -137,32 +133,25 @@ def test_a_loop_beyond_its_limit_has_no_stationary_deviation() -> None:
     assert _stationary_deviation(loop_factor=1.9, noise=0.0) == 0.0
 
 
-def test_the_largest_factor_that_stays_leaves_a_third_of_the_limit() -> None:
-    found = _largest_staying(limit=5.0, noise=1.0)
-    assert 3 * _stationary_deviation(loop_factor=found, noise=1.0) == pytest.approx(5.0, rel=1e-6)
-    assert _largest_staying(limit=5.0, noise=0.0) == pytest.approx(2.0)
-    assert _largest_staying(limit=1.0, noise=1e3) == pytest.approx(0.0, abs=1e-5)
-
-
 # --- the verdict ---
 
 
 def test_the_verdict_follows_the_loop_factor(scene: Scene, model: BalancerModel) -> None:
     rate = factor(scene, model).rate
     verdicts = {}
-    for h in (0.6, 1.7, 2.6):
+    for h in (0.6, 2.6):
         run = simulate(noisy(scene, noise=1.2e-8, proportional=h / rate), model)
         verdicts[h] = run.verdict
         assert run.status.startswith(run.verdict.value)
         assert run.settled == (run.verdict is RunVerdict.SETTLED) == (run.settling_time is not None)
-    assert verdicts == {0.6: RunVerdict.SETTLED, 1.7: RunVerdict.HOVERING, 2.6: RunVerdict.UNSTABLE}
+    assert verdicts == {0.6: RunVerdict.SETTLED, 2.6: RunVerdict.UNSTABLE}
 
 
 def test_a_gain_that_is_too_high_is_answered_with_a_number(scene: Scene, calibrated: BalancerModel) -> None:
     # The paper's gain on a bore that was chosen for k = 50: the calibrated law is three times as fast.
     run = simulate(noisy(scene, time_limit=20.0), calibrated)
     assert run.verdict is RunVerdict.HOVERING
-    gain = recommended_gain(scene, calibrated, loop=run.loop)
+    gain = 1.0 / run.loop.rate
     assert f"to {gain * 1e-6:.3g} s/um" in run.status
     again = simulate(noisy(scene, time_limit=20.0, proportional=gain), calibrated)
     assert again.settled
@@ -234,16 +223,6 @@ def test_no_settled_run_of_many_changes_its_answer(
 ) -> None:
     assert len(runs_that_survive(scene, model, range(40, 300))) > 100
     assert len(runs_that_survive(scene, calibrated, range(300, 340))) > 5
-
-
-def test_members_that_settled_keep_their_time(scene: Scene, model: BalancerModel) -> None:
-    rate = factor(scene, model).rate
-    for h in (0.6, 1.3, 1.8):
-        asked = noisy(scene, time_limit=12.0, proportional=h / rate)
-        short = simulate_members(asked, model, size=200, noise=partial(member_noise, 1))
-        long = simulate_members(doubled(asked), model, size=200, noise=partial(member_noise, 1))
-        assert np.array_equal(short.settling_time[short.settled], long.settling_time[short.settled])
-        assert bool(np.any(short.settled)) == (h < 1.4)
 
 
 def test_a_run_that_comes_to_rest_needs_no_hold(scene: Scene, model: BalancerModel) -> None:

@@ -13,7 +13,7 @@ import pytest
 from synthetic_rigs import Rig, fitted, rig
 
 from ringbalance.cli import main
-from ringbalance.controller.members import Members, MemberUncertainty
+from ringbalance.controller.liquid_ring.devices import Spread, devices
 from ringbalance.identification.device import Device, Models
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.kinds.kind import Observations
@@ -133,12 +133,10 @@ def test_drawn_devices_spread_as_the_posterior(result: FitResult, scene: Scene) 
     slopes = [(log_rate(moved_by(i, h)) - log_rate(moved_by(i, -h))) / (2 * h) for i, h in enumerate(steps)]
     posterior = float(np.sqrt(slopes @ result.joint.covariance @ slopes))
     alone = float(np.linalg.norm(slopes * result.joint.deviations))
-    widths = replace(
-        MemberUncertainty.of(scene, calibrated_model(scene)), velocity=0.0, moment=0.0, gas_line={}
-    )
-    drawn = Members.drawn(scene, uncertainty_95=widths, seed=0, block=0)
-    rate = np.log(drawn.velocity_factor * drawn.moment_factor * drawn.influence_coefficient)
-    assert np.std(rate) == pytest.approx(posterior, rel=0.1)
+    model = calibrated_model(scene)
+    spread = replace(Spread.of(scene, model), inputs={}, loss=0.0, moment=0.0, cavity=False)
+    made = devices(scene, model, spread, range(64), seed=0)
+    assert np.std([log_rate(made(place).scene) for place in range(64)]) == pytest.approx(posterior, rel=0.1)
     assert alone > 3 * posterior
 
 

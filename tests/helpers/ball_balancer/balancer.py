@@ -31,8 +31,9 @@ from ringbalance.controller.balancer import (
 )
 from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.drawn_input import DrawnInput, drawn_key
+from ringbalance.controller.judging.tune import tuned
+from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.trials import Trials, scaled
-from ringbalance.controller.tuning.settling import SettlingTimes, summary
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
@@ -74,44 +75,6 @@ class BallRun:
             "limit_m": self.scene.vibration.limit,
             "time_s": self.time.tolist(),
             "amplitude_m": self.amplitude.tolist(),
-        }
-
-
-@dataclass(frozen=True, kw_only=True)
-class BallTuning:
-    """The drag under which most devices settle, the fastest first."""
-
-    scene: BallScene
-    times: SettlingTimes
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether 95 % of the runs settle."""
-        return self.times.quantiles["p95"] is not None
-
-    @property
-    def status(self) -> str:
-        """The drag and what it comes to."""
-        drag = f"balls.drag {self.scene.balls.drag:.3g} N*s/m"
-        return f"{drag}: {self.times.told(self.times.settled.value)} settle"
-
-    @property
-    def recommended_scene(self) -> BallScene:
-        """With that drag."""
-        return self.scene
-
-    def rows(self) -> Rows:
-        """Its status."""
-        return _rows(self.status, self.succeeded)
-
-    def to_dict(self) -> dict[str, Any]:
-        """As a JSON document in SI."""
-        return {
-            "balancer": self.scene.balancer,
-            "status": self.status,
-            "drag_N_s_per_m": self.scene.balls.drag,
-            "settling_time_s": self.times.quantiles,
-            "fraction_settled": self.times.settled.value,
         }
 
 
@@ -256,22 +219,12 @@ class BallBalancer:
     def recommend(
         self,
         *,
-        pressure: bool = False,  # noqa: ARG002
-        remedies: bool | None = False,  # noqa: ARG002
+        pressure: bool = False,
+        remedies: bool | None = False,
         progress: Callable[[str], None] | None = None,
-    ) -> BallTuning:
-        """The drag of five between its bounds that settles most devices."""
-        (drag,) = self.settings()
-        found = []
-        for value in np.geomspace(drag.lowest, drag.highest, 5).tolist():
-            if progress is not None:
-                progress(f"drag {value:.3g} N*s/m")
-            outcomes = self.run({drag.path: value}, Draws.first(8))
-            scene = with_values_at(self.scene, {drag.path: value})
-            found.append(BallTuning(scene=scene, times=summary(outcomes.settling_time.tolist())))
-        return max(
-            found, key=lambda each: (each.times.settled.value, -(each.times.quantiles["p50"] or math.inf))
-        )
+    ) -> Tuning:
+        """The drag under which most devices settle."""
+        return tuned(self, along=pressure, remedies=remedies, progress=progress)
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Both balls side by side, their size left out."""

@@ -1,0 +1,140 @@
+"""Settings by runs of drawn devices: what is recommended, and what it is judged by."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ball_balancer.balancer import BallBalancer
+from ball_balancer.scene_keys import EXAMPLE, BallScene
+
+import ringbalance as rb
+from ringbalance.cli import main
+from ringbalance.controller.balancer import Draws, balancer_of
+from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.search import search, searched
+from ringbalance.controller.judging.tuning import Tuning
+from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
+from ringbalance.results.requirements import MET, MISSED
+from ringbalance.scene.loader import scene_from
+from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene, scene_as
+from ringbalance.scene.registry import register
+
+register("ball", scene="ball_balancer.scene_keys:KIND", balancer="ball_balancer.balancer:BallBalancer")
+
+
+def bundled(name: str, **values: object) -> Scene:
+    scene = rb.load_scene(rb.bundled_scene(name)).with_values(
+        {path.replace("__", "."): value for path, value in values.items()}
+    )
+    return liquid_ring_scene(scene)
+
+
+@pytest.fixture(scope="module")
+def paper() -> Tuning:
+    return rb.tune(bundled("liquid_ring_paper"))
+
+
+def test_the_papers_disc_works_at_a_lower_pressure(paper: Tuning) -> None:
+    assert paper.own is not None
+    assert paper.own.verdict == MISSED
+    assert 0.78 < paper.own.fraction.value < 0.90
+    assert paper.succeeded
+    assert 0.52e6 <= paper.recommended.settings["gas.pressure"] <= 0.60e6
+    assert paper.longer is not None
+    assert paper.longer.verdict == MET
+    by_level = {each.level: each for each in paper.along}
+    assert by_level[min(by_level)].judgement.fraction.count == 0
+    moments = [each.usable_moment[1] for each in paper.along if each.level > 0.55e6]
+    assert moments == sorted(moments, reverse=True)
+
+
+def test_a_tuned_scene_is_a_scene(paper: Tuning) -> None:
+    again = liquid_ring_scene(paper.recommended_scene)
+    assert again.gas.pressure == paper.recommended.settings["gas.pressure"]
+    assert again.controller.proportional == pytest.approx(paper.scene.controller.proportional)
+    document = paper.to_dict()
+    assert document["verdict"] == MET
+    assert json.loads(json.dumps(document, allow_nan=False))["settings"] == document["settings"]
+
+
+def test_too_little_pressure_is_told_from_capacity() -> None:
+    outcomes = judged(balancer_of(bundled("liquid_ring_paper", gas__pressure="0.42 MPa")), {})
+    assert outcomes.verdict == MISSED
+    assert set(outcomes.outcomes.ended) == {"stalled"}
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_seed_moves_no_verdict(seed: int) -> None:
+    balancer = balancer_of(bundled("liquid_ring_paper", run__seed=seed))
+    assert judged(balancer, {}).verdict == MISSED
+    chosen = {
+        "gas.pressure": 0.57e6,
+        "controller.proportional": 0.06e6,
+        "controller.gas_time_offset": (1e-3,),
+    }
+    assert judged(balancer, chosen).verdict == MET
+
+
+def test_six_chambers_work_with_settings_of_their_own() -> None:
+    found = rb.tune(bundled("six_chamber"))
+    assert found.own is not None
+    assert found.own.verdict == MISSED
+    assert found.recommended.fraction.value >= 0.99
+    assert found.along == ()
+    assert found.recommended.settings["controller.gas_time_offset"]
+
+
+def test_a_limit_follows_from_the_grade() -> None:
+    """G = U omega/m, and kappa U is the vibration."""
+    scene = bundled("liquid_ring_paper", rotor__mass="25 kg", requirement__grade="0.4 mm/s")
+    rotor = scene.rotor
+    expected = 0.4e-3 * 25.0 / rotor.speed * rotor.influence_coefficient
+    assert LiquidRingBalancer(scene).limit == pytest.approx(expected)
+    strict = replace(scene, requirement=replace(scene.requirement, residual=0.02e-6))
+    balancer = LiquidRingBalancer(strict)
+    assert balancer.limit == 0.02e-6
+    point = {axis.name: axis.levels[3] for axis in balancer.trials()[0].axes}
+    settings = balancer.trials()[0].settings(point)
+    assert settings is not None
+    assert settings["controller.limit"] == 0.02e-6
+
+
+def test_a_default_gain_is_not_the_scenes() -> None:
+    given = bundled("liquid_ring_paper")
+    left_out = bundled("liquid_ring_paper", controller__proportional=None)
+    assert LiquidRingBalancer(given).trials()[0].stated
+    assert not LiquidRingBalancer(left_out).trials()[0].stated
+
+
+def test_what_cannot_settle_is_not_run() -> None:
+    """With the liquid at its best: the unbalance is twice the usable moment."""
+    scene = bundled("liquid_ring_paper", rotor__initial_vibration={"amplitude": "20 um", "phase": "90 deg"})
+    (outcomes,) = balancer_of(scene).run_all([{}], Draws.block(0, 8, whole=False))
+    assert set(outcomes.ended) == {"capacity_exceeded"}
+    left = (outcomes.unbalance - outcomes.usable_moment) * scene.rotor.influence_coefficient
+    np.testing.assert_allclose(outcomes.final_amplitude, left, rtol=0.1)
+
+
+def test_the_search_finds_the_settings_of_another_balancer() -> None:
+    balancer = BallBalancer(scene_as(BallScene, scene_from(content=EXAMPLE, file="balls.toml")))
+    found = search(balancer, balancer.trials(), progress=lambda _: None)
+    assert found[0].count == max(each.count for each in found)
+    assert searched(balancer) == found[0].candidate.settings
+
+
+def test_the_command_saves_a_scene_that_is_met(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "tuned.toml"
+    words = ["tune", str(rb.bundled_scene("six_chamber")), "--save", str(target), "--json"]
+    assert main(words) == 0
+    document: dict[str, Any] = json.loads(capsys.readouterr().out)
+    scene = liquid_ring_scene(rb.load_scene(target))
+    assert scene.controller.proportional == pytest.approx(document["settings"]["controller.proportional"])
+    assert judged(balancer_of(scene), {}).verdict == MET
+    assert math.isfinite(document["settling_time_s"]["p90"])

@@ -315,13 +315,13 @@ def _work(v: Any, w: Any) -> Any:
     return dot(w.force, grad(v))
 
 
-def solve_on(basis: Any, problem: PressureProblem, *, unit: float = 1.0) -> LinearSolution:
-    """Nodal pressure, Pa, on any mesh of the liquid that names its free surface.
+def solve_on(basis: Any, problem: PressureProblem) -> LinearSolution:
+    """Nodal pressure, Pa, on any mesh of the liquid that names its free surface, lengths in m.
 
-    Args: `basis`: of `quadratic_basis`. `unit`: of the mesh's lengths, m.
+    Args: `basis`: of `quadratic_basis`.
     Source: quadratic elements, order three in the pressure and four in its integrals.
     """
-    return _solved(WeakProblem.of(basis, problem.force, unit=unit), problem, unit)
+    return _solved(WeakProblem.of(basis, problem.force), problem, 1.0)
 
 
 def _solved(weak: WeakProblem, problem: PressureProblem, unit: float) -> LinearSolution:

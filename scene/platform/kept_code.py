@@ -188,6 +188,9 @@ class KeptCode(_NumbaCache):  # type: ignore[misc]
         class Place:
             """Numba asks where its files belong; these go elsewhere."""
 
+            _py_file = function.__code__.co_filename
+            """Named in its warning of code that cannot be kept, as without optimisation."""
+
             @staticmethod
             def from_function(*_: object) -> Any:
                 return Place

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
 
@@ -19,8 +20,10 @@ from own_plant import run, settings_of, settling_times
 import ringbalance
 from ringbalance.controller.balancer import AS_GIVEN, Draws, Outcomes, balancer_of
 from ringbalance.controller.judging.judge import judged, judged_all
+from ringbalance.controller.judging.tune import tuned
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.models import Scene
+from ringbalance.scene.paths import with_values_at
 
 ASKED: Final = 0.9
 SEED: Final = 29
@@ -174,3 +177,29 @@ def test_twice_the_draws_move_no_verdict(pressure: str, verdict: str) -> None:
     draws = decided.outcomes.settled.size
     (twice,) = judged_all(balancer, [OFFSET], first=2 * draws, most=2 * draws)
     assert decided.verdict == twice.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("name", "lowest", "highest"),
+    [
+        (CALIBRATED, 0.0, math.inf),
+        pytest.param(SIX, 0.0, math.inf, marks=pytest.mark.heavy),
+        pytest.param(PAPER, 0.52e6, 0.60e6, marks=pytest.mark.heavy),
+    ],
+)
+def test_recommended_settings_hold_in_the_own_plant(name: str, lowest: float, highest: float) -> None:
+    """Both plants meet the fraction asked for, and settle from every direction as the scene says."""
+    scene = bundled(name)
+    best = tuned(balancer_of(scene)).recommended
+    assert best.verdict == MET
+    scene = with_values_at(scene, best.settings)
+    assert scene.controller.kind == "target_vector"
+    assert lowest <= scene.gas.pressure <= highest
+    settings = settings_of(scene, offset=scene.controller.offsets(scene.disc.chambers)[0])
+    assert Share.of(np.isfinite(settling_times(scene, settings, numbers=128, seed=SEED))).low >= ASKED
+    for degrees in range(0, 360, 30):
+        phase = math.radians(degrees)
+        turned = replace(scene, rotor=replace(scene.rotor, initial_phase=phase))
+        assert balancer_of(turned).run_all([{}], AS_GIVEN)[0].settled.all(), degrees
+        machine = drawn(scene, number=-1, seed=0, phase=phase)
+        assert math.isfinite(run(machine, settings, noise_seed=degrees).settling_time), degrees

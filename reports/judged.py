@@ -4,24 +4,32 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from itertools import product
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import FURTHER, Balancer, Outcomes
+from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all
+from ringbalance.controller.judging.remedies import tried_choices
+from ringbalance.controller.judging.search import Along
+from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.reports.section import Record
 from ringbalance.results.proportion import Proportion
+from ringbalance.results.requirements import MET
+from ringbalance.results.rows import Finding
 from ringbalance.scene.describe import usual_unit
+from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import unit_factor
 
 LONGER: Final = 300.0
 """s, for which runs are watched again, to show what longer watching changes."""
-_LONGER_DRAWS: Final = 128
 HALF, MOST = 0.5, 0.9
 """Fractions of all devices whose settling times are told."""
+_COARSE: Final = 16
+"""Devices on which settings for what can be bought are chosen."""
 _POINTS: Final = 50
 """Most entries of a curve."""
 _BAND: Final = (0.025, 0.5, 0.975)
@@ -29,13 +37,72 @@ _BAND: Final = (0.025, 0.5, 0.975)
 _DIGITS: Final = 4
 
 
-def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS, longer: bool = True) -> Record:
-    """The scene's own settings over drawn devices, and what longer watching makes of them."""
-    (own,) = judged_all(balancer, [{}], first=first, most=most)
-    if not longer:
-        return judgement_record(own)
-    (again,) = judged_all(balancer, [{}], first=first, most=min(_LONGER_DRAWS, most), further=LONGER)
-    return judgement_record(own) | {"longer": _watched(again, LONGER)}
+def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Record:
+    """The scene's own settings over drawn devices."""
+    return judgement_record(judged_all(balancer, [{}], first=first, most=most)[0])
+
+
+def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
+    """The scene's own settings beside the recommended ones, both watched longer too, and what else to do."""
+    best, own = tuning.recommended, tuning.own
+    longer = tuning.longer and _watched(tuning.longer, LONGER)
+    recommended = judgement_record(best) | {"longer": longer}
+    return {
+        "own": None if own is None else judgement_record(own) | {"longer": _longer(balancer)},
+        "recommended": recommended if own is None or best.settings else None,
+        "along": {
+            "path": tuning.along_name,
+            "levels": [_level(each) for each in tuning.along],
+        },
+        **_advice(tuning),
+    }
+
+
+def _longer(balancer: Balancer) -> Record:
+    (longer,) = judged_all(balancer, [{}], first=BLOCK, most=BLOCK, further=LONGER)
+    return _watched(longer, LONGER)
+
+
+def _advice(tuning: Tuning) -> Record:
+    """Remedies and measurements where too few devices meet what is asked, and what can be bought."""
+    best, own = tuning.recommended, tuning.own
+    if best.verdict == MET:
+        enough = own is not None and own.verdict == MET
+        measures = () if enough else (Finding(code="nothing_to_measure"),)
+        return {"remedies": [], "measures": [each.document() for each in measures]}
+    return {
+        "remedies": [each.document() for each in tuning.remedies],
+        "measures": [each.document() for each in tuning.ranking.findings()],
+    }
+
+
+def choice_records(balancer: Balancer) -> list[Record]:
+    """What can be bought for a scene that leaves it open, and what each makes of it."""
+    return [each.document() for each in tried_choices(balancer, search=_coarsely)]
+
+
+def _coarsely(balancer: Balancer) -> Settings:
+    """The best of the settings that a search begins with: enough to tell what can be bought apart."""
+    trials, *_ = balancer.trials()
+    names = [axis.name for axis in trials.axes]
+    levels = [[axis.levels[at] for at in axis.first] for axis in trials.axes]
+    points = [dict(zip(names, point, strict=True)) for point in product(*levels)]
+    settings = [found for each in points if (found := trials.settings(each)) is not None]
+    ran = zip(settings, balancer.run_all(settings, Draws.first(_COARSE)), strict=True)
+    return max(ran, key=lambda each: np.count_nonzero(each[1].settled), default=({}, None))[0]
+
+
+def _level(each: Along) -> Record:
+    """Of the axis on which the scene's gas pressure lies."""
+    found = each.judgement
+    return {
+        "value": each.level,
+        "fraction": found.fraction.document(),
+        "verdict": found.verdict,
+        "half_s": _time(found, HALF),
+        "most_s": _time(found, MOST),
+        "usable_moment_kg_m": np.nanquantile(found.outcomes.usable_moment, _BAND).tolist(),
+    }
 
 
 def judgement_record(judgement: Judgement) -> Record:

@@ -6,9 +6,21 @@ from typing import Final
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.tuning_rows import setting_text
+from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.liquid_ring.devices import ASSUMED_INFLUENCE
+from ringbalance.controller.loop import simulate
+from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reports import summary
-from ringbalance.reports.judged import judgement_record, own_record, settings_rows, settings_text
+from ringbalance.reports.figure import Drawing
+from ringbalance.reports.judged import (
+    choice_records,
+    judgement_record,
+    settings_rows,
+    settings_text,
+    tuning_record,
+)
+from ringbalance.reports.pages.pressure_figure import pressure_figure
 from ringbalance.reports.prose import key_words, named_with_origin, resting
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traced import read, states_uncertainty, traced
@@ -51,6 +63,15 @@ _RESTS: Final = {
     "correction_moment": ("tube.bore", "tube.hump_radius", "disc.plate_thickness"),
 }
 """Inputs behind what is asked, by its code."""
+_RUN: Final = (
+    "verdict",
+    "loop_factor",
+    "settling_time_s",
+    "stationary_deviation_m",
+    "gas",
+    "overshoots",
+    "misadjustments",
+)
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _DOMINANT: Final = 3
 _MAIN: Final = {
@@ -65,13 +86,18 @@ _NEEDED: Final = "needed_moment"
 
 
 def _collect(work: Work) -> Record:
-    scene = work.scene
+    scene, balancer = work.scene, LiquidRingBalancer(work.scene)
+    tuning = balancer.recommend(pressure=True, remedies=None)
+    chosen = liquid_ring_scene(tuning.scene)
     return {
         "limit_m": scene.controller.limit,
         "valve_given": scene.gas.conductance is not None,
-        "own": own_record(balancer_of(scene), first=BLOCK),
-        "recommended": None,
-        "settings": list(settings_rows(scene, SETTINGS)),
+        **tuning_record(balancer, tuning),
+        "choices": choice_records(balancer.on_scene(tuning.recommended_scene)),
+        "settings": list(settings_rows(chosen, SETTINGS)),
+        "gas_pressure_Pa": scene.gas.pressure,
+        "recommended_pressure_Pa": chosen.gas.pressure,
+        "run": _run_record(chosen, work.calibration.model) if tuning.recommended.settings else None,
         "needed_moment_kg_m": scene.rotor.initial_amplitude / scene.rotor.influence_coefficient,
         "needed_uncertainty_kg_m": _needed_uncertainty(scene),
         "requirement": requirement_record(scene),
@@ -79,6 +105,12 @@ def _collect(work: Work) -> Record:
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in scene.uncertainty),
         "other_reading": _other_reading(scene),
     }
+
+
+def _run_record(scene: Scene, model: BalancerModel) -> Record:
+    """One run with the recommended settings, as the table of runs has it."""
+    run = simulate(scene, model).to_dict()
+    return {**{key: run[key] for key in _RUN if key in run}, "injections": len(run["injections"])}
 
 
 def _needed_uncertainty(scene: Scene) -> float:
@@ -124,11 +156,32 @@ def _view(found: Record, evidence: Record) -> Record:
         "question": _question(evidence),
         "settings": settings_text(found.get("settings", ())),
         "rests_on": {code: resting(evidence, *paths) for code, paths in _RESTS.items()},
-        "actions": [],
+        "pressure": _pressure(found),
+        "remedies": [_remedy(each) for each in found.get("remedies", ())],
+        "measures": [each["text"] for each in found.get("measures", ())],
         "alerts": [*_dry(evidence), *_chamber(evidence)],
         "dominant": _dominant(evidence),
         "rests": [*_bore(found, evidence), *_exact(evidence), *_borrowed(evidence)],
     }
+
+
+def _remedy(row: Record) -> str:
+    """The change of the scene in words."""
+    changes = [f"{key_words(path)} {setting_text(path, value)}" for path, value in row["changes"].items()]
+    text = ", ".join(changes)
+    return f"{text[0].upper()}{text[1:]}"
+
+
+def _pressure(found: Record) -> Drawing | None:
+    if not found.get("along"):
+        return None
+    return pressure_figure(
+        found["along"]["levels"],
+        asked=(found["recommended"] or found["own"])["asked"],
+        needed=found["needed_moment_kg_m"],
+        own=found["gas_pressure_Pa"],
+        recommended=found["recommended_pressure_Pa"],
+    )
 
 
 def _question(evidence: Record) -> Record:

@@ -24,7 +24,7 @@ def decision(balancer: Balancer) -> Record:
     paths = (each.path for each in balancer.settings() if "[" not in each.path)
     return {
         "limit_m": _limit(balancer),
-        "own": own_record(balancer, first=_FEWEST, most=_MOST, longer=False),
+        "own": own_record(balancer, first=_FEWEST, most=_MOST),
         "recommended": None,
         "settings": list(settings_rows(scene, paths)),
     }

@@ -44,6 +44,42 @@ def test_the_fraction_of_devices_stands_first(evidence: Record, said: Said) -> N
     assert "64 of 64 devices" in said(recommended(evidence), "summary")
 
 
+def test_each_step_says_what_it_reaches(evidence: Record, said: Said) -> None:
+    own = evidence["summary"]["own"]
+    remedy = {
+        "code": "bore",
+        "name": "",
+        "changes": {"tube.bore": 0.7e-3},
+        "settings": {},
+        "fraction": {"value": 0.97, "low": 0.93, "high": 0.99, "count": 124, "of": 128},
+        "verdict": "met",
+        "half_settle_s": 5.0,
+        "ninety_percent_settle_s": 9.0,
+    }
+    evidence["summary"].update(remedies=[remedy], measures=[{"text": "measure the flow"}])
+    page = said(evidence, "summary")
+    assert "Bore 0.7 mm: 97 % of devices (93 % to 99 %), nine tenths within 9.0 s: met." in page
+    assert "Measure the flow." in page
+    assert own["verdict"] in page
+
+
+def test_the_gas_pressure_is_drawn_where_it_was_tried(evidence: Record) -> None:
+    fraction = evidence["summary"]["own"]["fraction"]
+    level = {
+        "fraction": fraction,
+        "verdict": "not met",
+        "half_s": [3.0, 3.1],
+        "most_s": None,
+        "usable_moment_kg_m": [7e-4, 9e-4, 1.1e-3],
+    }
+    assert view(evidence)["pressure"] is None
+    levels = [{**level, "value": pressure} for pressure in (5e5, 6e5, 7e5)]
+    evidence["summary"]["along"]["levels"] = levels
+    drawn = view(evidence)["pressure"]
+    assert drawn is not None
+    assert "gas pressure in MPa" in drawn.svg
+
+
 def test_the_settings_are_a_block_of_the_scene_file(paper_scene: Scene) -> None:
     block = read_toml(settings_text(settings_rows(paper_scene, SETTINGS)))
     assert block["gas"] == {"pressure": "0.7 MPa"}

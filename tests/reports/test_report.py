@@ -14,12 +14,12 @@ import pytest
 from check_traces import apart, traces, untrue
 from keep_evidence import kept_document
 
-from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging import tune
+from ringbalance.controller.judging.judge import judged, judged_all
 from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports import saved as saved_module
-from ringbalance.reports.judged import own_record
 from ringbalance.reports.page import case_views, render
 from ringbalance.reports.pages import consequences, first_page
 from ringbalance.reports.pages.standing import evidence_text
@@ -53,7 +53,11 @@ def few_cases(kept: Path) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evidence_module, "load_cases", cases)
         patch.setattr(saved_module, "code_root", lambda: kept)
-        patch.setattr(first_page, "own_record", partial(own_record, most=16))
+        patch.setattr(tune, "search", lambda *_, **__: ())
+        patch.setattr(tune, "judged_all", partial(judged_all, most=16))
+        patch.setattr(tune, "tried_remedies", lambda *_, **__: ())
+        patch.setattr(first_page, "choice_records", lambda _: [])
+        patch.setattr(first_page, "judged", partial(judged, most=16))
         patch.setattr(consequences, "judged", partial(judged, most=16))
         yield
 

@@ -93,7 +93,6 @@ HEAVY: Final = {
     "six chambers with an offset": (SIX, {}, 2e-3, 256, 0.97, 1.0),
     "six chambers with a valve": (SIX, VALVE, 15e-3, 128, 0.0, 1.0),
     "narrow tube with a valve": (CALIBRATED, VALVE, 30e-3, 128, 0.0, 1.0),
-    "narrow tube with a valve and more offset": (CALIBRATED, VALVE, 45e-3, 128, 0.0, 1.0),
     "paper's disc with a valve": (PAPER, VALVE, 20e-3, 128, 0.0, 1.0),
 }
 

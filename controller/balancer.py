@@ -14,11 +14,11 @@ from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
-from ringbalance.controller.common_rotor import CommonRotor
+from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.trials import Trials
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
-from ringbalance.results.requirements import AT_LEAST, AT_MOST, Requirement
+from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import BoolArray, FloatArray
@@ -250,6 +250,8 @@ class Balancer(Protocol):
 
     verdict_draws: tuple[int, int]
     """Devices of a verdict, at first and at the most."""
+    energy_kind: str
+    """Code of the sentence that says what its runs count as energy."""
     watched_to_end: bool
     """Whether every run is watched to its time limit, whatever is asked for."""
 
@@ -325,15 +327,24 @@ class Balancer(Protocol):
         """The same, with the same options, of another scene of its kind."""
         ...
 
-    def rotor(self) -> CommonRotor:
-        """The rotor alone. Raises: SceneError: it stands still, or never vibrates steadily."""
+    def rotor(self, number: int | None = None) -> CommonRotor:
+        """The rotor alone. Args: `number`: of a drawn device; default as the scene says.
+
+        Raises: SceneError: it stands still, or never vibrates steadily.
+        """
         ...
 
-    def on_rotor(self, rotor: CommonRotor | None) -> Self:
-        """This balancer on a rotor at constant speed in its steady vibration; None: on its own.
+    def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> Self:
+        """This balancer on a rotor at constant speed in its steady vibration, with nothing required but to
+        come below that rotor's limit.
 
-        Raises: SceneError: the rotor cannot be this balancer's.
+        Args: `rotors`: of the drawn devices; default its own. Raises: SceneError: the rotor cannot be this
+            balancer's.
         """
+        ...
+
+    def sampling_time(self) -> float:
+        """Time from one sample of the vibration to the next, s."""
         ...
 
     def span(self) -> float:
@@ -342,10 +353,6 @@ class Balancer(Protocol):
 
     def lasting(self, span: float) -> Self:
         """The same with runs that balance for so long, s, and go on when they have settled."""
-        ...
-
-    def advised(self) -> tuple[Self, Settings]:
-        """With the settings to compare it with, and those that this changed, SI."""
         ...
 
     def recommend(
@@ -366,10 +373,6 @@ class Balancer(Protocol):
     def quantities(self) -> tuple[Quantity, ...]:
         """What is known of it without a run; among them "reach", the largest unbalance, kg m, that it cancels
         wherever that lies."""
-        ...
-
-    def requirements(self) -> tuple[Requirement, ...]:
-        """What the scene demands of it, and what its runs come to."""
         ...
 
     def rows(self, run: Any) -> Rows:
@@ -474,20 +477,4 @@ def outcomes_of(runs: Sequence[TracedRun], *, trace: bool) -> Outcomes:
         unbalance=np.array([each.unbalance for each in runs]),
         ended=tuple(each.ended for each in runs),
         traced=tuple(runs) if trace else (),
-    )
-
-
-def requirements_of(
-    balancer: Balancer, *, unbalance: float, reach: float, residual: float, settling_time: float
-) -> tuple[Requirement, ...]:
-    """What one run of the scene as it says comes to, of what any balancer is asked for; SI.
-
-    Args: `unbalance`: to be cancelled. `reach`: largest that can be, wherever it lies. `residual`: amplitude
-        that may be left. `settling_time`: within which the run must settle.
-    """
-    (done,) = balancer.run({}, AS_GIVEN, trace=True).traced
-    return (
-        Requirement("balancing moment", "kg m", AT_LEAST, unbalance, "the unbalance to cancel", reach),
-        Requirement("amplitude at the end", "m", AT_MOST, residual, "the limit", done.final_amplitude),
-        Requirement("settling time", "s", AT_MOST, settling_time, "the time allowed", done.settling_time),
     )

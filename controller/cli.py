@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ringbalance.controller.balancer import balancer_of, balancer_under, takes
 from ringbalance.controller.compare import compare as compare_balancers
+from ringbalance.results.requirements import MET
 from ringbalance.scene.changes import file_text
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, with_tolerance
@@ -71,7 +72,7 @@ def compare(
     tolerance: str | None = None,
     models: Models | None = None,
 ) -> int:
-    """Run two balancers, both tuned, on one rotor: that of the first scene, over one span and several seeds.
+    """Run two balancers, both tuned, on one rotor, that of the first scene, as the same drawn devices.
 
     Args:
         first: a scene file; its rotor, vibration sensor and limit hold for both.
@@ -82,7 +83,8 @@ def compare(
         models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
-        Exit code: 0 both settled, 1 not both; the result is printed either way.
+        Exit code: 0 both settle the fraction of devices that the first scene requires, 1 not both, or it is
+        undecided; the result is printed either way.
 
     Raises:
         SceneError: a scene that cannot be used, or a balancer that cannot work on that rotor.
@@ -92,10 +94,10 @@ def compare(
         for path in (first, second)
         for scene in [with_tolerance(load_scene(path), tolerance=tolerance, models=models)]
     )
-    with activity("compare", "both balancers on one rotor ..."):
-        found = compare_balancers(one, other)
+    with activity("compare", "both balancers on one rotor ...") as shown:
+        found = compare_balancers(one, other, progress=shown.show)
     if json:
         print(json_format.dumps(found.to_dict(), allow_nan=False))
     else:
         results_console().print(found.rows().view(headline=False))
-    return 0 if all(side.settled for side in found.sides) else 1
+    return 0 if set(found.verdicts) == {MET} else 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ringbalance.scene.faults import Fault, SceneError
@@ -36,6 +37,10 @@ class CommonRotor:
     def amplitude(self) -> float:
         """Vibration before balancing, m zero-to-peak."""
         return abs(self.influence * self.unbalance)
+
+
+Rotors = Callable[[int], CommonRotor]
+"""The rotor by number of the drawn device that it belongs to."""
 
 
 def rotor_fault(scene: SceneFile, path: str, problem: str, allowed: str) -> SceneError:

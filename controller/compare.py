@@ -1,136 +1,166 @@
-"""Two balancers side by side on one rotor, both tuned: time, residual, energy and the worst amplitude."""
+"""Two balancers side by side on one rotor, each with settings chosen by runs: what fractions settle.
+
+Both are run as the devices of one number: with the same drawn rotor (speed, influence coefficient, unbalance
+in size and direction), each with its own inputs drawn, and with noise by that number.
+"""
 
 from __future__ import annotations
 
 import cmath
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Balancer, Draws
-from ringbalance.controller.common_rotor import CommonRotor, vibrating
-from ringbalance.controller.judging.tuning_rows import setting_text
+from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
+from ringbalance.controller.common_rotor import CommonRotor, Rotors, vibrating
+from ringbalance.controller.judging.judge import FRESH
+from ringbalance.controller.judging.search import searched
+from ringbalance.controller.judging.tuning_rows import plain_settings, setting_text
 from ringbalance.reduced_model.terms import ModelUsed
+from ringbalance.results.proportion import Proportion
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
-from ringbalance.scene.arrays import finite
+from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.paths import with_values_at
 
-RUNS: Final = 5
-"""Of each balancer, with the seeds that follow its scene's."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _RunResult:
-    """What one run of a balancer comes to, over the common span."""
-
-    time: float
-    """s, from the start of balancing until the amplitude has settled; infinite when it has not."""
-    residual_ratio: float
-    """Amplitude at the end over the one before balancing."""
-    energy: float
-    """What the balancer took, J: compressing the gas that it used, or the motors' electrical energy."""
-    worst_amplitude: float
-    """Largest amplitude from the start of balancing on, m zero-to-peak."""
-    status: str
-    """How the run ended and what to do next."""
+FEWEST: Final = 16
+MOST: Final = 64
+"""Devices, at first and at the most: doubled until the intervals of both fractions lie apart."""
+_TRACED: Final = 4
+"""Devices whose runs are kept for the largest vibration on the way."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Side:
     """One balancer of a comparison."""
 
     scene: SceneFile
-    """As it was run, on the common rotor and tuned, with the seed of the first run."""
-    tuned: Mapping[str, Any]
-    """Scene keys that tuning has changed, with their values, SI."""
-    results: tuple[_RunResult, ...]
-    """One for each seed."""
+    """On the common rotor, with the settings of its search."""
+    settings: Settings
+    """By path, where they differ from the scene's."""
+    outcomes: Outcomes
+    """By device."""
+    residual_ratio: FloatArray
+    """Amplitude at the end over the one before balancing, by device."""
+    worst_amplitude: float
+    """Median of the largest amplitude on the way of the first devices, m zero-to-peak."""
+    status: str
+    """Of the first of these that did not settle, else of the first."""
+    energy_kind: str
+    """Code of the sentence that says what is counted."""
+    sampling_time: float
+    """s, from one sample of the vibration to the next."""
     models_used: tuple[ModelUsed, ...] = ()
     """Of a liquid ring: every physical term, with its model and its estimated contribution."""
 
     @property
-    def settled(self) -> bool:
-        """Whether every run settled."""
-        return all(math.isfinite(result.time) for result in self.results)
-
-    @property
-    def time(self) -> float | None:
-        """Median of all runs, s; None when fewer than half settled."""
-        return finite(self.middle("time"))
-
-    @property
-    def status(self) -> str:
-        """Of the first run that did not settle, else of the first."""
-        return next((r for r in self.results if math.isinf(r.time)), self.results[0]).status
+    def fraction(self) -> Proportion:
+        """Of the devices that settle within the span."""
+        settled = self.outcomes.settled
+        return Proportion(count=int(np.count_nonzero(settled)), of=settled.size)
 
     @property
     def finding(self) -> Finding:
-        """How its runs ended."""
-        done = sum(math.isfinite(each.time) for each in self.results)
-        numbers: dict[str, Value] = {"source": self.scene.source, "text": self.status}
-        numbers |= {"settled": done, "runs": len(self.results)}
-        return Finding(code="side_settled" if self.settled else "side_not_settled", values=numbers)
+        """Which fraction settles, and how its runs ended."""
+        share = self.fraction
+        values: dict[str, Value] = {"source": self.scene.source, "text": self.status}
+        values |= {"share": share.value, "low": share.low, "high": share.high, "of": share.of}
+        return Finding(code="side_settled" if share.count == share.of else "side_not_settled", values=values)
 
     @property
-    def tuned_text(self) -> str:
-        """What tuning has changed, as a scene file has it."""
-        return (
-            ", ".join(f"{key} {setting_text(key, value)}" for key, value in self.tuned.items()) or "as it is"
+    def energy(self) -> Finding:
+        """What its energy is."""
+        return Finding(code=self.energy_kind, values={"source": self.scene.source})
+
+    @property
+    def settings_text(self) -> str:
+        """What the search has changed."""
+        changed = [f"{path} = {setting_text(path, value)}" for path, value in self.settings.items()]
+        return ", ".join(changed) or "the scene's"
+
+    def middle(self, name: str) -> float | None:
+        """Median over the devices that settle; None: none does."""
+        return finite(float(np.median(here))) if (here := self._settled(name)).size else None
+
+    def ends(self, name: str) -> list[float] | None:
+        """Smallest and largest over the devices that settle."""
+        return [float(here.min()), float(here.max())] if (here := self._settled(name)).size else None
+
+    def _settled(self, name: str) -> FloatArray:
+        values = self.residual_ratio if name == "residual_ratio" else getattr(self.outcomes, name)
+        return np.asarray(values[self.outcomes.settled])
+
+    def quantities(self, prefix: str) -> Iterator[Quantity]:
+        """The fraction, then medians from the smallest to the largest. Args: `prefix`: of the keys."""
+        share = self.fraction
+        yield Quantity(
+            key=f"{prefix}fraction_settled",
+            name="devices that settle",
+            value=share.value,
+            lower=share.low,
+            upper=share.high,
+            origin="simulated",
+        )
+        for name, (key, words, unit) in _NUMBERS.items():
+            low, high = self.ends(name) or (None, None)
+            yield Quantity(
+                key=prefix + key,
+                name=words,
+                unit=unit,
+                value=self.middle(name),
+                lower=low,
+                upper=high,
+                origin="simulated",
+                status="ok" if self.outcomes.settled.any() else "not_settled",
+            )
+        yield Quantity(
+            key=f"{prefix}worst_amplitude",
+            name="largest amplitude on the way",
+            unit="m",
+            value=self.worst_amplitude,
+            origin="simulated",
+        )
+        yield Quantity(
+            key=f"{prefix}sampling_time",
+            name="vibration sampled every",
+            unit="s",
+            value=self.sampling_time,
+            origin="given",
         )
 
-    def quantities(self, prefix: str) -> tuple[Quantity, ...]:
-        """Medians over its runs, from the smallest to the largest. Args: `prefix`: of the keys."""
-        rows = []
-        for name, (words, unit) in _WORDS.items():
-            low, high = (finite(end) for end in self.ends(name))
-            value = finite(self.middle(name))
-            status = "ok" if value is not None else "not_settled"
-            ends = (low, high) if low != high else (None, None)
-            rows.append(
-                Quantity(
-                    key=prefix + name,
-                    name=words,
-                    unit=unit,
-                    value=value,
-                    lower=ends[0],
-                    upper=ends[1],
-                    origin="simulated",
-                    status=status,
-                )
-            )
-        return tuple(rows)
 
-    def middle(self, name: str) -> float:
-        """Median of one number of `_RunResult` over the runs."""
-        return float(np.quantile(self._values(name), 0.5, method="inverted_cdf"))
-
-    def ends(self, name: str) -> tuple[float, float]:
-        """Smallest and largest of one number of `_RunResult` over the runs."""
-        values = self._values(name)
-        return min(values), max(values)
-
-    def _values(self, name: str) -> list[float]:
-        return [getattr(result, name) for result in self.results]
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Comparison(Result):
     """Two balancers on one rotor."""
 
     rotor: CommonRotor
-    """That of the first scene."""
+    """That of the first scene, as it says."""
     span: float
     """s, from the start of balancing, of every run: the longer time limit of both scenes."""
+    asked: float
+    """Fraction of the devices, of the first scene."""
     sides: tuple[Side, Side]
     """In the order of the scenes."""
 
+    @property
+    def better(self) -> int | None:
+        """Which side settles more devices; None: the intervals overlap."""
+        one, other = (side.fraction for side in self.sides)
+        if one.low > other.high:
+            return 0
+        return 1 if other.low > one.high else None
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """Of each side on the fraction asked for."""
+        return tuple(side.fraction.verdict(self.asked) for side in self.sides)
+
     def to_dict(self) -> dict[str, Any]:
-        """All as a JSON document in SI; lists run along `scenes`; null: not settled."""
+        """All as a JSON document in SI; lists run along `scenes`; null: no device settles."""
         sides, rotor = self.sides, self.rotor
         return {
             "scenes": [
@@ -138,18 +168,16 @@ class Comparison(Result):
                 for side in sides
             ],
             "balancer": [side.scene.balancer for side in sides],
-            "settled": [side.settled for side in sides],
-            "time_s": [side.time for side in sides],
-            "residual_ratio": [side.middle("residual_ratio") for side in sides],
-            "energy_J": [side.middle("energy") for side in sides],
-            "worst_amplitude_m": [side.middle("worst_amplitude") for side in sides],
-            "spread": [
-                {key: [finite(end) for end in side.ends(name)] for key, name in _NUMBERS.items()}
-                for side in sides
-            ],
-            "runs": [len(side.results) for side in sides],
-            "runs_settled": [sum(math.isfinite(r.time) for r in side.results) for side in sides],
-            "tuned": [dict(side.tuned) for side in sides],
+            "fraction": [side.fraction.document() for side in sides],
+            "asked": self.asked,
+            "verdict": list(self.verdicts),
+            "better": self.better,
+            **{key: [side.middle(name) for side in sides] for key, name in _KEYS.items()},
+            "spread": [{key: side.ends(name) for key, name in _KEYS.items()} for side in sides],
+            "worst_amplitude_m": [side.worst_amplitude for side in sides],
+            "settings": [plain_settings(side.settings) for side in sides],
+            "energy_kind": [side.energy.text for side in sides],
+            "sampling_time_s": [side.sampling_time for side in sides],
             "span_s": self.span,
             "status": [side.status for side in sides],
             "models_used": [[asdict(used) for used in side.models_used] for side in sides],
@@ -166,7 +194,7 @@ class Comparison(Result):
         }
 
     def rows(self) -> Rows:
-        """What both come to: medians over the runs, with the smallest and the largest."""
+        """What both come to."""
         rotor, sides = self.rotor, self.sides
         of_rotor = (
             ("speed", "speed", "rad/s", rotor.speed),
@@ -174,10 +202,10 @@ class Comparison(Result):
             ("lag_angle", "lag angle", "rad", -cmath.phase(rotor.influence)),
             ("initial_amplitude", "amplitude before balancing", "m", rotor.amplitude),
             ("limit", "limit", "m", rotor.limit),
-            ("span", "time of each run", "s", self.span),
+            ("noise", "noise of a sample of the vibration", "m", rotor.noise),
+            ("span", "time of each run, at most", "s", self.span),
         )
-        both = [side.quantities(f"{place}.") for place, side in enumerate(sides, start=1)]
-        facts = ({"balancer": s.scene.balancer.replace("_", " "), "tuned": s.tuned_text} for s in sides)
+        both = [tuple(side.quantities(f"{place}.")) for place, side in enumerate(sides, start=1)]
         return Rows(
             title=f"Two balancers on the rotor of {rotor.source}",
             quantities=(
@@ -186,26 +214,44 @@ class Comparison(Result):
                 *both[1],
             ),
             listed=len(of_rotor),
-            findings=tuple(side.finding for side in sides),
-            tables=(_table(sides, both, tuple(facts)),),
+            findings=(self._finding, *(side.finding for side in sides), *(side.energy for side in sides)),
+            tables=(_table(sides, both),),
         )
 
+    @property
+    def _finding(self) -> Finding:
+        better = self.better
+        if better is None:
+            return Finding(code="compared_alike", values={"of": self.sides[0].fraction.of})
+        return Finding(code="compared_better", values={"source": self.sides[better].scene.source})
 
-def compare(first: Balancer, second: Balancer, *, runs: int = RUNS) -> Comparison:
-    """Put two balancers on the rotor of the first, tune each, and let each balance it over one span.
 
-    Of the second its balancer alone counts.  Each has the settings that its formulas recommend.
+def compare(
+    first: Balancer,
+    second: Balancer,
+    *,
+    most: int = MOST,
+    progress: Callable[[str], None] | None = None,
+) -> Comparison:
+    """Put two balancers on the rotor of the first, choose settings for each, and run both as drawn devices.
+
+    Of the second its balancer alone counts.
+    Args: `most`: after so many a difference that cannot be told is left open.
     Raises: SceneError: a balancer that cannot work on that rotor.
     """
+    told = progress or (lambda _: None)
     rotor = vibrating(first.scene, first.rotor())
     try:
         # Whether the second can work there at all is known before anything is run.
-        both = first.on_rotor(None), second.on_rotor(rotor)
-        span = max(balancer.span() for balancer in both)
-        one, other = (_side(rotor, balancer, span=span, runs=runs) for balancer in both)
+        placed = [each.on_rotor(rotor, first.rotor) for each in (first, second)]
+        span = max(each.span() for each in placed)
+        both = [each.lasting(span) for each in placed]
+        settings = [searched(each, progress=told) for each in both]
+        outcomes = _raced(both, settings, most=most, progress=told)
+        one, other = (_side(*each, first.rotor) for each in zip(both, settings, outcomes, strict=True))
     except SceneError as error:
         raise SceneError(_placed(first.scene, fault) for fault in error.faults) from error
-    return Comparison(rotor=rotor, span=span, sides=(one, other))
+    return Comparison(rotor=rotor, span=span, asked=first.asked_fraction(), sides=(one, other))
 
 
 def _placed(first: SceneFile, fault: Fault) -> Fault:
@@ -214,46 +260,63 @@ def _placed(first: SceneFile, fault: Fault) -> Fault:
     return replace(fault, problem=f"on the rotor of {first.source}: {fault.problem}")
 
 
-def _side(rotor: CommonRotor, balancer: Balancer, *, span: float, runs: int) -> Side:
-    advised, changes = balancer.advised()
-    ready = advised.lasting(span)
-    found = ready.run({}, Draws.first(runs, devices=False), trace=True)
-    results = tuple(
-        _RunResult(
-            time=math.inf if each.settling_time is None else each.settling_time,
-            residual_ratio=each.final_amplitude / rotor.amplitude,
-            energy=each.energy,
-            worst_amplitude=each.worst_amplitude,
-            status=each.run.status,
-        )
-        for each in found.traced
+def _raced(
+    both: Sequence[Balancer], settings: Sequence[Settings], *, most: int, progress: Callable[[str], None]
+) -> list[Outcomes]:
+    """Both over the same devices, twice as many each time until their fractions lie apart."""
+    whole: list[Outcomes] = []
+    more = min(FEWEST, most)
+    while more:
+        count = whole[0].settled.size if whole else 0
+        progress(f"{count} of at most {most} drawn devices")
+        draws = Draws.block(FRESH + count, more)
+        ran = [each.run_all([asked], draws)[0] for each, asked in zip(both, settings, strict=True)]
+        whole = [a.joined(b) for a, b in zip(whole, ran, strict=True)] if whole else ran
+        more = 0 if _apart(*whole) else min(count + more, most - count - more)
+    return whole
+
+
+def _apart(one: Outcomes, other: Outcomes) -> bool:
+    a, b = (Proportion(count=int(each.settled.sum()), of=each.settled.size) for each in (one, other))
+    return a.low > b.high or b.low > a.high
+
+
+def _side(balancer: Balancer, settings: Settings, outcomes: Outcomes, rotors: Rotors) -> Side:
+    before = np.array([rotors(FRESH + number).amplitude for number in range(outcomes.settled.size)])
+    traced = balancer.run(settings, Draws.block(FRESH, _TRACED), trace=True).traced
+    told = next((each for each in traced if each.settling_time is None), traced[0])
+    ready = balancer.on_scene(with_values_at(balancer.scene, settings))
+    return Side(
+        scene=ready.scene,
+        settings=settings,
+        outcomes=outcomes,
+        residual_ratio=outcomes.final_amplitude / before,
+        worst_amplitude=float(np.median([each.worst_amplitude for each in traced])),
+        status=told.run.status,
+        energy_kind=balancer.energy_kind,
+        sampling_time=balancer.sampling_time(),
+        models_used=ready.models_used,
     )
-    return Side(scene=ready.scene, tuned=changes, results=results, models_used=ready.models_used)
 
 
 _NUMBERS: Final = {
-    "time_s": "time",
-    "residual_ratio": "residual_ratio",
-    "energy_J": "energy",
-    "worst_amplitude_m": "worst_amplitude",
+    "settling_time": ("time", "time to the limit, of those that settle", "s"),
+    "residual_ratio": ("residual_ratio", "left over, ratio", "1"),
+    "energy": ("energy", "energy", "J"),
 }
-"""Keys of the document, each with its number of `_RunResult`."""
-_WORDS: Final = {
-    "time": ("time to the limit", "s"),
-    "residual_ratio": ("left over, ratio", "1"),
-    "energy": ("energy", "J"),
-    "worst_amplitude": ("largest amplitude on the way", "m"),
-}
+"""Numbers by device: key, words and unit."""
+_KEYS: Final = {"time_s": "settling_time", "residual_ratio": "residual_ratio", "energy_J": "energy"}
+"""Of the document, each with its number by device."""
 
 
-def _table(
-    sides: Sequence[Side], both: Sequence[Sequence[Quantity]], facts: Sequence[Mapping[str, str]]
-) -> Table:
-    """One column a balancer; medians with the smallest and the largest of the runs."""
+def _table(sides: Sequence[Side], both: Sequence[Sequence[Quantity]]) -> Table:
+    """One column a balancer."""
     names = [side.scene.name for side in sides]
     heads = names if len(set(names)) > 1 else [side.scene.source for side in sides]
-    rows = [(name, *(each[name] for each in facts)) for name in facts[0]]
+    rows = [
+        ("balancer", *(side.scene.balancer.replace("_", " ") for side in sides)),
+        ("settings", *(side.settings_text for side in sides)),
+    ]
     rows += [(one.name, one.text, other.text) for one, other in zip(*both, strict=True)]
-    return Table(
-        heads=("", *heads), rows=rows, note="medians of the runs; -/+: to the smallest and the largest"
-    )
+    note = "medians of the devices that settle; -/+: to the smallest and the largest"
+    return Table(heads=("", *heads), rows=rows, note=note)

@@ -40,6 +40,7 @@ _COLOURS: Final = (FOUND, THIRD)
 _LOCKED: Final = {**AS_PAPER, "linewidth": 1.2, "label": "masses locked"}
 _BALANCED: Final = {"color": FOUND, "linewidth": 1.2, "label": "balanced"}
 _LIMIT: Final = {"color": MUTED, "linewidth": 1, "linestyle": ":", "label": "limit"}
+_DRAWN: Final[dict[str, Any]] = {"color": FOUND, "alpha": 0.2, "linewidth": 0}
 _SHORTEST: Final = 0.09
 """Fraction of the time axis that the name of a stage needs."""
 _MILLIMETRE: Final = 1e3
@@ -50,20 +51,31 @@ _LAG_TOP: Final = 300
 _ACROSS: Final = ("data", "axes fraction")
 
 
-def over_time(run: Record, locked: Record) -> Drawing:
-    """Vibration amplitude over time, m, balanced and with the masses locked, with the limit."""
+def over_time(run: Record, locked: Record, drawn: Record | None = None) -> Drawing:
+    """Vibration amplitude over time, m, balanced and with the masses locked, with the limit.
+
+    Args: `drawn`: band of drawn devices, `time_s`, `low_m` and `high_m`.
+    """
     pairs = ((locked, _LOCKED), (run, _BALANCED))
     return draw(
         "eccentric-amplitude",
+        lambda axes: _band(axes, drawn and drawn["time_s"], drawn, 1.0),
         amplitudes([(each["time_s"], each["amplitude_m"], look) for each, look in pairs], run["limit_m"]),
         lambda axes: _shade_stages(axes, run),
         x=TIME,
         y=AMPLITUDE,
         xlim=(run["time_s"][0], run["time_s"][-1]),
-        columns=3,
+        columns=4,
         wide=True,
         height=3.2,
     )
+
+
+def _band(axes: Axes, at: Any, drawn: Record | None, factor: float) -> None:
+    """Where drawn devices lie. Args: `at`: abscissae. `factor`: of the axis, per metre."""
+    if drawn is not None:
+        low, high = (factor * np.asarray(drawn[key]) for key in ("low_m", "high_m"))
+        axes.fill_between(at, low, high, label="drawn devices", **_DRAWN)
 
 
 def _shade_stages(axes: Axes, run: Record) -> None:
@@ -77,12 +89,13 @@ def _shade_stages(axes: Axes, run: Record) -> None:
             note(name, (start, 1), (3, -3), xycoords=_ACROSS, va="top")(axes)
 
 
-def run_up(run: Record, locked: Record, rotor: Record) -> Drawing:
+def run_up(run: Record, locked: Record, rotor: Record, drawn: Record | None = None) -> Drawing:
     """Bode plot of a run-up: vibration amplitude over speed, balanced and with the masses locked, and below
     it the lag of the locked rotor behind its unbalance, with the critical speed.
 
     Args: `rotor`: its `critical_speed_rad_s`, `amplification_factor` (None: none is defined), and
-    `locked_phase_rad`, the phase of what the locked masses leave of the unbalance.
+    `locked_phase_rad`, the phase of what the locked masses leave of the unbalance. `drawn`: as
+    of `over_time`.
     """
     speeds = [_RPM * np.asarray(each["speed_rad_s"]) for each in (locked, run)]
     lag = np.degrees((rotor["locked_phase_rad"] - np.asarray(locked["phase_rad"])) % math.tau)
@@ -95,6 +108,8 @@ def run_up(run: Record, locked: Record, rotor: Record) -> Drawing:
         top, below = panels(axes, (0.09, 0.43, 0.89, 0.47), (0.09, 0.135, 0.89, 0.25))
         values = [_MILLIMETRE * np.asarray(each["amplitude_m"]) for each in (locked, run)]
         curves = zip(speeds, values, (_LOCKED, _BALANCED), strict=True)
+        if drawn is not None:
+            _band(top, *_while_speed_changes(run, drawn), _MILLIMETRE)
         amplitudes(curves, _MILLIMETRE * run["limit_m"])(top)
         below.plot(speeds[0], lag, **_LOCKED)
         for panel in (top, below):
@@ -110,8 +125,17 @@ def run_up(run: Record, locked: Record, rotor: Record) -> Drawing:
         note(text, (critical, 0.0), (-4 if side == "right" else 4, 4), xycoords=_ACROSS, ha=side)(top)
         for look in (_LOCKED, _BALANCED, _LIMIT):
             axes.plot([], [], **look)
+        if drawn is not None:
+            axes.fill_between([], [], [], label="drawn devices", **_DRAWN)
 
-    return draw("eccentric-run-up", paint, columns=3, wide=True, height=3.5)
+    return draw("eccentric-run-up", paint, columns=4, wide=True, height=3.5)
+
+
+def _while_speed_changes(run: Record, drawn: Record) -> tuple[FloatArray, Record]:
+    """Speeds, rpm, and the band there: at one speed it has one width for each time."""
+    speed: FloatArray = np.asarray(np.interp(drawn["time_s"], run["time_s"], run["speed_rad_s"]))
+    changing = np.flatnonzero(np.diff(speed)) + 1
+    return _RPM * speed[changing], {key: np.asarray(drawn[key])[changing] for key in ("low_m", "high_m")}
 
 
 def mass_angles(run: Record) -> Drawing:

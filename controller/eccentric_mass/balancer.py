@@ -24,12 +24,11 @@ from ringbalance.controller.balancer import (
     TracedRun,
     inputs_of,
     outcomes_of,
-    requirements_of,
     settles_within,
 )
-from ringbalance.controller.common_rotor import CommonRotor, rotor_fault
+from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.drawn_input import MEASURE_INPUT, DrawnInput, drawn_key
-from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device
+from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device, on_rotor
 from ringbalance.controller.eccentric_mass.loop_rows import loops_document, loops_quantities, loops_status
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.remedies import advised_remedies
@@ -37,9 +36,9 @@ from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.scene_records import (
+    EccentricRequirement,
     EccentricRotor,
     EccentricScene,
-    SpeedPoint,
     eccentric_scene,
 )
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
@@ -47,7 +46,7 @@ from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.trials import Axis, Trials
-from ringbalance.results.requirements import AT_MOST, Requirement
+from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.draws import run_noise
@@ -74,11 +73,12 @@ class EccentricMassBalancer:
 
     options = frozenset[str]()
     verdict_draws = (16, 64)
+    energy_kind = "energy_electrical"
     watched_to_end = True
     models_used: tuple[Any, ...] = ()
 
-    def __init__(self, scene: EccentricScene) -> None:
-        self.scene = scene
+    def __init__(self, scene: EccentricScene, rotors: Rotors | None = None) -> None:
+        self.scene, self._rotors = scene, rotors
 
     def inputs(self) -> tuple[Input, ...]:
         """Those of the scene."""
@@ -143,7 +143,7 @@ class EccentricMassBalancer:
         return tuple(found)
 
     def _device(self, number: int, *, drawn: bool) -> Device:
-        return device(self.scene, number) if drawn else Device(scene=self.scene, inputs={})
+        return device(self.scene, number, self._rotors) if drawn else Device(scene=self.scene, inputs={})
 
     def asked_fraction(self) -> float:
         """The scene's."""
@@ -196,11 +196,11 @@ class EccentricMassBalancer:
 
     def on_scene(self, scene: SceneFile) -> EccentricMassBalancer:
         """See `Balancer`."""
-        return EccentricMassBalancer(eccentric_scene(scene))
+        return EccentricMassBalancer(eccentric_scene(scene), self._rotors)
 
-    def rotor(self) -> CommonRotor:
+    def rotor(self, number: int | None = None) -> CommonRotor:
         """At the speed at which the strategy starts; see `Balancer`."""
-        scene = self.scene
+        scene = self.scene if number is None else device(self.scene, number, self._rotors).scene
         speed, _ = speed_at(*scene.rotor.profile, scene.supervisor.start)
         if speed <= 0:
             problem = "the rotor does not turn forwards when balancing starts"
@@ -220,37 +220,33 @@ class EccentricMassBalancer:
             limit=scene.supervisor.limit,
         )
 
-    def on_rotor(self, rotor: CommonRotor | None) -> EccentricMassBalancer:
+    def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> EccentricMassBalancer:
         """Opposite each other until the rotor's vibration is steady, with the noise that both balancers have.
 
         A wrong assumption stays as wrong as it was. Raises: SceneError: no such rotor has these masses.
         """
-        rotor = self.rotor() if rotor is None else rotor
         scene = self.scene
         before, masses = scene.rotor, scene.masses
         whole = before.mass + 2 * masses.mass if rotor.mass is None else rotor.mass
-        dynamic = rotor.speed**2 / rotor.influence
-        found = replace(
-            before,
-            mass=whole - 2 * masses.mass,
-            stiffness=whole * rotor.speed**2 + dynamic.real,
-            damping=dynamic.imag / rotor.speed,
-        )
-        _check_rotor(rotor, scene, found)
-        radius, limit = scene.imbalance.radius, rotor.limit
+        lighter = replace(scene, rotor=replace(before, mass=whole - 2 * masses.mass))
+        plant = on_rotor(lighter, rotor)
+        _check_rotor(rotor, scene, plant.rotor)
         moved = replace(
-            scene,
-            rotor=found,
-            imbalance=replace(
-                scene.imbalance, mass=abs(rotor.unbalance) / radius, phase=cmath.phase(rotor.unbalance)
-            ),
+            plant,
             sensor=replace(
                 scene.sensor, position_noise=rotor.noise, velocity_noise=rotor.noise * rotor.speed
             ),
-            imbalance_filter=_believed(scene, found, rotor, heavier=whole / (before.mass + 2 * masses.mass)),
-            supervisor=replace(scene.supervisor, limit=limit),
+            imbalance_filter=_believed(
+                scene, plant.rotor, rotor, heavier=whole / (before.mass + 2 * masses.mass)
+            ),
+            supervisor=replace(scene.supervisor, limit=rotor.limit),
+            requirement=EccentricRequirement(fraction=scene.requirement.fraction),
         )
-        return EccentricMassBalancer(_steady_start(moved, rotor.speed))
+        return EccentricMassBalancer(_steady_start(moved), rotors)
+
+    def sampling_time(self) -> float:
+        """See `Balancer`."""
+        return self.scene.sensor.step
 
     def span(self) -> float:
         """See `Balancer`."""
@@ -259,12 +255,9 @@ class EccentricMassBalancer:
     def lasting(self, span: float) -> EccentricMassBalancer:
         """See `Balancer`."""
         limit = span + self.scene.supervisor.start
-        return EccentricMassBalancer(replace(self.scene, run=replace(self.scene.run, time_limit=limit)))
-
-    def advised(self) -> tuple[EccentricMassBalancer, Mapping[str, float]]:
-        """Gains lowered to the recommended ones; see `Balancer`."""
-        scene, changes = advised(self.scene)
-        return EccentricMassBalancer(scene), changes
+        return EccentricMassBalancer(
+            replace(self.scene, run=replace(self.scene.run, time_limit=limit)), self._rotors
+        )
 
     def recommend(
         self,
@@ -282,17 +275,6 @@ class EccentricMassBalancer:
             key="reach", name="usable moment in any direction", unit="kg m", value=reach_of(self.scene)
         )
         return (reach, *loops_quantities(RecommendedGains.of(self.scene)))
-
-    def requirements(self) -> tuple[Requirement, ...]:
-        """See `Balancer`."""
-        scene = self.scene
-        return requirements_of(
-            self,
-            unbalance=scene.imbalance.mass * scene.imbalance.radius,
-            reach=reach_of(scene),
-            residual=scene.requirement.residual or scene.supervisor.limit,
-            settling_time=self.demands()[0].required,
-        )
 
     def rows(self, run: EccentricRun) -> Rows:
         """See `Balancer`."""
@@ -345,7 +327,7 @@ def _believed(scene: EccentricScene, found: EccentricRotor, rotor: CommonRotor, 
     )
 
 
-def _steady_start(scene: EccentricScene, speed: float) -> EccentricScene:
+def _steady_start(scene: EccentricScene) -> EccentricScene:
     """At constant speed; the strategy waits until the vibration from the rotor's start has died away."""
     whole = scene.rotor.mass + 2 * scene.masses.mass
     start = _SETTLED_WHIRL * 2 * whole / scene.rotor.damping
@@ -353,7 +335,6 @@ def _steady_start(scene: EccentricScene, speed: float) -> EccentricScene:
     first = scene.masses.initial_angle[0]
     return replace(
         scene,
-        rotor=replace(scene.rotor, speed_profile=(SpeedPoint(time=0.0, speed=speed),)),
         masses=replace(scene.masses, initial_angle=(first, first + math.pi)),
         supervisor=replace(scene.supervisor, start=start),
         run=replace(scene.run, time_limit=scene.run.time_limit + start),

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from ringbalance.controller.common_rotor import CommonRotor
+from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
 from ringbalance.scene.draws import deviates, quantiles
@@ -28,12 +28,8 @@ ring's."""
 PHASE: Final = "imbalance.phase"
 FITTED: Final = "fitted together, direction"
 _SIZE: Final = ("imbalance.mass", "imbalance.radius")
-_OF_ROTOR: Final = frozenset({"rotor.stiffness", "rotor.damping", *_SIZE, PHASE})
-"""Inputs that a common rotor brings; its mass is left open by the influence coefficient."""
 _ANGLES: Final = frozenset({"rad", "mrad", "deg"})
 _Move = Callable[[float], float]
-Rotors = Callable[[int], CommonRotor]
-"""The rotor by number of the device."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,16 +46,16 @@ def device(scene: EccentricScene, number: int, rotors: Rotors | None = None) -> 
     """A device by its number. Args: `rotors`: that it runs on; default its own, drawn."""
     seed, plant, inputs = scene.run.seed, scene, {}
     for name, moves in _inputs(scene):
-        if rotors is None or name not in _OF_ROTOR:
-            (normal,), (place,) = (draw(name, (number,), seed=seed) for draw in (deviates, quantiles))
-            inputs[name] = float(place)
-            for path, move in moves(float(normal) / NORMAL_95, float(place)):
-                plant = moved_at(plant, path, move)
+        (normal,), (place,) = (draw(name, (number,), seed=seed) for draw in (deviates, quantiles))
+        inputs[name] = float(place)
+        for path, move in moves(float(normal) / NORMAL_95, float(place)):
+            plant = moved_at(plant, path, move)
     return Device(scene=plant if rotors is None else on_rotor(plant, rotors(number)), inputs=inputs)
 
 
 def on_rotor(scene: EccentricScene, rotor: CommonRotor) -> EccentricScene:
-    """With a rotor's speed, influence coefficient and unbalance, and the scene's own mass.
+    """With a rotor's speed, influence coefficient and unbalance, and the scene's own mass, which these leave
+    open.
 
     K_B = M W^2 + Re(W^2/alpha), C_B = Im(W^2/alpha)/W, with the mass M of rotor and both masses.
     """

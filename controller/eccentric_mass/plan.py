@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 from typing import Final, NamedTuple
 
@@ -9,6 +10,7 @@ from ringbalance.controller.eccentric_mass.friction_filter import FrictionEstima
 from ringbalance.controller.eccentric_mass.imbalance_filter import FilterMatrices, ImbalanceEstimate
 from ringbalance.controller.eccentric_mass.targets import Correction, Tuning
 from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compiled import compiled
 
 Pair = tuple[float, float]
 
@@ -278,3 +280,114 @@ class StrategyState(NamedTuple):
     last_rate: Pair
     """Of the masses, as measured at that step."""
     voltage: Pair
+
+
+@compiled
+def setting_out(time: float) -> Progress:
+    """Progress at the beginning of a move, with nothing arrived or averaged yet."""
+    return Progress(time, NOT_YET, math.inf, time, NOT_YET, 0.0j, 0)
+
+
+# Numba builds a tuple by position alone: each of these replaces one part.
+@compiled
+def enter(plan: Plan, stage: int, time: float, cause: int, goal: Pair) -> Plan:
+    """Begin a stage with the plan's tuning and findings."""
+    begin = setting_out(time)
+    return Plan(stage, time, cause, goal, MOVING, begin, plan.correction, plan.tuning, plan.findings)
+
+
+@compiled
+def with_progress(plan: Plan, progress: Progress) -> Plan:
+    """Of the present move."""
+    stage, entered, cause, goal, hold, _, correction, tuning, findings = plan
+    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
+
+
+@compiled
+def with_findings(plan: Plan, findings: Findings) -> Plan:
+    """What stages leave behind."""
+    stage, entered, cause, goal, hold, progress, correction, tuning, _ = plan
+    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
+
+
+@compiled
+def with_hold(plan: Plan, hold: int) -> Plan:
+    """Whether the drives move, hold or rest."""
+    stage, entered, cause, goal, _, progress, correction, tuning, findings = plan
+    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
+
+
+@compiled
+def with_trial(plan: Plan, time: float, tuning: Tuning, goal: Pair) -> Plan:
+    """Set out to a trial of fine tuning."""
+    stage, entered, cause, _, _, _, correction, _, findings = plan
+    return Plan(stage, entered, cause, goal, MOVING, setting_out(time), correction, tuning, findings)
+
+
+@compiled
+def with_goal(plan: Plan, goal: Pair) -> Plan:
+    """Another goal for the same move."""
+    stage, entered, cause, _, hold, progress, correction, tuning, findings = plan
+    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
+
+
+@compiled
+def with_correction(plan: Plan, correction: Correction) -> Plan:
+    """By the measured vibration."""
+    stage, entered, cause, goal, hold, progress, _, tuning, findings = plan
+    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
+
+
+@compiled
+def averaging_from(progress: Progress, begins: float) -> Progress:
+    """Begin the mean at a time, s."""
+    return Progress(progress.moving, progress.arrived, progress.nearest, progress.nearer, begins, 0.0j, 0)
+
+
+@compiled
+def with_arrival(progress: Progress, arrived: float) -> Progress:
+    """Args: `arrived`: time, s; NOT_YET."""
+    moving, _, nearest, nearer, averaging, total, samples = progress
+    return Progress(moving, arrived, nearest, nearer, averaging, total, samples)
+
+
+@compiled
+def with_nearest(progress: Progress, nearest: float, since: float) -> Progress:
+    """Masses have come as near to their goal as this, rad, at a time, s."""
+    moving, arrived, _, _, averaging, total, samples = progress
+    return Progress(moving, arrived, nearest, since, averaging, total, samples)
+
+
+@compiled
+def with_sample(progress: Progress, position: complex) -> Progress:
+    """One sample more in the mean."""
+    moving, arrived, nearest, nearer, averaging, total, samples = progress
+    return Progress(moving, arrived, nearest, nearer, averaging, total + position, samples + 1)
+
+
+@compiled
+def with_stall(findings: Findings, stalled: bool) -> Findings:
+    """One sample more of the friction stage."""
+    saturated, residual, objective, short, driven, before = findings
+    return Findings(saturated, residual, objective, short, driven + 1, before + (1 if stalled else 0))
+
+
+@compiled
+def with_targets(findings: Findings, saturated: bool, residual: float) -> Findings:
+    """What the targets leave, kg m."""
+    _, _, objective, short, driven, stalled = findings
+    return Findings(saturated, residual, objective, short, driven, stalled)
+
+
+@compiled
+def with_objective(findings: Findings, objective: float) -> Findings:
+    """The mean amplitude at the present place, m."""
+    saturated, residual, _, short, driven, stalled = findings
+    return Findings(saturated, residual, objective, short, driven, stalled)
+
+
+@compiled
+def with_short(findings: Findings, short: float) -> Findings:
+    """The distance at which friction was left to hold a mass short of its goal, rad."""
+    saturated, residual, objective, _, driven, stalled = findings
+    return Findings(saturated, residual, objective, short, driven, stalled)

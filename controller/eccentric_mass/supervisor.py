@@ -17,8 +17,23 @@ from ringbalance.controller.eccentric_mass.plan import (
     Gates,
     Pair,
     Plan,
-    Progress,
     Stage,
+    averaging_from,
+    enter,
+    setting_out,
+    with_arrival,
+    with_correction,
+    with_findings,
+    with_goal,
+    with_hold,
+    with_nearest,
+    with_objective,
+    with_progress,
+    with_sample,
+    with_short,
+    with_stall,
+    with_targets,
+    with_trial,
 )
 from ringbalance.controller.eccentric_mass.targets import (
     Correction,
@@ -57,7 +72,7 @@ def first_plan(goal: Pair, time: float) -> Plan:
     """The plan before the first sample. Returns: Plan, waiting."""
     nothing = Findings(False, 0.0, math.inf, 0.0, 0, 0)
     tuning = tuning_start(goal[0], goal[1], math.inf, 1.0)
-    begin = _setting_out(time)
+    begin = setting_out(time)
     return Plan(0, time, 0, goal, MOVING, begin, correction_start(goal, 0.0j), tuning, nothing)
 
 
@@ -69,7 +84,7 @@ def supervise(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """
     if plan.stage == WAITING:
         begins = facts.time >= gates.start
-        return _enter(plan, IMBALANCE, facts.time, NONE, plan.goal) if begins else plan
+        return enter(plan, IMBALANCE, facts.time, NONE, plan.goal) if begins else plan
     if plan.stage == IMBALANCE:
         return _imbalance(gates, plan, facts)
     if plan.stage == FRICTION:
@@ -91,7 +106,7 @@ def _imbalance(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     known = facts.deviation <= gates.imbalance_gate * abs(facts.imbalance)
     settled = 2 * facts.deviation * abs(facts.influence) <= 0.1 * gates.limit
     if facts.visible and (known or settled) and facts.time - plan.entered >= gates.least_estimate:
-        return _enter(plan, FRICTION, facts.time, NONE, facts.angle)
+        return enter(plan, FRICTION, facts.time, NONE, facts.angle)
     if facts.time - plan.entered < gates.imbalance_time:
         return plan
     cause = IMBALANCE_UNCERTAIN
@@ -101,7 +116,7 @@ def _imbalance(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         cause = SPEED_NOT_CONSTANT
     elif not facts.visible:
         cause = MASSES_MOVE
-    return _enter(plan, FAILED, facts.time, cause, facts.angle)
+    return enter(plan, FAILED, facts.time, cause, facts.angle)
 
 
 @compiled
@@ -122,7 +137,7 @@ def _friction(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         return now
     stalled = now.findings.stalled > STALLED_SHARE * now.findings.driven
     cause = STALLED if stalled else FRICTION_UNCERTAIN
-    return _enter(now, FAILED, facts.time, cause, facts.angle)
+    return enter(now, FAILED, facts.time, cause, facts.angle)
 
 
 @compiled
@@ -131,16 +146,16 @@ def _watched(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     if facts.time - plan.entered < 0.5 * gates.least_drive:
         return plan
     slow = min(abs(facts.rate[0]), abs(facts.rate[1])) < gates.stall_rate
-    return _with_findings(plan, _with_stall(plan.findings, slow))
+    return with_findings(plan, with_stall(plan.findings, slow))
 
 
 @compiled
 def _towards(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """Go to the targets for the estimated imbalance."""
     goal, saturated, residual = _goal(gates, facts.angle, facts.imbalance)
-    now = _with_findings(plan, _with_targets(plan.findings, saturated, residual))
-    now = _with_correction(now, correction_start(goal, facts.imbalance))
-    return _enter(now, POSITIONING, facts.time, NONE, goal)
+    now = with_findings(plan, with_targets(plan.findings, saturated, residual))
+    now = with_correction(now, correction_start(goal, facts.imbalance))
+    return enter(now, POSITIONING, facts.time, NONE, goal)
 
 
 @compiled
@@ -163,9 +178,9 @@ def _positioning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """Until the masses are at their targets, or friction holds them: the check tells what that leaves."""
     now = _arriving(gates, plan, facts, gates.arrival_angle)
     if _there(gates, now, facts) or _held(gates, now, facts):
-        return _enter(now, CHECK, facts.time, NONE, now.goal)
+        return enter(now, CHECK, facts.time, NONE, now.goal)
     late = facts.time - now.entered >= gates.positioning_time
-    return _enter(now, FAILED, facts.time, NOT_ARRIVED, facts.angle) if late else now
+    return enter(now, FAILED, facts.time, NOT_ARRIVED, facts.angle) if late else now
 
 
 @compiled
@@ -177,7 +192,7 @@ def _check(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     if now.hold == MOVING:
         return now
     if now.progress.averaging == NOT_YET:
-        now = _with_progress(now, _averaging_from(now.progress, facts.time + gates.wait))
+        now = with_progress(now, averaging_from(now.progress, facts.time + gates.wait))
     now = _sampled(now, facts)
     if not _averaged(gates, now, facts):
         return now
@@ -189,7 +204,7 @@ def _corrected(gates: Gates, plan: Plan, mean: complex, facts: Facts) -> Plan:
     """Go on to better targets while that helps, back to the best place, or on to what comes after."""
     held = plan.findings.short > gates.tuning_near
     best = correction_judged(plan.correction, mean, gates.margin, held)
-    now = _judged(_with_correction(plan, best), abs(best.residual))
+    now = _judged(with_correction(plan, best), abs(best.residual))
     far = plan.findings.short > gates.arrival_angle
     enough = far and abs(mean) <= gates.limit
     over = enough or gates.by_trials or facts.influence == 0 or correction_ends(best, gates.margin)
@@ -199,7 +214,7 @@ def _corrected(gates: Gates, plan: Plan, mean: complex, facts: Facts) -> Plan:
         if _distance(goal, best.place) > gates.tuning_near:
             # Where friction keeps the masses far off, the aim goes beyond the imbalance to pull them free.
             if not far:
-                now = _with_findings(now, _with_targets(now.findings, saturated, residual))
+                now = with_findings(now, with_targets(now.findings, saturated, residual))
             return _set_out(now, correction_step(best, aim, goal), facts)
     if best.residual != mean and not enough:
         return _set_out(now, correction_back(best), facts)
@@ -209,20 +224,20 @@ def _corrected(gates: Gates, plan: Plan, mean: complex, facts: Facts) -> Plan:
 @compiled
 def _set_out(plan: Plan, correction: Correction, facts: Facts) -> Plan:
     """Begin the move of a correction."""
-    return _enter(_with_correction(plan, correction), CORRECTION, facts.time, NONE, correction.goal)
+    return enter(with_correction(plan, correction), CORRECTION, facts.time, NONE, correction.goal)
 
 
 @compiled
 def _decided(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """After the last correction: content with this place, or what is left to do from here."""
     if plan.findings.objective <= gates.limit:
-        return _with_hold(_enter(plan, REST, facts.time, BALANCED, plan.goal), plan.hold)
+        return with_hold(enter(plan, REST, facts.time, BALANCED, plan.goal), plan.hold)
     if plan.findings.saturated:
-        return _with_hold(_enter(plan, REST, facts.time, SATURATED, plan.goal), plan.hold)
+        return with_hold(enter(plan, REST, facts.time, SATURATED, plan.goal), plan.hold)
     if plan.findings.short > gates.arrival_angle:
-        return _enter(plan, FAILED, facts.time, NOT_ARRIVED, facts.angle)
+        return enter(plan, FAILED, facts.time, NOT_ARRIVED, facts.angle)
     first = tuning_start(plan.goal[0], plan.goal[1], plan.findings.objective, gates.tuning_step)
-    return _try(gates, _enter(plan, FINE_TUNING, facts.time, NONE, plan.goal), first, facts)
+    return _try(gates, enter(plan, FINE_TUNING, facts.time, NONE, plan.goal), first, facts)
 
 
 @compiled
@@ -230,7 +245,7 @@ def _cut_short(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """The speed has changed during a check or a correction: the best place so far is kept."""
     content = abs(plan.correction.residual) <= gates.limit
     cause = BALANCED if content else SPEED_CHANGED
-    return _enter(plan, REST, facts.time, cause, plan.correction.place)
+    return enter(plan, REST, facts.time, cause, plan.correction.place)
 
 
 @compiled
@@ -239,15 +254,15 @@ def _correction(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     if not facts.constant:
         return _cut_short(gates, plan, facts)
     now = _arriving(gates, plan, facts, gates.tuning_near)
-    return _enter(now, CHECK, facts.time, NONE, now.goal) if _over(gates, now, facts) else now
+    return enter(now, CHECK, facts.time, NONE, now.goal) if _over(gates, now, facts) else now
 
 
 @compiled
 def _fine_tuning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     if not facts.constant:
-        return _enter(plan, REST, facts.time, SPEED_CHANGED, plan.tuning.base)
+        return enter(plan, REST, facts.time, SPEED_CHANGED, plan.tuning.base)
     if facts.time - plan.entered >= gates.fine_tuning_time:
-        return _enter(plan, REST, facts.time, TUNING_TIME, plan.tuning.base)
+        return enter(plan, REST, facts.time, TUNING_TIME, plan.tuning.base)
     if plan.progress.averaging == NOT_YET:
         return _moving(gates, plan, facts)
     now = _sampled(plan, facts)
@@ -256,7 +271,7 @@ def _fine_tuning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     tuning = tuning_next(now.tuning, _mean(now), gates.margin, gates.tuning_stop)
     told = _judged(now, tuning.best)
     if tuning.best <= gates.limit:
-        return _enter(told, REST, facts.time, BALANCED, tuning.base)
+        return enter(told, REST, facts.time, BALANCED, tuning.base)
     return _try(gates, told, tuning, facts)
 
 
@@ -266,7 +281,7 @@ def _moving(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     now = _arriving(gates, plan, facts, max(0.1 * plan.tuning.step, gates.tuning_near))
     if not _over(gates, now, facts):
         return now
-    return _with_progress(now, _averaging_from(now.progress, facts.time + gates.wait))
+    return with_progress(now, averaging_from(now.progress, facts.time + gates.wait))
 
 
 @compiled
@@ -278,8 +293,8 @@ def _try(gates: Gates, plan: Plan, tuning: Tuning, facts: Facts) -> Plan:
         chosen = tuning_next(chosen, math.inf, gates.margin, gates.tuning_stop)
         place = tuning_place(chosen)
     if chosen.done:
-        return _enter(plan, REST, facts.time, RESIDUAL, chosen.base)
-    return _with_trial(plan, facts.time, chosen, place)
+        return enter(plan, REST, facts.time, RESIDUAL, chosen.base)
+    return with_trial(plan, facts.time, chosen, place)
 
 
 @compiled
@@ -294,15 +309,15 @@ def _rest(gates: Gates, plan: Plan, facts: Facts) -> Plan:
         astray = astray or abs(facts.angle[i] - now.goal[i]) > 2 * gates.arrival_angle
     if hold == RELEASED and (astray or facts.load > _HOLDS_FOR_SURE):
         hold = HELD
-    return _with_hold(now, hold)
+    return with_hold(now, hold)
 
 
 @compiled
 def _left_there(gates: Gates, plan: Plan, facts: Facts) -> Plan:
     """Where friction has the masses is their place from now on, if that is far short of their goal."""
     short = _distance(facts.angle, plan.goal)
-    now = _with_findings(plan, _with_short(plan.findings, short))
-    return _with_goal(now, facts.angle) if short > gates.arrival_angle else now
+    now = with_findings(plan, with_short(plan.findings, short))
+    return with_goal(now, facts.angle) if short > gates.arrival_angle else now
 
 
 @compiled
@@ -312,10 +327,10 @@ def _arriving(gates: Gates, plan: Plan, facts: Facts, closeness: float) -> Plan:
         close = abs(facts.angle[i] - plan.goal[i]) <= closeness
         there = there and close and abs(facts.rate[i]) <= gates.arrival_rate
     since = facts.time if plan.progress.arrived == NOT_YET else plan.progress.arrived
-    now = _with_arrival(plan.progress, since if there else NOT_YET)
+    now = with_arrival(plan.progress, since if there else NOT_YET)
     distance = _distance(facts.angle, plan.goal)
     nearer = distance < now.nearest - gates.noticeable
-    return _with_progress(plan, _with_nearest(now, distance, facts.time) if nearer else now)
+    return with_progress(plan, with_nearest(now, distance, facts.time) if nearer else now)
 
 
 @compiled
@@ -354,7 +369,7 @@ def _sampled(plan: Plan, facts: Facts) -> Plan:
     """The mean is of the rotor-fixed vector: noise averages out of it, but not out of amplitudes."""
     if facts.time < plan.progress.averaging:
         return plan
-    return _with_progress(plan, _with_sample(plan.progress, facts.position))
+    return with_progress(plan, with_sample(plan.progress, facts.position))
 
 
 @compiled
@@ -369,111 +384,4 @@ def _mean(plan: Plan) -> float:
 
 @compiled
 def _judged(plan: Plan, objective: float) -> Plan:
-    return _with_findings(plan, _with_objective(plan.findings, objective))
-
-
-@compiled
-def _setting_out(time: float) -> Progress:
-    """Progress at the beginning of a move, with nothing arrived or averaged yet."""
-    return Progress(time, NOT_YET, math.inf, time, NOT_YET, 0.0j, 0)
-
-
-# Numba builds a tuple by position alone: each of these replaces one part.
-@compiled
-def _enter(plan: Plan, stage: int, time: float, cause: int, goal: Pair) -> Plan:
-    """Begin a stage with the plan's tuning and findings."""
-    begin = _setting_out(time)
-    return Plan(stage, time, cause, goal, MOVING, begin, plan.correction, plan.tuning, plan.findings)
-
-
-@compiled
-def _with_progress(plan: Plan, progress: Progress) -> Plan:
-    stage, entered, cause, goal, hold, _, correction, tuning, findings = plan
-    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
-
-
-@compiled
-def _with_findings(plan: Plan, findings: Findings) -> Plan:
-    stage, entered, cause, goal, hold, progress, correction, tuning, _ = plan
-    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
-
-
-@compiled
-def _with_hold(plan: Plan, hold: int) -> Plan:
-    stage, entered, cause, goal, _, progress, correction, tuning, findings = plan
-    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
-
-
-@compiled
-def _with_trial(plan: Plan, time: float, tuning: Tuning, goal: Pair) -> Plan:
-    """Set out to a trial of fine tuning."""
-    stage, entered, cause, _, _, _, correction, _, findings = plan
-    return Plan(stage, entered, cause, goal, MOVING, _setting_out(time), correction, tuning, findings)
-
-
-@compiled
-def _with_goal(plan: Plan, goal: Pair) -> Plan:
-    """Another goal for the same move."""
-    stage, entered, cause, _, hold, progress, correction, tuning, findings = plan
-    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
-
-
-@compiled
-def _with_correction(plan: Plan, correction: Correction) -> Plan:
-    stage, entered, cause, goal, hold, progress, _, tuning, findings = plan
-    return Plan(stage, entered, cause, goal, hold, progress, correction, tuning, findings)
-
-
-@compiled
-def _averaging_from(progress: Progress, begins: float) -> Progress:
-    """Begin the mean at a time, s."""
-    return Progress(progress.moving, progress.arrived, progress.nearest, progress.nearer, begins, 0.0j, 0)
-
-
-@compiled
-def _with_arrival(progress: Progress, arrived: float) -> Progress:
-    """Args: `arrived`: time, s; NOT_YET."""
-    moving, _, nearest, nearer, averaging, total, samples = progress
-    return Progress(moving, arrived, nearest, nearer, averaging, total, samples)
-
-
-@compiled
-def _with_nearest(progress: Progress, nearest: float, since: float) -> Progress:
-    """Masses have come as near to their goal as this, rad, at a time, s."""
-    moving, arrived, _, _, averaging, total, samples = progress
-    return Progress(moving, arrived, nearest, since, averaging, total, samples)
-
-
-@compiled
-def _with_sample(progress: Progress, position: complex) -> Progress:
-    """One sample more in the mean."""
-    moving, arrived, nearest, nearer, averaging, total, samples = progress
-    return Progress(moving, arrived, nearest, nearer, averaging, total + position, samples + 1)
-
-
-@compiled
-def _with_stall(findings: Findings, stalled: bool) -> Findings:
-    """One sample more of the friction stage."""
-    saturated, residual, objective, short, driven, before = findings
-    return Findings(saturated, residual, objective, short, driven + 1, before + (1 if stalled else 0))
-
-
-@compiled
-def _with_targets(findings: Findings, saturated: bool, residual: float) -> Findings:
-    """What the targets leave, kg m."""
-    _, _, objective, short, driven, stalled = findings
-    return Findings(saturated, residual, objective, short, driven, stalled)
-
-
-@compiled
-def _with_objective(findings: Findings, objective: float) -> Findings:
-    """The mean amplitude at the present place, m."""
-    saturated, residual, _, short, driven, stalled = findings
-    return Findings(saturated, residual, objective, short, driven, stalled)
-
-
-@compiled
-def _with_short(findings: Findings, short: float) -> Findings:
-    """The distance at which friction was left to hold a mass short of its goal, rad."""
-    saturated, residual, objective, _, driven, stalled = findings
-    return Findings(saturated, residual, objective, short, driven, stalled)
+    return with_findings(plan, with_objective(plan.findings, objective))

@@ -87,15 +87,20 @@ def tried_remedies(
 ) -> tuple[Remedied, ...]:
     """What the remedies of a balancer come to, the best first.
 
-    Of one kind, alternatives are tried from the smallest change on until one meets, or fewer devices meet
-    than before.  Where none meets by itself, the best two together follow.
+    Of one kind, alternatives are tried from the smallest change on until one meets, none meets at all, or
+    fewer devices meet than before; where no device of the scene as it is does, until one kind meets.  Where
+    none meets by itself, the best two together follow.
     Args: `own`: judgement of the best settings of the scene as it is. `search`: best settings.
     """
     kinds: dict[str, list[Remedy]] = {}
     for each in balancer.remedies():
         kinds.setdefault(each.code, []).append(each)
     trial = _Trial(balancer=balancer, search=search, told=told or (lambda _: None))
-    rows = [row for some in kinds.values() for row in trial.series(some, own.fraction)]
+    rows: list[Remedied] = []
+    for some in kinds.values():
+        rows += trial.series(some, own.fraction)
+        if own.fraction.count == 0 and any(row.met for row in rows):
+            break
     if not any(row.met for row in rows):
         rows += trial.pair(rows)
     return tuple(sorted(rows, key=lambda row: row.order))
@@ -152,7 +157,8 @@ class _Trial:
                 if before is not None and each.continuous:
                     yield from self._between(before, row)
                 return
-            if row.judgement.fraction.high < (before.judgement.fraction if before else own).low:
+            fraction = row.judgement.fraction
+            if fraction.count == 0 or fraction.high < (before.judgement.fraction if before else own).low:
                 return
             before = row
 

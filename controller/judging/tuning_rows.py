@@ -54,7 +54,7 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "status": tuning.status,
         "asked": tuning.recommended.asked,
         **_judgement(tuning.recommended),
-        "settings": _plain(tuning.recommended.settings),
+        "settings": plain_settings(tuning.recommended.settings),
         "own": None if tuning.own is None else _judgement(tuning.own),
         "further_s": FURTHER,
         "longer": None
@@ -79,7 +79,7 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "tried": [
             {
                 "kind": each.candidate.trials.kind,
-                "settings": _plain(each.judgement.settings),
+                "settings": plain_settings(each.judgement.settings),
                 "fraction": each.judgement.fraction.document(),
             }
             for each in tuning.tried
@@ -106,7 +106,7 @@ def _level(level: Along) -> dict[str, Any]:
     low, middle, high = level.usable_moment
     return {
         "value": level.level,
-        "settings": _plain(level.judgement.settings),
+        "settings": plain_settings(level.judgement.settings),
         "fraction": level.judgement.fraction.document(),
         "verdict": level.judgement.verdict,
         "settling_time_s": times_of(level.judgement),
@@ -120,7 +120,8 @@ def times_of(judgement: Judgement) -> dict[str, float | None]:
     return {name: None if time is None else finite(time[0]) for name, time in times.items()}
 
 
-def _plain(settings: Settings) -> dict[str, Any]:
+def plain_settings(settings: Settings) -> dict[str, Any]:
+    """For JSON."""
     return {path: list(value) if isinstance(value, tuple) else value for path, value in settings.items()}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
@@ -25,17 +24,15 @@ from ringbalance.controller.balancer import (
     TracedRun,
     inputs_of,
     outcomes_of,
-    requirements_of,
     settles_within,
 )
-from ringbalance.controller.common_rotor import CommonRotor
+from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
 from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.judging.judge import MOST_DRAWS
-from ringbalance.controller.judging.search import searched
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
-from ringbalance.controller.liquid_ring.devices import Spread
+from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.information import loop_information
 from ringbalance.controller.liquid_ring.remedies import drawn_input, remedies_of, valves_of
@@ -52,10 +49,11 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, BalancerModel, completed_model, lacking
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
-from ringbalance.results.requirements import AT_LEAST, Requirement
+from ringbalance.results.requirements import AT_LEAST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.draws import BLOCK, run_noise
+from ringbalance.scene.loop_models import RequirementSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
@@ -73,6 +71,7 @@ class LiquidRingBalancer:
 
     options = frozenset({"flow_law", "controller", "sensor", "modelled"})
     verdict_draws = (BLOCK, MOST_DRAWS)
+    energy_kind = "energy_compression"
     watched_to_end = False
     scene: Scene
     _: KW_ONLY
@@ -82,6 +81,8 @@ class LiquidRingBalancer:
     sensor: Sensor | None = None
     modelled: Collection[str] | None = None
     to_time_limit: bool = False
+    rotors: Rotors | None = None
+    """Of drawn devices; None: their own, drawn."""
 
     def __post_init__(self) -> None:
         """Refuse what is no algorithm."""
@@ -213,7 +214,9 @@ class LiquidRingBalancer:
     def _drawn_runs(self) -> DrawnRuns:
         remade = self.flow_law is None or self.flow_law == CALIBRATED
         spread = Spread.of(self.scene, self.model, remade=remade)
-        return DrawnRuns(scene=self.scene, model=self.model, spread=spread, limit=self.limit)
+        return DrawnRuns(
+            scene=self.scene, model=self.model, spread=spread, limit=self.limit, rotors=self.rotors
+        )
 
     def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> TracedRun:
         drawn: dict[str, Any] = {"controller": self.controller}
@@ -249,42 +252,32 @@ class LiquidRingBalancer:
             unbalance=moment * abs(scene.rotor.initial_unbalance),
         )
 
-    def rotor(self) -> CommonRotor:
+    def rotor(self, number: int | None = None) -> CommonRotor:
         """See `Balancer`."""
-        rotor = self.scene.rotor
+        scene = self.scene if number is None else self._drawn_runs.device(number).scene
         return CommonRotor(
-            source=self.scene.source,
-            speed=rotor.speed,
-            influence=rotor.influence,
-            unbalance=rotor.initial_unbalance,
+            source=scene.source,
+            speed=scene.rotor.speed,
+            influence=scene.rotor.influence,
+            unbalance=scene.rotor.initial_unbalance,
             mass=None,
-            noise=self.scene.sensor.amplitude_noise,
-            limit=self.scene.controller.limit,
+            noise=scene.sensor.amplitude_noise,
+            limit=self.limit,
         )
 
-    def on_rotor(self, rotor: CommonRotor | None) -> LiquidRingBalancer:
+    def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> LiquidRingBalancer:
         """Valve-open times are rescaled to the same valve-open time per unbalance; a wrong assumption stays
         as wrong as it was. Raises: SceneError: the rotor is too slow to form a ring."""
-        if rotor is None:
-            return self
-        own, control = self.scene.rotor, self.scene.controller
-        coefficient, lag = abs(rotor.influence), -cmath.phase(rotor.influence)
-        share = coefficient / own.influence_coefficient
-        vibration = rotor.influence * rotor.unbalance
+        before, control = self.scene.rotor, self.scene.controller
+        after = rotor_like(before, rotor)
+        share = after.influence_coefficient / before.influence_coefficient
         scene = replace(
             self.scene,
-            rotor=replace(
-                own,
-                speed=rotor.speed,
-                influence_coefficient=coefficient,
-                lag_angle=lag,
-                initial_amplitude=abs(vibration),
-                initial_phase=cmath.phase(vibration),
-            ),
+            rotor=after,
             sensor=replace(
                 self.scene.sensor,
                 amplitude_noise=rotor.noise,
-                phase_noise=min(rotor.noise / abs(vibration), 1.0),
+                phase_noise=min(rotor.noise / after.initial_amplitude, 1.0),
             ),
             controller=replace(
                 control,
@@ -292,11 +285,16 @@ class LiquidRingBalancer:
                 proportional=control.proportional / share,
                 fine_below=control.fine_below * share,
                 assumed_influence_coefficient=control.assumed_influence_coefficient * share,
-                assumed_lag_angle=wrapped(control.assumed_lag_angle - own.lag_angle + lag),
+                assumed_lag_angle=wrapped(control.assumed_lag_angle - before.lag_angle + after.lag_angle),
             ),
+            requirement=RequirementSettings(fraction=self.scene.requirement.fraction),
         )
         check_ring(scene)
-        return replace(self, scene=scene)
+        return replace(self, scene=scene, rotors=rotors)
+
+    def sampling_time(self) -> float:
+        """See `Balancer`."""
+        return self.scene.controller.period
 
     def span(self) -> float:
         """The scene's time limit, s."""
@@ -306,11 +304,6 @@ class LiquidRingBalancer:
         """See `Balancer`."""
         run = replace(self.scene.run, time_limit=span)
         return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
-
-    def advised(self) -> tuple[LiquidRingBalancer, Mapping[str, Any]]:
-        """With the settings that serve most of a few drawn devices."""
-        changes = searched(self)
-        return replace(self, scene=with_values_at(self.scene, changes)), changes
 
     def recommend(
         self,
@@ -329,18 +322,6 @@ class LiquidRingBalancer:
     def quantities(self) -> tuple[Quantity, ...]:
         """Those of its calibration; see `Balancer`."""
         return calibrate(self.scene).rows().quantities
-
-    def requirements(self) -> tuple[Requirement, ...]:
-        """See `Balancer`."""
-        wanted, rotor = self.scene.requirement, self.scene.rotor
-        reach = next(each.value for each in self.quantities() if each.key == "reach")
-        return requirements_of(
-            self,
-            unbalance=wanted.correction_moment or abs(rotor.initial_unbalance),
-            reach=reach or 0.0,
-            residual=wanted.residual or self.scene.controller.limit,
-            settling_time=wanted.settling_time or self.span(),
-        )
 
     def rows(self, run: Simulation) -> Rows:
         """See `Balancer`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, nominal_law
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -16,6 +18,7 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import deviates, quantiles
+from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import (
     NORMAL_95,
@@ -129,9 +132,18 @@ class Device:
 
 
 def devices(
-    scene: Scene, model: BalancerModel, spread: Spread, numbers: Sequence[int], *, seed: int
+    scene: Scene,
+    model: BalancerModel,
+    spread: Spread,
+    numbers: Sequence[int],
+    *,
+    seed: int,
+    rotors: Rotors | None = None,
 ) -> Callable[[int], Device]:
-    """The device at a place among numbers, made when it is asked for."""
+    """The device at a place among numbers, made when it is asked for.
+
+    Args: `rotors`: that the devices run on; default their own, drawn.
+    """
     places = {name: quantiles(name, numbers, seed=seed) for name in spread.names}
     normal = {name: deviates(name, numbers, seed=seed) / NORMAL_95 for name in spread.names}
 
@@ -139,6 +151,8 @@ def devices(
         z = {name: float(each[place]) for name, each in normal.items()}
         q = {name: float(each[place]) for name, each in places.items()}
         drawn, clipped = _drawn(scene, spread, z, q)
+        if rotors is not None:
+            drawn = replace(drawn, rotor=rotor_like(drawn.rotor, rotors(numbers[place])))
         law, speed = _law(drawn, model, spread, z, q)
         return Device(
             number=numbers[place],
@@ -151,6 +165,19 @@ def devices(
         )
 
     return made
+
+
+def rotor_like(own: Rotor, rotor: CommonRotor) -> Rotor:
+    """A scene's rotor with another's speed, influence coefficient and vibration before balancing."""
+    vibration = rotor.influence * rotor.unbalance
+    return replace(
+        own,
+        speed=rotor.speed,
+        influence_coefficient=abs(rotor.influence),
+        lag_angle=-cmath.phase(rotor.influence),
+        initial_amplitude=abs(vibration),
+        initial_phase=cmath.phase(vibration),
+    )
 
 
 def _drawn(

@@ -14,6 +14,7 @@ import numpy as np
 from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.balancer import FURTHER, Draws, Outcomes, Settings
+from ringbalance.controller.common_rotor import Rotors
 from ringbalance.controller.liquid_ring.devices import Device, Spread, devices
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_plan import LoopPlan, Records
@@ -61,6 +62,8 @@ class DrawnRuns:
     spread: Spread
     limit: float
     """Amplitude to come below, m, whatever the controller rests at."""
+    rotors: Rotors | None = None
+    """Of the devices; None: their own, drawn."""
 
     @cached_property
     def terms(self) -> tuple[str, ...]:
@@ -129,7 +132,8 @@ class DrawnRuns:
         """By number; the last ones are kept, as a search runs the same again and again."""
 
         def made(number: int) -> Device:
-            return devices(self.scene, self.model, self.spread, (number,), seed=self.scene.run.seed)(0)
+            seed, rotors = self.scene.run.seed, self.rotors
+            return devices(self.scene, self.model, self.spread, (number,), seed=seed, rotors=rotors)(0)
 
         return lru_cache(_KEPT)(made)
 

@@ -61,9 +61,9 @@ _VARY: Final = frozenset({AMPLITUDE, PHASE})
 def remedies_of(scene: Scene, model: BalancerModel) -> tuple[Remedy, ...]:
     """Every change by itself, those of one kind with the smallest first."""
     return (
+        *_of_crest(scene, model),
         *_of_bore(scene, model),
         *_of_valve(scene),
-        *_of_crest(scene, model),
         Remedy(code="period", changes={"controller.period": scene.controller.period / 2}),
         *_of_limit(scene),
     )

@@ -40,8 +40,8 @@ def _run(_own: Record, evidence: Record) -> Record:
     varies = max(run["speed_rad_s"]) > min(run["speed_rad_s"])
     ends = np.interp([stage["end_s"] for stage in run["stages"]], run["time_s"], run["amplitude_m"])
     return {
-        "over_speed": run_up(run, locked, evidence["rotor"]) if varies else None,
-        "over_time": over_time(run, locked),
+        "over_speed": run_up(run, locked, evidence["rotor"], evidence["drawn"]) if varies else None,
+        "over_time": over_time(run, locked, evidence["drawn"]),
         "stages": [{"place": place, "amplitude_m": float(end)} for place, end in enumerate(ends)],
     }
 
@@ -155,7 +155,6 @@ SECTIONS: Final = (
 BALANCER: Final = "eccentric_mass"
 RIVAL: Final = "driven_masses_small"
 """Masses of a size for the liquid-ring paper's rotor."""
-_RUNS: Final = 3
 _SPAN: Final = 20.0
 """s compared at most: either balances the rotor within a few seconds or not at all."""
 
@@ -170,8 +169,8 @@ def _compared(work: Work) -> Record | None:
         return None
     rival = _shortened(load_scene(bundled_scene(RIVAL)))
     try:
-        ring = balancer_of(_shortened(work.scene), flow_law=work.calibration.flow_law)
-        found = compare(ring, balancer_of(rival), runs=_RUNS)
+        ring = balancer_of(_shortened(work.scene))
+        found = compare(ring, balancer_of(rival))
     except SceneError as error:
         # Without folders: the evidence is the same wherever the files stand.
         faults = (replace(fault, file=PurePath(fault.file).name) for fault in error.faults)

@@ -50,7 +50,7 @@ def pressure_figure(
         handles, labels = share.get_legend_handles_labels()
         figure_of(axes).legend(handles, labels, loc="upper left", ncols=2, borderaxespad=0.0, borderpad=0.1)
 
-    return draw("pressure-choice", paint, columns=0, height=5.6)
+    return draw("pressure-choice", paint, columns=0, height=4.4)
 
 
 def _shares(panel: Axes, pressure: FloatArray, shares: Sequence[Record], asked: float) -> None:

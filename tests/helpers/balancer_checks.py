@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.balancer import AS_GIVEN, Balancer, Draws, Outcomes, balancer_of
-from ringbalance.results.requirements import MET, MISSED, OPEN
 from ringbalance.scene import SceneError
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.units import DIMENSIONS
@@ -102,16 +101,6 @@ def only_asked_for_runs_are_kept(balancer: Balancer) -> None:
     assert balancer.run({}, Draws.first(1, devices=False)).traced == ()
 
 
-def its_requirements_are_judged_by_its_reach_and_its_run(balancer: Balancer) -> None:
-    moment, *_ = requirements = {each.quantity: each for each in balancer.requirements()}.values()
-    reach = next(each for each in balancer.quantities() if each.key == "reach")
-    assert moment.achieved == pytest.approx(reach.value)
-    assert {each.verdict for each in requirements} <= {MET, MISSED, OPEN}
-    (settled,) = balancer.run({}, AS_GIVEN).settled
-    settling = next(each for each in requirements if each.quantity == "settling time")
-    assert (settling.achieved is not None) == settled
-
-
 def its_own_rotor_is_the_common_one(balancer: Balancer) -> None:
     rotor = balancer.rotor()
     again = balancer.on_rotor(rotor).rotor()
@@ -160,7 +149,6 @@ CHECKS: tuple[Check, ...] = (
     a_run_answers_what_its_row_says,
     a_row_does_not_depend_on_the_trace,
     only_asked_for_runs_are_kept,
-    its_requirements_are_judged_by_its_reach_and_its_run,
     its_own_rotor_is_the_common_one,
     a_span_is_what_was_asked_for,
     it_survives_a_pickle,

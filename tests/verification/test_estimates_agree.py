@@ -41,7 +41,7 @@ def check(scene: Scene, calibration: Calibration) -> None:
 def check_comparison(scene: Scene, calibration: Calibration) -> None:
     """`compare` reports for the scene whose rotor it takes what holds for it as tuned."""
     ring = balancer_of(scene, flow_law=calibration.flow_law)
-    comparison = compare(ring, ring, runs=1)
+    comparison = compare(ring, ring, most=1)
     tuned = comparison.sides[0].scene
     assert isinstance(tuned, Scene)
     assert comparison.to_dict()["models_used"][0] == [asdict(used) for used in models_used(tuned)]

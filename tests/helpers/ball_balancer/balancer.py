@@ -27,15 +27,13 @@ from ringbalance.controller.balancer import (
     inputs_of,
     one_by_one,
     outcomes_of,
-    requirements_of,
     settles_within,
 )
-from ringbalance.controller.common_rotor import CommonRotor, rotor_fault
+from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.drawn_input import DrawnInput, drawn_key
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.trials import Trials, scaled
-from ringbalance.results.requirements import Requirement
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
@@ -89,11 +87,12 @@ class BallBalancer:
 
     options = frozenset[str]()
     verdict_draws = (16, 32)
+    energy_kind = "energy_none"
     watched_to_end = True
     models_used: tuple[Any, ...] = ()
 
-    def __init__(self, scene: BallScene) -> None:
-        self.scene = scene
+    def __init__(self, scene: BallScene, rotors: Rotors | None = None) -> None:
+        self.scene, self.rotors = scene, rotors
 
     def inputs(self) -> tuple[Input, ...]:
         """Those of the scene."""
@@ -142,7 +141,8 @@ class BallBalancer:
         }
         one, other = random.uniform(-math.pi, math.pi, 2).tolist()
         balls = replace(scene.balls, initial_angle=(one, other))
-        return with_values_at(replace(scene, balls=balls), values)
+        device = with_values_at(replace(scene, balls=balls), values)
+        return device if self.rotors is None else _on(device, self.rotors(number))
 
     def run_all(
         self,
@@ -183,9 +183,9 @@ class BallBalancer:
         """Other balls."""
         return BallBalancer(scene_as(BallScene, scene))
 
-    def rotor(self) -> CommonRotor:
-        """The scene's."""
-        rotor = self.scene.rotor
+    def rotor(self, number: int | None = None) -> CommonRotor:
+        """The scene's, or a device's."""
+        rotor = (self.scene if number is None else self._drawn(self.scene, number)).rotor
         return CommonRotor(
             source=self.scene.source,
             speed=rotor.speed,
@@ -196,27 +196,17 @@ class BallBalancer:
             limit=self.scene.vibration.limit,
         )
 
-    def on_rotor(self, rotor: CommonRotor | None) -> BallBalancer:
+    def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> BallBalancer:
         """Raises: SceneError: below the critical speed the balls would roll to the heavy side."""
-        if rotor is None:
-            return self
         if rotor.influence.real >= 0:
             problem = "below the critical speed balls roll to the heavy side"
             raise rotor_fault(self.scene, "rotor.speed", problem, "a lag angle beyond 90 deg")
-        return BallBalancer(
-            replace(
-                self.scene,
-                rotor=replace(
-                    self.scene.rotor,
-                    speed=rotor.speed,
-                    influence_coefficient=abs(rotor.influence),
-                    lag_angle=-cmath.phase(rotor.influence),
-                    unbalance=abs(rotor.unbalance),
-                    phase=cmath.phase(rotor.unbalance),
-                ),
-                vibration=replace(self.scene.vibration, limit=rotor.limit),
-            )
-        )
+        scene = _on(self.scene, rotor)
+        return BallBalancer(replace(scene, vibration=replace(scene.vibration, limit=rotor.limit)), rotors)
+
+    def sampling_time(self) -> float:
+        """Nothing is measured."""
+        return 0.0
 
     def span(self) -> float:
         """The time limit, s."""
@@ -224,11 +214,7 @@ class BallBalancer:
 
     def lasting(self, span: float) -> BallBalancer:
         """The same for so long."""
-        return BallBalancer(replace(self.scene, run=replace(self.scene.run, time_limit=span)))
-
-    def advised(self) -> tuple[BallBalancer, Mapping[str, float]]:
-        """No formula recommends anything."""
-        return self, {}
+        return BallBalancer(replace(self.scene, run=replace(self.scene.run, time_limit=span)), self.rotors)
 
     def recommend(
         self,
@@ -245,17 +231,6 @@ class BallBalancer:
         reach = 2 * self.scene.balls.mass * self.scene.balls.race_radius
         return (Quantity(key="reach", name="usable moment in any direction", unit="kg m", value=reach),)
 
-    def requirements(self) -> tuple[Requirement, ...]:
-        """Those that any balancer has."""
-        scene, (reach,) = self.scene, self.quantities()
-        return requirements_of(
-            self,
-            unbalance=scene.rotor.unbalance,
-            reach=reach.value or 0.0,
-            residual=scene.vibration.limit,
-            settling_time=self.span(),
-        )
-
     def rows(self, run: BallRun) -> Rows:
         """Its amplitude and how it ended."""
         return _rows(run.status, run.settled, float(run.amplitude[-1]))
@@ -263,6 +238,20 @@ class BallBalancer:
     def history(self, run: BallRun) -> Mapping[str, Sequence[Any]]:
         """Amplitude over time."""
         return {"time_s": run.time.tolist(), "amplitude_m": run.amplitude.tolist()}
+
+
+def _on(scene: BallScene, rotor: CommonRotor) -> BallScene:
+    return replace(
+        scene,
+        rotor=replace(
+            scene.rotor,
+            speed=rotor.speed,
+            influence_coefficient=abs(rotor.influence),
+            lag_angle=-cmath.phase(rotor.influence),
+            unbalance=abs(rotor.unbalance),
+            phase=cmath.phase(rotor.unbalance),
+        ),
+    )
 
 
 def _rows(status: str, settled: bool, amplitude: float | None = None) -> Rows:

@@ -209,9 +209,8 @@ def test_simulate_and_tune_refuse_to_call_it_settled(
     assert (found["settled"], found["outcome"], found["settling_time_s"]) == (False, "drifting", None)
     assert main(["tune", file, "--law", law, "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
-    assert found["fraction_settled"] == 0.0
-    assert found["fraction_drifted"] == 1.0
-    assert found["reachable"] is False
+    assert found["fraction"]["value"] == 0.0
+    assert found["ended"] == {"drifting": found["fraction"]["of"]}
     assert found["gas_line"]["holds"] is False
     assert all(end["smallest_correction_m"] is None for end in found["gas_line"]["ends"])
 

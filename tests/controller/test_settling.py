@@ -148,9 +148,9 @@ def test_the_verdict_follows_the_loop_factor(scene: Scene, model: BalancerModel)
 
 
 def test_a_gain_that_is_too_high_is_answered_with_a_number(scene: Scene, calibrated: BalancerModel) -> None:
-    # The paper's gain on a bore that was chosen for k = 50: the calibrated law is three times as fast.
-    run = simulate(noisy(scene, time_limit=20.0), calibrated)
-    assert run.verdict is RunVerdict.HOVERING
+    rate = factor(scene, calibrated).rate
+    run = simulate(noisy(scene, time_limit=20.0, proportional=2.5 / rate), calibrated)
+    assert run.verdict is RunVerdict.UNSTABLE
     gain = 1.0 / run.loop.rate
     assert f"to {gain * 1e-6:.3g} s/um" in run.status
     again = simulate(noisy(scene, time_limit=20.0, proportional=gain), calibrated)

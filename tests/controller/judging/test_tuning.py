@@ -118,8 +118,8 @@ def test_what_cannot_settle_is_not_run() -> None:
     scene = bundled("liquid_ring_paper", rotor__initial_vibration={"amplitude": "20 um", "phase": "90 deg"})
     (outcomes,) = balancer_of(scene).run_all([{}], Draws.block(0, 8, whole=False))
     assert set(outcomes.ended) == {"capacity_exceeded"}
-    left = (outcomes.unbalance - outcomes.usable_moment) * scene.rotor.influence_coefficient
-    np.testing.assert_allclose(outcomes.final_amplitude, left, rtol=0.1)
+    assert np.all(outcomes.final_amplitude > scene.controller.limit)
+    assert np.all(np.isnan(outcomes.energy))
 
 
 def test_the_search_finds_the_settings_of_another_balancer() -> None:

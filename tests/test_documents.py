@@ -26,7 +26,7 @@ PAPER, DRIVEN = (str(rb.bundled_scene(name)) for name in ("liquid_ring_paper", "
 MEASUREMENTS: Final = Path(PAPER).parent / "measurements"
 MODELS: Final = "rungs"
 BY_NAME: Final = {
-    *("tube.terms", "tube.uncertainty_parts", "fill_ratio", "tuned", "gain", "outcomes"),
+    *("tube.terms", "tube.uncertainty_parts", "fill_ratio", "settings", "gain", "outcomes"),
     *("held", "pulls", "times"),
     *(f"quantities.{MODELS}.{each}" for each in ("models", "work", "fixed_work")),
     f"times.{MODELS}",

@@ -35,7 +35,7 @@ _SAME_FILL: Final = 1e-8
 _ROUNDING: Final = 1e-12
 _SCANS: Final = 17, 6
 """Places of a scan, and number of finer ones: 1e-8 of a fill is left."""
-_SCANS_OF_ONE: Final = 257, 2
+_SCANS_OF_ONE: Final = 257, 3
 """The same of a single row, for which few calls cost least."""
 Drawn = Callable[[IntArray, FloatArray], FloatArray]
 """Fill down to which the flow at a fill draws gas, of some rows."""

@@ -18,7 +18,7 @@ from ringbalance.controller.judging.search import (
     searched_along,
     top_level,
 )
-from ringbalance.controller.judging.tuning import Information, Tuning
+from ringbalance.controller.judging.tuning import BestOfKind, Information, Tuning
 from ringbalance.controller.judging.tuning_rows import LONGER, tuning_document, tuning_rows
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Presentation
@@ -62,7 +62,7 @@ def tuned(
         recommended=best,
         own=own,
         longer=longer,
-        tried=tuple(found),
+        tried=tuple(BestOfKind(kind=each.candidate.trials.kind, judgement=each.judgement) for each in found),
         along=curve,
         along_name=axis.name if axis else "",
         along_unit=axis.unit if axis else "1",

@@ -9,7 +9,7 @@ from typing import Any
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.remedies import Remedied
-from ringbalance.controller.judging.search import Along, Tried
+from ringbalance.controller.judging.search import Along
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Facts, PresentedResult
 from ringbalance.results.rows import Quantity
@@ -28,6 +28,14 @@ class Information:
     document: Mapping[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BestOfKind:
+    """The best settings of one kind of controller, on the devices of the search."""
+
+    kind: str
+    judgement: Judgement
+
+
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Tuning(PresentedResult):
     """Settings for a scene's controller, and the fraction of drawn devices that they serve."""
@@ -39,8 +47,7 @@ class Tuning(PresentedResult):
     """Of the scene's own settings on the same devices; None: it gives none."""
     longer: Judgement | None
     """Of the recommended ones, devices watched for `LONGER`; None: all are watched to the end of the run."""
-    tried: tuple[Tried, ...]
-    """The best of every kind of controller, on the devices of the search."""
+    tried: tuple[BestOfKind, ...]
     along: tuple[Along, ...] = ()
     """The best at every level of the axis that the balancer names, such as the gas pressure."""
     along_name: str = ""

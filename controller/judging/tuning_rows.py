@@ -78,7 +78,7 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         },
         "tried": [
             {
-                "kind": each.candidate.trials.kind,
+                "kind": each.kind,
                 "settings": plain_settings(each.judgement.settings),
                 "fraction": each.judgement.fraction.document(),
             }
@@ -282,7 +282,7 @@ def _along_table(tuning: Tuning) -> Table:
 def _tried_table(tuning: Tuning) -> Table:
     rows = [
         (
-            each.candidate.trials.kind.replace("_", " "),
+            each.kind.replace("_", " "),
             ", ".join(
                 f"{path} {setting_text(path, value)}" for path, value in each.judgement.settings.items()
             ),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from typing import Any, Final
 
@@ -126,6 +126,10 @@ class DrawnRuns:
     def device(self, number: int) -> Device:
         """One of the devices."""
         return self._devices(number)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is kept stays behind."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def _devices(self) -> Callable[[int], Device]:

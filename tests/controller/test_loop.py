@@ -13,6 +13,7 @@ import pytest
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
 from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
@@ -241,18 +242,20 @@ def test_a_faulty_sensor_delays_but_does_not_mislead(scene: Scene, model: Balanc
     document(run)
 
 
-def test_dipping_below_the_limit_at_the_end_is_not_settling(scene: Scene, model: BalancerModel) -> None:
+def test_a_run_within_its_limit_in_time_is_watched_until_it_has_settled(
+    scene: Scene, model: BalancerModel
+) -> None:
     settled = simulate(with_noise(scene), model)
     assert settled.settled
     assert settled.settling_time is not None
-    # The same run, cut short two periods after it has come below the limit: too few samples to say so.
-    end = settled.settling_time + 1.2
-    cut = simulate(replace(with_noise(scene), run=replace(scene.run, time_limit=end)), model)
-    assert cut.amplitude[-1] <= cut.limit
-    assert cut.outcome is Outcome.HOLD_INCOMPLETE
-    assert cut.verdict is RunVerdict.NOT_SETTLED
-    assert "raise run.time_limit" in cut.status
-    assert not cut.settled
+    after, before = (
+        simulate(replace(with_noise(scene), run=replace(scene.run, time_limit=end)), model)
+        for end in (settled.settling_time + 1.2, settled.settling_time - 0.1)
+    )
+    assert after.settling_time == settled.settling_time
+    assert after.time[-1] >= settled.settling_time + scene.controller.hold_time + FURTHER
+    assert before.outcome is Outcome.TIME_LIMIT
+    assert before.verdict is RunVerdict.NOT_SETTLED
 
 
 def test_progress_runs_to_the_end(scene: Scene, model: BalancerModel) -> None:

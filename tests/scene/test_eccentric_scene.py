@@ -46,6 +46,7 @@ RECORDS = {
     "fine_tuning": control_records.FineTuning,
     "supervisor": control_records.Supervisor,
     "run": RunSettings,
+    "requirement": scene_records.EccentricRequirement,
 }
 
 

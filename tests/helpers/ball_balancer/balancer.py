@@ -86,7 +86,7 @@ class BallBalancer:
     """
 
     options = frozenset[str]()
-    verdict_draws = (16, 32)
+    verdict_draws = (16, 64)
     energy_kind = "energy_none"
     watched_to_end = True
     models_used: tuple[Any, ...] = ()

@@ -40,7 +40,10 @@ def tuning_rows(tuning: Tuning) -> Rows:
             _along_table(tuning),
             _tried_table(tuning),
             _remedies_table("Remedies, each with its best settings", tuning.remedies),
-            _remedies_table("Valves that can be bought, each with its best settings", tuning.choices),
+            _remedies_table(
+                "Valves that can be bought, their lags assumed, each with the best settings of a coarse grid",
+                tuning.choices,
+            ),
         ),
     )
 

@@ -35,16 +35,16 @@ _LIMITS: Final = (2.0, 4.0, 6.0)
 _CRESTS: Final = (1.0, 0.96, 0.92)
 """Times the largest radius of a crest that holds the liquid."""
 _SOLD: Final = (
-    ("Festo MHE2-MS1H-3/2", 0.39e-8, 0.3, 2.0e-3),
+    ("Festo MHA2-MS1H-3/2", 0.39e-8, 0.3, 2.0e-3),
     ("SMC SY3000", 1.1e-8, 0.28, 12e-3),
-    ("Festo MHE4-MS1H-3/2", 1.57e-8, 0.3, 3.5e-3),
+    ("CKD M4GA2 R", 2.3e-8, 0.36, 20e-3),
 )
 """Solenoid valves that can be bought: C, m^3/(s Pa), b and lag, s, of the valve alone.
 
 A line and a rotary distributor behind it let less through.
-Source: C and b of the SY3000 from SMC's catalogue EUS11-83 B-UK.  Festo gives standard nominal flows, 100 and
-    400 l/min from 6 to 5 bar gauge, of which C follows by ISO 6358 with b taken as 0.3.  Switching times are
-    those of the makers' catalogues, recalled and not read.
+Source: C and b of the SY3000 from SMC's catalogue EUS11-83 B-UK, of the M4GA2 R (two positions) from CKD's
+    manual SM-P00077-A/3.  A seller's data of the MHA2 gives a standard nominal flow of 100 l/min, from 6 to 5
+    bar gauge, of which C follows by ISO 6358 with b taken as 0.3.  All lags are assumed.
 """
 _MEASURED: Mapping[str, str] = MappingProxyType(
     {

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +15,11 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.cli import main
+from ringbalance.controller.balancer import Draws
+from ringbalance.controller.judging import remedies as remedies_module
+from ringbalance.controller.judging import search as search_module
+from ringbalance.controller.judging import tune as tune_module
+from ringbalance.controller.judging.judge import judged, judged_all
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
@@ -138,6 +143,20 @@ def test_keys_of_simulate(folder: Path, printed: Any) -> None:
 
 def test_keys_of_simulate_of_eccentric_masses(printed: Any) -> None:
     compare("`simulate --json` of eccentric masses", [printed("simulate", DRIVEN)])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_devices() -> Iterator[None]:
+    """The keys are those of many."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tune_module, "judged_all", partial(judged_all, first=8, most=8))
+        patch.setattr(tune_module, "BLOCK", 8)
+        patch.setattr(remedies_module, "judged", partial(judged, most=8))
+        patch.setattr(remedies_module, "_FIRST", 4)
+        patch.setattr(search_module, "_HEATS", ((0, 4),))
+        patch.setattr(search_module, "DEVICES", 4)
+        patch.setattr(search_module, "CURVE", Draws.block(64, 4))
+        yield
 
 
 def test_keys_of_tune(folder: Path, printed: Any) -> None:

@@ -8,8 +8,8 @@ does not explain.  So every file is read otherwise too, and the likelihoods of b
 restricted to what parameters, held inputs and free unknowns leave (A their slopes), the noise of each group
 estimated again, y' what was measured as the other reading has it.  The other reading is fitted linearly from
 the scene, so that it loses a little by curvature; the given one from its optimum.  Both know that lambda
-follows from the geometry: without that, peak to peak in one file is a lambda of two.  A reading is named from a
-gain of `DECISIVE` on: of thirty readings, and one file in a hundred read wrongly, odds of 100 to 1 are left.
+follows from the geometry: without that, peak to peak in one file is a lambda of two.  A reading is named from
+a gain of `DECISIVE` on: of thirty, and one file in a hundred read wrongly, odds of 100 to 1 are left.
 Source: restricted likelihood, Harville, J. Am. Stat. Assoc. 72 (1977) 320; slopes of held inputs in
 proportion to the prediction are ours.
 """

@@ -24,8 +24,7 @@ from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 
 FEWEST: Final = 16
 MOST: Final = 64

@@ -56,8 +56,7 @@ from ringbalance.scene.draws import BLOCK, run_noise
 from ringbalance.scene.loop_models import RequirementSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
 
 _GAIN: Final = 30.0

@@ -29,7 +29,7 @@ from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stall
 from ringbalance.scene.draws import run_noise
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import with_values_at
 
 RELATIVE_ERROR: Final = 1e-4
 """Allowed to one step of a run's states: an injection then ends within 1e-6 in fill of a single run's, and

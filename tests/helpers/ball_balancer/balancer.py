@@ -38,8 +38,7 @@ from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.narrowing import scene_as
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 INSTANTS = 2001

@@ -326,7 +326,7 @@ def _eccentric_study(scene: EccentricScene) -> Record:
         "locked": locked_run(scene).to_dict(),
         "rotor": rotor_record(scene),
         "tuning": loops_document(RecommendedGains.of(scene)),
-        "drawn": amplitude_band(several.traced, start=0.0, end=scene.run.time_limit),
+        "drawn": amplitude_band(several.traced, end=scene.run.time_limit),
     }
 
 

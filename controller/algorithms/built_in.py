@@ -116,7 +116,7 @@ def show(run: Record, measurement: Measurement | None) -> None:
     run["usable"] = 0
     if measurement is not None:
         run["seen_amplitude"], run["seen_phase"] = measurement.amplitude, measurement.phase
-        if measurement.usable(needs_phase=False):
+        if math.isfinite(measurement.time) and math.isfinite(measurement.amplitude):
             run["usable"] = USABLE if math.isfinite(measurement.phase) else NO_PHASE
 
 

@@ -174,7 +174,7 @@ class EccentricMassBalancer:
     def trials(self) -> tuple[Trials, ...]:
         """The gains of the drives with their margins, where the scene's have less: no other gain decides
         whether masses settle."""
-        changes = advised(self.scene)[1]
+        changes = advised(self.scene)
         if all(loop.value <= loop.recommended for loop in RecommendedGains.of(self.scene).loops):
             return ()
         loops = Axis(name="margins of the drives", levels=(0.0, 1.0), first=(0, 1))

@@ -20,7 +20,6 @@ from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import lqr_gain, track_model
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import ComplexArray
-from ringbalance.scene.origins import with_values_at
 
 GAIN_MARGIN: Final = 2.0
 """Factor by which the recommended gains could be higher before a pole leaves the unit circle."""
@@ -100,18 +99,13 @@ class RecommendedGains:
         )
 
 
-def advised(
-    scene: EccentricScene, gains: RecommendedGains | None = None
-) -> tuple[EccentricScene, dict[str, float]]:
-    """The scene with those gains lowered that are above the recommended ones, and its drives fast enough.
-
-    Returns: The scene, and the values that changed by key, SI.
-    """
-    advice = RecommendedGains.of(scene) if gains is None else gains
-    changes = {loop.key: loop.recommended for loop in advice.loops if loop.value > loop.recommended}
-    if advice.drive_speed > scene.friction_filter.drive_speed:
-        changes["friction_filter.drive_speed"] = advice.drive_speed
-    return with_values_at(scene, changes), changes
+def advised(scene: EccentricScene) -> dict[str, float]:
+    """By key, SI, the gains that are above the recommended ones, lowered, and drives fast enough."""
+    gains = RecommendedGains.of(scene)
+    changes = {loop.key: loop.recommended for loop in gains.loops if loop.value > loop.recommended}
+    if gains.drive_speed > scene.friction_filter.drive_speed:
+        changes["friction_filter.drive_speed"] = gains.drive_speed
+    return changes
 
 
 def _regulator(scene: EccentricScene) -> _SampledLoop:

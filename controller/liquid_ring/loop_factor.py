@@ -52,11 +52,6 @@ class LoopFactor:
         """Whether a small residual grows."""
         return self.fixed and self.value is not None and self.value >= self.limit
 
-    @property
-    def lag_margin(self) -> float | None:
-        """Error of the assumed lag angle at which the residual no longer falls, acos(h/2), rad."""
-        return None if self.value is None else math.acos(min(self.value / 2.0, 1.0))
-
 
 def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any]) -> LoopFactor:
     """The loop of a scene under a law and a controller.

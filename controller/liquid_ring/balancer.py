@@ -28,7 +28,6 @@ from ringbalance.controller.balancer import (
 )
 from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
-from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
@@ -41,7 +40,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import Sensor, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
-from ringbalance.controller.trials import Trials
+from ringbalance.controller.trials import DrawnInput, Trials
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import gives_forces

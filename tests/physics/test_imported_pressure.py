@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from block_discs import sector_chamber
 
-from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
+from ringbalance.physics.pressure.loads import ImportedRing, solved_ring
 from ringbalance.scene.chamber_file.record import CellKind
 
 _RHO, _OMEGA, _A, _ANGLE, _WIDTH = 900.0, 150.0, 0.77, np.pi / 2, 1.3

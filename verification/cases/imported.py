@@ -22,7 +22,7 @@ from ringbalance.mesh.wall_integrals import (
 )
 from ringbalance.physics.convergence import gci
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
-from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
+from ringbalance.physics.pressure.loads import ImportedRing, solved_ring
 from ringbalance.physics.pressure.solve import quadratic_basis, side, solve_on
 from ringbalance.reduced_model.chamber.values import chamber_closed_forms
 from ringbalance.scene.arrays import FloatArray

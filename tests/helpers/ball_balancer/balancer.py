@@ -30,10 +30,9 @@ from ringbalance.controller.balancer import (
     settles_within,
 )
 from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
-from ringbalance.controller.drawn_input import DrawnInput, drawn_key
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Tuning
-from ringbalance.controller.trials import Trials, scaled
+from ringbalance.controller.trials import DrawnInput, Trials, drawn_key, scaled
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray

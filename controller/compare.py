@@ -14,10 +14,10 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
-from ringbalance.controller.common_rotor import CommonRotor, Rotors, vibrating
 from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.judging.tuning_rows import plain_settings, setting_text
+from ringbalance.controller.rotor import CommonRotor, Rotors, vibrating
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.proportion import Proportion
 from ringbalance.results.result import Result, Rows, Table

@@ -1,6 +1,7 @@
 """A finished run as the JSON document that scripts rely on, as a table of its histories, and for a person.
 
 Where a scene does not give its gas line, whole runs at both ends of the default range stand beside it.
+`conventions` has the run in the quantities and units of balancing shops and of operators of machines.
 """
 
 from __future__ import annotations

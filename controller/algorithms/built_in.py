@@ -203,7 +203,7 @@ def target_vector_step(loop: Record, run: Record) -> None:
     if run.seen_amplitude <= loop.rest_limit:
         run.resting, run.integral, run.before_time = 1, 0.0, math.inf
         return
-    wanted, run.integral = vector_gas_time(
+    wanted, run.integral = _vector_gas_time(
         run.seen_amplitude,
         run.seen_phase,
         run.time,
@@ -226,7 +226,7 @@ def target_vector_step(loop: Record, run: Record) -> None:
 
 
 @in_place
-def vector_gas_time(
+def _vector_gas_time(
     amplitude: float,
     phase: float,
     time: float,

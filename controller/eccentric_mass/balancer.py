@@ -27,7 +27,6 @@ from ringbalance.controller.balancer import (
     outcomes_of,
     settles_within,
 )
-from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device, on_rotor
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
@@ -49,6 +48,7 @@ from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
+from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.trials import MEASURE_INPUT, Axis, DrawnInput, Trials, drawn_key
 from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows

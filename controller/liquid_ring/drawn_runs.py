@@ -14,11 +14,11 @@ import numpy as np
 from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.balancer import FURTHER, Draws, Outcomes, Settings
-from ringbalance.controller.common_rotor import Rotors
 from ringbalance.controller.liquid_ring.devices import Device, Spread, devices
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_plan import LoopPlan, Records
 from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING, MomentTable
+from ringbalance.controller.rotor import Rotors
 from ringbalance.controller.simulation import Outcome
 from ringbalance.controller.terms import check_settings, dynamics_of, run_models, terms_modelled
 from ringbalance.physics.gas import compression_work

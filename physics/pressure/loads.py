@@ -1,4 +1,10 @@
-"""What the pressure in one chamber adds up to: volume, moment, wall pressure, force and torque on walls."""
+"""What the pressure in one chamber adds up to: volume, moment, wall pressure, force and torque on walls.
+
+In an imported chamber it is solved here: laplace(p) = 2 rho omega^2 in the liquid, p = 0 on the free surface
+and n . grad p = rho omega^2 r e_r . n on walls, by quadratic tetrahedra on a mesh that follows the surface.
+The exact pressure is known, rho omega^2 (r^2 - a^2)/2; what the elements leave of it is the error of the
+discretisation.  What the facets of a wall leave of a smooth wall is estimated apart.
+"""
 
 from __future__ import annotations
 

@@ -29,9 +29,9 @@ from ringbalance.controller.balancer import (
     outcomes_of,
     settles_within,
 )
-from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Tuning
+from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
 from ringbalance.controller.trials import DrawnInput, Trials, drawn_key, scaled
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity

@@ -155,7 +155,7 @@ class Mutation:
 
 @dataclass(frozen=True, kw_only=True)
 class _Study:
-    """The function that computes a case, in place of a `case.py`."""
+    """The function that computes a case of the program's."""
 
     of: Annotated[str, Pattern(r"[a-z0-9_]+(\.[a-z0-9_]+){2,}", "folder.module.function")]
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -189,7 +189,7 @@ class CaseDefinition:
     equations: tuple[Text, ...] = ()
     reference: _ReferenceText
     study: _Study | None = None
-    """What computes it where the folder has no `case.py`."""
+    """What computes it; a user's own case has a `case.py`."""
     judged_on: Literal["scene", "paper"] = "scene"
     """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
     shape: Literal["any", "sector"] = "any"

@@ -24,7 +24,7 @@ from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
-from ringbalance.verification.cases.measured_laminar_tubes.case import CALIBRATING
+from ringbalance.verification.cases.measured import CALIBRATING
 from ringbalance.verification.catalogue import case_code, load_case
 from ringbalance.verification.navier_stokes.rotating_section import (
     DuctMesh,

@@ -159,7 +159,7 @@ def _coefficients(*, kl: float, s: float, inertia: float) -> Coefficients:
     return Coefficients(inertia=inertia, viscosity=1.0, rotation=rotation)
 
 
-def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> _March:
+def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps: int) -> FloatArray:
     """The same in time, from the flow without inertia and a disturbance of one per cent.
 
     It finds what a steady solution leaves out where that is unstable; flow is alike along the tube.
@@ -170,6 +170,7 @@ def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps
     div u = 0, N is convection and ' the step before.  One set of factors serves all steps.  Stable while a
     step carries flow through less than about a third of a cell.
     Args: `step`: dt over d^2/nu.
+    Returns: G of each step.
     Raises: ArithmeticError: the flow grew without bound; the step is too long.
     """
     coefficients, start = _coefficients(kl=kl, s=s, inertia=1.0), _disturbed(system, kl, s)
@@ -190,7 +191,7 @@ def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps
         now[free] = change + found[i] * bordering
         if not np.isfinite(found[i]) or np.abs(now).max() > 1e12:
             raise ArithmeticError("the flow grew without bound: take shorter steps")
-    return _March(gradients=found)
+    return found
 
 
 def _disturbed(system: FlowSystem, kl: float, s: float) -> FloatArray:
@@ -228,18 +229,6 @@ def solve_section_without_inertia(*, system: FlowSystem, rotation_reynolds: floa
 def friction_ratio(solution: FlowSolution) -> float:
     """F = G/32, the pressure gradient over that of the tube at rest at the same flow rate."""
     return solution.driving_gradient / POISEUILLE_GRADIENT
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _March:
-    """A flow at constant flow rate over equal steps."""
-
-    gradients: FloatArray
-    """G of each step."""
-
-    def mean_gradient(self) -> float:
-        """Mean of G over the second half of the steps."""
-        return float(np.mean(self.gradients[-round(self.gradients.size / 2) :]))
 
 
 def _mass(system: FlowSystem) -> Any:

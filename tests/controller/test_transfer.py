@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from adaptive_transfer import adaptive_ode
 
 from ringbalance import bundled_scene, load_scene
 from ringbalance.reduced_model.injection.dynamics import Event
@@ -16,7 +17,6 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.reference.transfers import (
     Drive,
     Integrator,
-    adaptive_ode,
     closed_form,
     explicit_segments,
     marched,

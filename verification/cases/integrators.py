@@ -1,6 +1,7 @@
-"""One operation under a flow law by every integrator: the program's march, Eq. 20's segments, adaptive steps.
+"""One operation under a flow law by the program's march and by Eq. 20's segments.
 
-Laws with exact solutions: the paper's, and one without its parabola in time.  Near a stall u goes like the
+Exact are the closed form of the paper's law, and for any other one the time t = (V/S) int dx/u to a fill x.
+Near a stall u goes like the
 square root of the distance d: u = c sqrt(d), and with kappa = (S/V) c dt one segment takes d to
 d - kappa sqrt(d).  The exact flow stalls after tau = 2 sqrt(d)/((S/V) c).  A segment stays on its side of
 the stall only while kappa <= sqrt(d), which is dt <= tau/2: however short the segments, the last ones are too
@@ -12,12 +13,14 @@ steps end in the cycle d = +-kappa^2/4, in which that slope is zero, so that eve
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
+from scipy.integrate import quad
 
 from ringbalance.reduced_model.law.flow_law import Flow
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
@@ -32,7 +35,6 @@ from ringbalance.verification.evidence import (
     NotRunError,
     Reference,
     Series,
-    Table,
     as_found,
     figure,
     from_half_width,
@@ -41,11 +43,9 @@ from ringbalance.verification.finite_elements import OrderStudy
 from ringbalance.verification.reference.transfers import (
     Drive,
     Integrator,
-    adaptive_ode,
     closed_form,
     explicit_segments,
     marched,
-    paper_drive,
 )
 
 _SHARE: Final = 0.9
@@ -59,15 +59,6 @@ _BELOW_STALL: Final = 0.6
 """Gas pressures in units of the one that empties a chamber."""
 _KINK: Final = 0.6
 """Fill, in units of the largest, below which the kinked law slows down."""
-_WAYS: Final[Mapping[str, Integrator]] = {
-    "closed form": closed_form,
-    "adaptive, 1e-5": adaptive_ode(tolerance=1e-5),
-    "adaptive, 1e-8": adaptive_ode(tolerance=1e-8),
-    "adaptive, 1e-11": adaptive_ode(tolerance=1e-11),
-    "Eq. 20, 16 segments": explicit_segments(16),
-    "Eq. 20, 128 segments": explicit_segments(128),
-    "Eq. 20, 1024 segments": explicit_segments(1024),
-}
 _SEGMENTS: Final = (8, 16, 32, 64, 128)
 _PHASES: Final = np.linspace(1.0, 1.3, 31)
 """Durations, in units of the time to the stall: each lets the segments meet the stall differently."""
@@ -78,7 +69,15 @@ _CYCLES: Final = 5
 
 
 def _from_full(law: PaperLaw, gas_pressure: float) -> Drive:
-    return paper_drive(law, gas_pressure=gas_pressure, fill=law.max_fill_ratio, total=law.max_fill_ratio)
+    """One chamber that gives liquid away, its tube empty."""
+    return Drive(
+        law=law,
+        fill=law.max_fill_ratio,
+        total=law.max_fill_ratio,
+        exchange_rate=law.tube_area / law.chamber_volume,
+        gas_pressure=gas_pressure,
+        primed=False,
+    )
 
 
 def _end(drive: Drive) -> float:
@@ -162,7 +161,7 @@ def _segments_for(drive: Drive, duration: float, tolerance: float) -> float:
 
 
 def orders(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Every integrator on one operation, and Eq. 20's segments into a stall."""
+    """The march on one operation, and Eq. 20's segments into a stall."""
     law, march = paper_law(scene), marched(scene.tube)
     empties = stall_pressure(
         disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
@@ -173,50 +172,43 @@ def orders(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     duration = _SHARE * _end(long)
     t, fine = (np.linspace(0, duration, count + 1)[1:] for count in (20, _INSTANTS))
     stalls = march(used_low, np.array([2 * _end(low)])).event_time
-    _, study = _by_segments(long, duration, _COUNTS[1:-1], frozen=defect == "frozen_velocity")
-    kinked = replace(long, law=_SlowedLaw(law, _kinked))
+    kinked = _KinkedLaw(law)
+    path = march(replace(used, law=kinked), t).fill
     stalled, longest, drawn = _stall_study(low, law, spoiled=defect == "stall_rate_off")
     return Evidence(
         found=as_found(
-            march_error=_difference(march(used, fine).fill, closed_form(long, fine).fill),
+            march_error=np.max(np.abs(march(used, fine).fill - closed_form(long, fine).fill)),
             stall_error=1.0 if stalls is None else abs(stalls / _end(low) - 1),
-            moved_error=_moved_error(march, long, duration),
-            explicit_order=study.settled_order,
-            kinked_difference=_difference(
-                march(kinked, t).fill, adaptive_ode(tolerance=1e-11)(kinked, t).fill
-            ),
-            tapered_march=_tapered_error(long, law, t, march),
-            tapered_adaptive=_tapered_error(long, law, t, adaptive_ode(tolerance=1e-10)),
+            kinked_difference=_off_in_fill(replace(long, law=kinked), t, path),
             **stalled,
         ),
         numbers={"longest_for_per_mille": longest, "time_to_stall": _end(low)},
         series=(drawn,),
-        tables=(_side_by_side(march, long, law, duration),),
-        convergence=(study.table("fill by explicit segments, relative error", 1.0),),
     )
 
 
-def _difference(fill: FloatArray, other: FloatArray) -> float:
-    return float(np.max(np.abs(fill - other)))
+def _off_in_fill(drive: Drive, time: FloatArray, fill: FloatArray) -> float:
+    """Largest error of falling fills at instants, by the exact time (V/S) int dx/u to each."""
 
+    def slowness(x: float) -> float:
+        return 1 / (drive.exchange_rate * float(drive.flow(x).velocity))
 
-def _moved_error(march: Integrator, drive: Drive, duration: float) -> float:
-    """S times the integral of u along the march's own path, by Gauss's rule in time."""
-    abscissa, weight = np.polynomial.legendre.leggauss(20)
-    t = duration * (1 + abscissa) / 2
-    path = march(drive, np.append(t, duration))
-    passed = drive.exchange_rate * duration / 2 * float(weight @ drive.flow(path.fill[:-1]).velocity)
-    return abs(passed / (drive.fill - float(path.fill[-1])) - 1)
+    cuts = [drive.fill, *fill.tolist()]
+    kink = [_KINK * drive.law.max_fill_ratio]
+    steps = [
+        quad(slowness, low, high, points=kink if low < kink[0] < high else None, epsabs=0, epsrel=1e-12)[0]
+        for high, low in pairwise(cuts)
+    ]
+    speed = drive.exchange_rate * drive.flow(fill).velocity
+    return float(np.max(np.abs((np.cumsum(steps) - time) * speed)))
 
 
 @dataclass(frozen=True)
-class _SlowedLaw:
-    """The paper's law, slower in the share of its velocity that a function of the fill gives."""
+class _KinkedLaw:
+    """The paper's law, slower in proportion to the fill once that is below a kink; continuous, not smooth."""
 
     base: PaperLaw
-    share: Callable[[FloatArray, float], FloatArray]
-    """From x of the driven chamber and the largest x."""
-    name: str = "slowed"
+    name: str = "kinked"
 
     @property
     def max_fill_ratio(self) -> float:
@@ -226,66 +218,8 @@ class _SlowedLaw:
     def evaluate(self, **asked: Any) -> Flow:
         """As the paper's law, slowed."""
         flow = self.base.evaluate(**asked)
-        share = self.share(np.asarray(asked["fill_ratio"], dtype=np.float64), self.max_fill_ratio)
-        return replace(flow, velocity=flow.velocity * share)
-
-
-def _kinked(fill_ratio: FloatArray, largest: float) -> FloatArray:
-    """Slower in proportion to the fill once that is below a kink; continuous, not smooth."""
-    return np.asarray(np.minimum(1.0, 0.5 + 0.5 * fill_ratio / (_KINK * largest)))
-
-
-def _tapered(fill_ratio: FloatArray, largest: float) -> FloatArray:
-    """Smooth, and with an exact solution of its own."""
-    return np.asarray((1 + fill_ratio / largest) / 2)
-
-
-def _tapered_error(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrator) -> float:
-    """Largest error in fill of an integrator under the tapered law, from a pressure that empties the chamber.
-
-    With s = sqrt(alpha + beta x) and u = s (1 + x/x_max)/2 the fill obeys ds/dt = -(S/V) (A + D s^2)/2, so
-    s = sqrt(A/D) tan(atan(s_0 sqrt(D/A)) - (S/V) sqrt(A D) t/2).
-    """
-    a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
-    alpha, beta = a * (drive.gas_pressure - b * drive.total), 2 * a * b
-    d = 0.5 / law.max_fill_ratio
-    rest = beta / 2 - d * alpha
-    start = math.atan(math.sqrt(alpha + beta * drive.fill) * math.sqrt(d / rest))
-    s = math.sqrt(rest / d) * np.tan(start - drive.exchange_rate * math.sqrt(rest * d) / 2 * time)
-    tapered = replace(drive, law=_SlowedLaw(law, _tapered))
-    return _difference(way(tapered, time).fill, (s**2 - alpha) / beta)
-
-
-def _side_by_side(march: Integrator, drive: Drive, law: PaperLaw, duration: float) -> Table:
-    """Error at the end of a long operation, and what it costs; the closed form is the reference."""
-    t, exact = np.array([duration]), _last_fill(closed_form, drive, duration)
-    ways = {"march": march, **_WAYS}
-    others = [way for way in ways.values() if way is not closed_form]
-    tapered = {way: f"{_tapered_error(drive, law, t, way):.1e}" for way in others}
-    taken = {way: _velocities_taken(drive, law, t, way) for way in others}
-    errors = [abs(_last_fill(way, drive, duration) - exact) for way in ways.values()]
-    round_off = np.finfo(np.float64).eps
-    return Table(
-        name="integrators side by side: error in fill at the end of a long operation",
-        columns={
-            "integrator": list(ways),
-            "error, paper's law": [f"{e:.1e}" if e > round_off else "round-off" for e in errors],
-            "error, tapered law": [tapered.get(way, "does not apply") for way in ways.values()],
-            "velocities taken": [taken.get(way, "none") for way in ways.values()],
-        },
-    )
-
-
-def _velocities_taken(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrator) -> str:
-    """At how many points an integrator asks the law, its table included where it makes one."""
-    sizes: list[int] = []
-
-    def count(fill_ratio: FloatArray, _: float) -> FloatArray:
-        sizes.append(fill_ratio.size)
-        return np.ones_like(fill_ratio)
-
-    way(replace(drive, law=_SlowedLaw(law, count)), time)
-    return f"{sum(sizes)}"
+        share = np.asarray(asked["fill_ratio"]) / (_KINK * self.max_fill_ratio)
+        return replace(flow, velocity=flow.velocity * np.minimum(1.0, 0.5 + 0.5 * share))
 
 
 def _stall_study(

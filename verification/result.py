@@ -18,6 +18,7 @@ from ringbalance.verification.assumptions import Assumption
 from ringbalance.verification.case import CAUSES, NEEDS_REFERENCE, CaseDefinition, Quantity, fill
 from ringbalance.verification.evidence import (
     COVERAGE_FACTOR,
+    Comparison,
     Convergence,
     Curve,
     Evidence,
@@ -25,9 +26,9 @@ from ringbalance.verification.evidence import (
     Level,
     Reference,
     Series,
+    Verdict,
 )
 from ringbalance.verification.typed_record import plain
-from ringbalance.verification.verdicts import Comparison, Verdict
 
 Document = dict[str, Any]
 _LISTED: Final = {"id", "kind", "about", "paper", "number", "title", "claim", "cost"}

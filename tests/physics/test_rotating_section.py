@@ -25,7 +25,7 @@ from ringbalance.physics.tube.rotation_table import (
 )
 from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, StepRule, follow
-from ringbalance.verification.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.tube import (
     POISEUILLE_GRADIENT,
     DuctMesh,
     SectionMesh,

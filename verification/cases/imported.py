@@ -31,8 +31,7 @@ from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, as_found, from_half_width
 from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found
-from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
-from ringbalance.verification.reference.exact_chamber import exact_totals
+from ringbalance.verification.reference.chambers import block_chamber, disc_chamber, exact_totals
 from ringbalance.verification.reference.pressure import Manufactured
 
 _CELLS: Final = ((8, 32, 2), (4, 16, 1), (2, 8, 1))

@@ -16,7 +16,7 @@ from ringbalance.scene.loop_models import Rotor
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, as_found, figure
 from ringbalance.verification.navier_stokes.flow import FlowSystem
-from ringbalance.verification.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.tube import (
     POISEUILLE_GRADIENT,
     DuctMesh,
     SectionMesh,

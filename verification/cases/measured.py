@@ -121,7 +121,7 @@ def ducts(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Friction in rectangular ducts, laminar to turbulent."""
     sets = [measurements(name) for name in ("cornish_1928", "huebscher_1947_ducts")]
     if defect == "circular_section":
-        # Tubes are told by an aspect ratio of zero.
+        # An aspect ratio of zero stands for a tube.
         sets = [each.with_columns(aspect_ratio=np.zeros(len(each))) for each in sets]
     mutation = defect if defect in MUTATIONS else None
     points = friction(*sets, mutation=mutation)

@@ -8,19 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from adaptive_transfer import adaptive_ode
+from transfers import (
+    Drive,
+    Integrator,
+    adaptive_ode,
+    closed_form,
+    explicit_segments,
+    marched,
+)
 
 from ringbalance import bundled_scene, load_scene
 from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.transfers import (
-    Drive,
-    Integrator,
-    closed_form,
-    explicit_segments,
-    marched,
-)
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 

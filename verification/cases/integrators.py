@@ -64,7 +64,7 @@ _CYCLES: Final = 5
 
 @dataclass(frozen=True, kw_only=True)
 class _Operation:
-    """One chamber under a constant gas pressure that gives liquid away; its tube is empty, the other one vented.
+    """One chamber under a constant gas pressure that empties; its tube is dry, the other one vented.
 
     dx/dt = -(S/V) u(x, x_max - x, p).
     """

@@ -104,7 +104,8 @@ def test_where_all_or_none_meet_time_or_amplitude_is_ranked() -> None:
     balancer: Any = Named()
     for settled, outcome in ((True, "settling_time"), (False, "final_amplitude")):
         found = judgement(np.full(256, settled), drawn)
-        ranking = ranked(balancer, replace(found, outcomes=replace(found.outcomes, **{outcome: drawn["a"]})))
+        ranks: dict[str, Any] = {outcome: drawn["a"]}
+        ranking = ranked(balancer, replace(found, outcomes=replace(found.outcomes, **ranks)))
         best = ranking.inputs[0]
         assert (best.name, best.outcome) == ("a", outcome)
         assert best.index == pytest.approx(1 - 1 / 64, abs=0.01)

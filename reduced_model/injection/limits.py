@@ -24,10 +24,7 @@ _HALVINGS: Final = 24
 
 
 def residual_fills(plants: npt.NDArray[np.void], designs: Designs) -> FloatArray:
-    """Fill ratio of each plant at which gas enters the port of a driven chamber, as `residual_fill_ratio`.
-
-    Args: `designs`: of the plants.
-    """
+    """Fill ratio of each plant at which gas enters the port of a driven chamber, as `residual_fill_ratio`."""
     scene = designs.scene
 
     def drawn(rows: IntArray, fills: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from transfers import Drive, adaptive_ode, marched
 
 from ringbalance import bundled_scene, load_scene
 from ringbalance.controller.liquid_ring.devices import Spread, devices
@@ -17,7 +18,6 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.verification.reference.transfers import Drive, adaptive_ode, marched
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 

@@ -17,8 +17,8 @@ from ringbalance.controller.liquid_ring.devices import Spread, devices
 from ringbalance.identification.device import Device, Models
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.parameters import changed
+from ringbalance.identification.reading import KINDS
 from ringbalance.identification.saving import save_result
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.tube.loss import MODEL_CAUSES

@@ -15,8 +15,7 @@ from ringbalance.results.result import Facts, PresentedResult
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +56,7 @@ class Tuning(PresentedResult):
     remedies: tuple[Remedied, ...] = ()
     """What remedies come to, the best first; tried where what is required is not met."""
     ranking: Ranking = field(default_factory=Ranking)
-    """Which input decides; where what is required is not met."""
+    """Which input decides what the recommended settings come to."""
     choices: tuple[Remedied, ...] = ()
     """What things that can be bought make of a scene that leaves them open."""
     open_choice: bool = False

@@ -17,7 +17,7 @@ from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import in_usual_unit, usual_unit
-from ringbalance.scene.paths import raw_value_at
+from ringbalance.scene.origins import raw_value_at
 
 LONGER: Final = 300.0
 """s, for which devices under the recommended settings are watched once more."""
@@ -187,7 +187,8 @@ def _mending(tuning: Tuning) -> Iterator[Finding]:
         code = "remedy_meets" if each.met else "remedy_best"
         values = {**_values(each.judgement), "what": _changes_text(each.changes)}
         yield Finding(code=code, values=values, change=each.changes)
-    yield from tuning.ranking.findings()
+    if best.verdict != MET:
+        yield from tuning.ranking.findings()
     states = any(each.stated and each.outcome == "final_amplitude" for each in best.demands)
     if best.verdict != MET and states and (reached := amplitude_reached(best)) is not None:
         yield Finding(code="amplitude_reached", values={"amplitude": reached, "asked": best.asked})

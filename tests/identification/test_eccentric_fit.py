@@ -22,12 +22,12 @@ from ringbalance.identification.criticism import Review
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import _offered_rows, _words_of, next_measurement
 from ringbalance.identification.parameters import FitError
+from ringbalance.identification.reading import KINDS
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.paths import value_at, with_values_at
+from ringbalance.scene.origins import value_at, with_values_at
 
 NOISE = 20e-6
 SPEEDS = np.linspace(8.0, 24.0, 24)

@@ -188,18 +188,17 @@ _WITHIN: Final = 9
 
 
 def _swept(
-    response: Callable[[FloatArray], FloatArray], *, frequency_ratio: float, natural: FloatArray
+    response: Callable[[FloatArray], FloatArray], *, natural: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Extremes of a forced response while all natural frequencies vary within `FREQUENCY_UNCERTAINTY`.
 
-    Frequencies that are q times as high answer to a force at s as those of the theory do at s/q.
+    Frequencies that are q times as high answer to gravity as those of the theory do to a force at s = 1/q.
     Args:
         response: takes frequency ratios of the force, shape (m,), to values, shape (m, quantities).
-        frequency_ratio: s of the force, over the speed.
         natural: natural frequencies over the speed: peaks are looked for there.
     Returns: Lower and upper ends, shape (quantities,) each: seldom as far from the value on both sides.
     """
-    low, high = frequency_ratio / HIGHEST_TRUE, frequency_ratio / LOWEST_TRUE
+    low, high = 1 / HIGHEST_TRUE, 1 / LOWEST_TRUE
     peaks = natural[(natural > low) & (natural < high)]
     places = np.unique([*np.linspace(low, high, _GRID), *peaks])
     values = response(places)
@@ -248,7 +247,6 @@ def sloshing_response(
     angular_velocity: float,
     kinematic_viscosity: float,
     gravity: float,
-    frequency_ratio: float = 1.0,
     cells: tuple[tuple[int, int], ...] | None = None,
 ) -> SloshingResponse:
     """Answer of the liquid in one chamber to gravity that turns in the disc's frame.
@@ -259,7 +257,6 @@ def sloshing_response(
     Args:
         fill_ratio: x, any shape, flattened to (n,), above 0 and at most 1.
         kinematic_viscosity: nu, m^2/s, zero or more; zero leaves resonance without a limit.
-        frequency_ratio: s, above 0; 1 for gravity.
         cells: three meshes, finest first; default those of `sloshing_modes`.
     Returns: SloshingResponse; status says where the waves might not be small, or gravity leaves no ring.
     Raises: ValueError: fill ratios outside (0, 1], or an argument outside its range.
@@ -269,14 +266,14 @@ def sloshing_response(
     Source: derived in `section_system`; the layers as in Landau and Lifshitz, "Fluid Mechanics", section 24.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
-    _check(fills, angular_velocity, kinematic_viscosity, gravity, frequency_ratio)
+    _check(fills, angular_velocity, kinematic_viscosity, gravity)
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
     meshes = _Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc))
     ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
 
     def on_mesh(radius: float, level: int) -> FloatArray:
         system, unit = meshes.system(radius, level)
-        answers = _answers(system, np.array([frequency_ratio]), ekman)[0]
+        answers = _answers(system, np.array([1.0]), ekman)[0]
         return np.asarray(answers * [1.0, unit / disc.outer_radius, 1.0])
 
     found = np.array([[on_mesh(float(a), level) for level in meshes.levels] for a in radii])
@@ -285,7 +282,7 @@ def sloshing_response(
     )
     scale = gravity / angular_velocity**2
     amplitude = Estimate(value=scale * found[:, 0, 1], uncertainty=scale * widths[:, 1])
-    ends = np.array([_interval(meshes, float(a), frequency_ratio, ekman) for a in radii])
+    ends = np.array([_interval(meshes, float(a), ekman) for a in radii])
     # At either end the solution errs by about the same share as in the middle.
     share = widths / found[:, 0]
     ends *= 1 + np.stack([-np.minimum(share, 1.0), share], axis=1)
@@ -302,7 +299,7 @@ def sloshing_response(
     )
 
 
-def _interval(meshes: _Meshes, radius: float, ratio: float, ekman: float) -> FloatArray:
+def _interval(meshes: _Meshes, radius: float, ekman: float) -> FloatArray:
     """Ends by natural frequencies of moment, displacement (as `_answers`) and wall pressure, shape (2, 3)."""
     # Peaks are looked for on the mesh in the middle, if there are three.
     system, _ = meshes.system(radius, len(meshes.levels) // 3)
@@ -310,14 +307,14 @@ def _interval(meshes: _Meshes, radius: float, ratio: float, ekman: float) -> Flo
     def response(ratios: FloatArray) -> FloatArray:
         return _answers(system, ratios, ekman)
 
-    return np.stack(_swept(response, frequency_ratio=ratio, natural=system.natural_frequencies()))
+    return np.stack(_swept(response, natural=system.natural_frequencies()))
 
 
-def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float, ratio: float) -> None:
+def _check(fills: FloatArray, omega: float, viscosity: float, gravity: float) -> None:
     if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)):
         raise ValueError("fill_ratio must lie within (0, 1], and there must be at least one")
-    if not (np.isfinite([omega, ratio]).all() and omega > 0 and ratio > 0):
-        raise ValueError("angular_velocity and frequency_ratio must be finite and above zero")
+    if not (np.isfinite(omega) and omega > 0):
+        raise ValueError("angular_velocity must be finite and above zero")
     if not (np.isfinite([viscosity, gravity]).all() and viscosity >= 0 and gravity >= 0):
         raise ValueError("kinematic_viscosity and gravity must be finite and not negative")
 

@@ -14,13 +14,13 @@ from ringbalance.scene.keys.fields import (
     NOT_NEGATIVE,
     POSITIVE,
     Angle,
+    BalanceGrade,
     Influence,
     Length,
     PositiveLength,
     PositiveMass,
     PositiveTime,
     PositiveUnbalance,
-    PositiveVelocity,
     ProperFraction,
     Time,
     TimePerChamber,
@@ -285,8 +285,8 @@ class RequirementSettings:
         Shown("residual amplitude allowed", "um"),
     ] = None
     grade: Annotated[
-        PositiveVelocity | None,
-        unused("none is required", 'balance quality grade of ISO 21940-11: "2.5 mm/s" for G 2.5'),
+        BalanceGrade | None,
+        unused("none is required", "balance quality grade of ISO 21940-11"),
         Shown("balance quality grade", "mm/s"),
     ] = None
     correction_moment: Annotated[

@@ -83,7 +83,7 @@ class LiquidRing:
         corners = self._corners(least_fill)
         edges = np.roll(corners, -1) - corners
         offset = -rotor.initial_unbalance - corners
-        if self.chambers > 2 and np.all((edges.conj() * offset).imag >= 0):
+        if np.all((edges.conj() * offset).imag > 0):
             return 0.0
         along = np.clip((edges.conj() * offset).real / np.maximum(np.abs(edges) ** 2, 1e-300), 0.0, 1.0)
         return float(np.min(np.abs(offset - along * edges))) * rotor.influence_coefficient
@@ -95,6 +95,9 @@ class LiquidRing:
         towards = direction / abs(direction) if direction else 1.0
         # On the line of an edge: Im(edge* (t direction - corner)) = 0.
         crossed = (edges.conj() * towards).imag
+        if not np.any(crossed < 0):
+            # Nothing moves, or two chambers lie along the direction.
+            return float(np.max(np.abs(corners)))
         reached = (edges.conj() * corners).imag / np.where(crossed < 0, crossed, -np.inf)
         return float(np.min(np.where(crossed < 0, reached, np.inf)))
 

@@ -119,7 +119,6 @@ def ring_quantities(
     shaft: Shaft = "horizontal",
     dimension: int | None = None,
     cells: Sequence[tuple[int, ...]] | None = None,
-    turn_samples: int | None = None,
 ) -> RingQuantities:
     """Finite-element totals of one chamber's liquid over fill ratios, each with its uncertainty.
 
@@ -133,13 +132,11 @@ def ring_quantities(
         dimension: 2 or 3; default 2, or 3 for a vertical shaft with gravity, which 2 cannot describe.
         cells: three meshes, finest first, each with half the cells of the one before; default `default_cells`
             and two coarser ones; they decide the dimension when given.
-        turn_samples: even number of angles of gravity over a turn; default enough for a mean within
-            1e-8.
     Returns: The totals. Where gravity leaves no closed ring, or its surface is not found, status says so,
         `closed` is False and the values are those without gravity, their half-widths widened by all that
         gravity could do to the liquid there.
-    Raises: ValueError: fill ratios outside [0, 1], or above 0 but too small for a mesh; density, speed or
-        number of samples that make no sense; two dimensions for gravity along the shaft; not three
+    Raises: ValueError: fill ratios outside [0, 1], or above 0 but too small for a mesh; density or speed
+        that make no sense; two dimensions for gravity along the shaft; not three
         meshes.
     Source: Eqs. 3 to 12 of the liquid-ring paper, with exact plates; Celik et al. (2008),
         doi:10.1115/1.2960953.
@@ -152,7 +149,7 @@ def ring_quantities(
     if axial and len(meshes[0]) == 2:
         raise ValueError("gravity along the shaft needs dimension 3")
     liquid = RotatingLiquid(density=density, angular_velocity=angular_velocity)
-    turn = _Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity, turn_samples))
+    turn = _Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity))
     case = _Case(disc=disc, liquid=liquid, fills=fills, meshes=meshes, turn=turn)
     return _collect(case, [_on_meshes(case, float(x), turn) for x in fills])
 
@@ -186,11 +183,8 @@ def _meshes(
     return meshes
 
 
-def _turn_samples(disc: Disc, liquid: RotatingLiquid, gravity: float, wanted: int | None) -> int:
-    if wanted is not None:
-        if wanted < 2 or wanted % 2:
-            raise ValueError("turn_samples must be even and at least two")
-        return wanted
+def _turn_samples(disc: Disc, liquid: RotatingLiquid, gravity: float) -> int:
+    """Angles of gravity over a turn, an even number, enough for a mean within 1e-8."""
     tilt = gravity / (liquid.angular_velocity**2 * disc.inner_radius)
     if tilt == 0:
         return 2

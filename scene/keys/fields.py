@@ -6,6 +6,7 @@ A reader stands in the annotation of a record's field, see `declaration`.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args
@@ -86,6 +87,23 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
         return number
 
     return Reader(read=read, allowed=allowed, summary=f"{kind.name}{interval}", dimension=dimension)
+
+
+def balance_grade() -> Reader:
+    """Reader of a balance quality grade of ISO 21940-11, m/s: "G 2.5", or the velocity it stands for."""
+    plain = quantity("velocity", POSITIVE)
+    allowed = f'a grade such as "G 2.5", or {plain.allowed}'
+
+    def read(value: object) -> float:
+        grade = re.fullmatch(r"\s*G\s*([0-9.]+)\s*", value) if isinstance(value, str) else None
+        try:
+            return float(plain.read(f"{grade[1]} mm/s" if grade else value))
+        except FieldError as error:
+            raise FieldError(error.problem, allowed) from None
+
+    return Reader(
+        read=read, allowed=allowed, summary='a grade such as "G 2.5" or "2.5 mm/s"', dimension="velocity"
+    )
 
 
 def angle_of_turn() -> Reader:
@@ -320,6 +338,7 @@ Mass = Annotated[float, quantity("mass", NOT_NEGATIVE)]
 Stiffness = Annotated[float, quantity("stiffness", POSITIVE)]
 Damping = Annotated[float, quantity("damping", NOT_NEGATIVE)]
 PositiveVelocity = Annotated[float, quantity("velocity", POSITIVE)]
+BalanceGrade = Annotated[float, balance_grade()]
 Velocity = Annotated[float, quantity("velocity", NOT_NEGATIVE)]
 PositiveUnbalance = Annotated[float, quantity("unbalance", POSITIVE)]
 Unbalance = Annotated[float, quantity("unbalance", NOT_NEGATIVE)]

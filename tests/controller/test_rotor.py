@@ -127,6 +127,15 @@ def test_two_chambers_reach_a_line(scene: Scene, model: BalancerModel, ring_of: 
     assert left_over(plant, scene.rotor, wanted=(0.7 + 0.2j) * pair) == pytest.approx(0.2 * pair)
 
 
+def test_a_disc_that_moves_no_liquid_reaches_nothing(
+    scene: Scene, model: BalancerModel, ring_of: RingOf
+) -> None:
+    plant = ring_of(model, chambers=4)
+    rotor = replace(scene.rotor, influence_coefficient=1.0, initial_amplitude=3e-4)
+    assert plant.unreachable_vibration(rotor=rotor, least_fill=0.25) == pytest.approx(3e-4, rel=1e-12)
+    assert plant.moment_towards(1j, least_fill=0.25) == 0.0
+
+
 def test_the_starting_pressure_of_the_paper_is_eq_19_at_rest(model: BalancerModel) -> None:
     # rho omega^2 V 0.5/(B theta), the stall pressure of an emptied chamber: 0.381 MPa.
     omega = 10000 * 2 * math.pi / 60

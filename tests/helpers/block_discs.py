@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc
 from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
@@ -28,7 +28,16 @@ def sector_chamber(
         across = [radius * np.cos(turned), radius * np.sin(turned), width * (cube[..., 2] - 0.5)]
         return np.stack(across, axis=-1)
 
-    return block_chamber(cells, place, kind=kind, closed=angle > 2 * np.pi - 1e-9)
+    chamber = block_chamber(cells, place, kind=kind)
+    return welded(chamber, chamber.points, chamber.cells) if angle > 2 * np.pi - 1e-9 else chamber
+
+
+def welded(like: ChamberGeometry, points: FloatArray, cells: IntArray) -> ChamberGeometry:
+    """A chamber in which points at one place are one, without plates."""
+    _, first, number = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
+    number = number.reshape(-1)
+    boundaries = {name: number[at] for name, at in like.boundaries.items() if not name.startswith("plate")}
+    return replace(like, points=points[first], cells=number[cells], boundaries=boundaries)
 
 
 def imported(disc: Disc, *, cells: tuple[int, int, int] = (4, 16, 2)) -> Disc:

@@ -152,14 +152,13 @@ def test_a_deliberate_fault_leaves_the_half_width(disc: Disc, direction: str) ->
         {"angular_velocity": 0.0},
         {"angular_velocity": np.inf},
         {"gravity": -1.0},
-        {"turn_samples": 3},
         {"cells": [(4, 8), (2, 4)]},
         {"cells": [(4, 8), (2, 4), (1, 2, 1)]},
     ],
 )
 def test_impossible_arguments_are_refused(disc: Disc, change: Mapping[str, Any]) -> None:
     arguments: dict[str, Any] = {"disc": disc, "density": RHO, "angular_velocity": OMEGA, "fill_ratio": [0.2]}
-    with pytest.raises(ValueError, match=r"fill_ratio|density|gravity|turn_samples|cells"):
+    with pytest.raises(ValueError, match=r"fill_ratio|density|gravity|cells"):
         ring_quantities(**{**arguments, **change})
 
 

@@ -106,15 +106,14 @@ def test_resonant_fills_have_a_mode_at_the_speed(disc: Disc) -> None:
         assert ratios[mode - 1] == pytest.approx(1.0, abs=1e-4)
 
 
-@pytest.mark.parametrize("s", [0.3, 1.0, 1.7])
-def test_forced_swing_matches_the_spectral_one(disc: Disc, s: float) -> None:
+def test_forced_swing_matches_the_spectral_one(disc: Disc) -> None:
     chamber = bare(disc, np.pi / 2)
-    found = forced(chamber, 0.3, frequency_ratio=s)
+    found = forced(chamber, 0.3)
     depth = float(np.log(disc.outer_radius / found.surface_radius[0]))
     waves = CosineWaves.of(central_angle=np.pi / 2, depth=depth)
-    exact = waves.amplification(frequency_ratio=s)
+    exact = waves.amplification(frequency_ratio=1.0)
     assert found.amplification.value[0] == pytest.approx(exact, rel=1e-4)
-    pressure = waves.pressure_amplification(frequency_ratio=s, depth=depth)
+    pressure = waves.pressure_amplification(frequency_ratio=1.0, depth=depth)
     assert found.pressure_amplification.value[0] == pytest.approx(pressure, rel=1e-4)
 
 
@@ -135,26 +134,22 @@ def test_the_interval_is_what_exact_waves_do_within_six_per_cent(disc: Disc, fil
 
 
 def test_a_peak_within_the_interval_is_found(disc: Disc) -> None:
-    """The third mode 3 % beside the speed: the upper end is the highest that any force nearby makes."""
-    fill = 1.06 * dict(resonant_fills(disc=disc, modes=3))[3]
-
-    def at(s: float) -> SloshingResponse:
-        cells = ((8, 24), (4, 12), (2, 6))
-        return forced(disc, fill, kinematic_viscosity=1e-6, frequency_ratio=s, cells=cells)
-
-    there = at(1.0)
-    peak = max(float(at(s).amplification.value[0]) for s in 1.03 + 2e-4 * np.arange(-40, 41))
-    assert there.amplification.value[0] < 0.3 * peak
-    assert there.amplification_interval[0, 1] == pytest.approx(peak, rel=0.1)
+    """The third mode 3 % beside the speed: the upper end is about that where the mode is at the speed."""
+    resonant = dict(resonant_fills(disc=disc, modes=3))[3]
+    cells = ((8, 24), (4, 12), (2, 6))
+    found = forced(disc, [1.06 * resonant, resonant], kinematic_viscosity=1e-6, cells=cells)
+    beside, peak = found.amplification.value
+    assert 3 * beside < found.amplification_interval[0, 1] == pytest.approx(peak, rel=0.4)
 
 
-def test_slow_forcing_only_tilts_the_surface(disc: Disc) -> None:
-    found = forced(disc, [0.1, 0.5], frequency_ratio=1e-6)
-    assert found.amplification.value == pytest.approx(1.0, abs=1e-6)
-    half = disc.central_angle / 2 - np.arcsin(disc.plate_thickness / found.surface_radius)
+def test_gravity_only_tilts_the_surface_of_a_short_chamber(disc: Disc) -> None:
+    """Of one degree: the lowest mode is 13 times as fast as the disc turns, or faster."""
+    found = forced(bare(disc, np.radians(1.0)), [0.1, 0.5])
+    assert found.amplification.value == pytest.approx(1.0, abs=0.01)
+    half = np.radians(0.5)
     # At the edge gravity along the chamber counts as cos(angle) less its mean, across as sin(angle).
     highest = 9.81 / OMEGA**2 * np.hypot(np.sin(half) / half - np.cos(half), np.sin(half))
-    assert found.surface_amplitude.value == pytest.approx(highest, rel=0.005)
+    assert found.surface_amplitude.value == pytest.approx(highest, rel=0.01)
 
 
 def test_viscosity_limits_the_peak_and_nothing_else(disc: Disc) -> None:

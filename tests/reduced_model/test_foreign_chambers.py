@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 import pytest
+from block_discs import welded
 from drawn_chamber import drawing_of, loaded, msh_2
 
 import ringbalance as rb
@@ -142,11 +143,10 @@ def mesh(shape: Shape, kind: CellKind = "hexahedron27") -> ChamberGeometry:
     """A chamber's mesh in mm, its outer wall and the rest named."""
     if not shape.pillars:
         return block_chamber(shape.cells, shape.place, kind=kind)
-    parts = [block_chamber(shape.cells, partial(_round, each), kind=kind, closed=True) for each in PILLARS]
+    parts = [block_chamber(shape.cells, partial(_round, each), kind=kind) for each in PILLARS]
     points = np.concatenate([part.points for part in parts])
     cells = np.concatenate([parts[0].cells, parts[1].cells + len(parts[0].points)])
-    _, first, number = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
-    whole = replace(parts[0], points=points[first], cells=number.reshape(-1)[cells], boundaries={})
+    whole = welded(parts[0], points, cells)
     facets = boundary_facets(whole)
     outer = np.all(np.abs(np.hypot(*whole.points[facets, :2].T.swapaxes(1, 2)) - OUTER) < 1e-6, axis=1)
     return replace(whole, boundaries={"outer_wall": facets[outer], "walls": facets[~outer]})

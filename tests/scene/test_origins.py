@@ -103,5 +103,6 @@ def test_requirement(newcomer_document: dict[str, Any], load: Load) -> None:
     required = scene.requirement
     assert (required.settling_time, required.residual) == (10.0, pytest.approx(1e-7))
     assert required.grade == pytest.approx(2.5e-3)
+    assert scene.with_values({"requirement.grade": "G 2.5"}).requirement.grade == required.grade
     assert (required.correction_moment, scene.rotor.mass) == (pytest.approx(9e-4), 20.0)
     assert {"balance quality grade", "mass"} <= {row.quantity for row in scene_table(scene)}

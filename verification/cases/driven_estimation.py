@@ -34,6 +34,10 @@ _KNOWN: Final = 0.02
 """Relative error of the imbalance within which its estimate has converged."""
 _SCALES: Final = (1.0, 10.0, 100.0, 1000.0, 1500.0, 2000.0, 2500.0, 1e4)
 """Sensor noise that the filter assumes, over the true one."""
+_RECORD: Final = 8.0
+"""Time of a record for Fig. 4, s."""
+_FRICTION_TIME: Final = 12.0
+"""Time limit of a run for Fig. 5, s."""
 _BEFORE, _AFTER = 0.1, 0.6
 """Shown around the beginning of the friction stage, s."""
 _ARMS: Final = (0.01, 0.005)
@@ -153,12 +157,10 @@ def estimate_imbalance(
     )
 
 
-def figure_four(
-    scene: EccentricScene, *, duration: float = 8.0, scales: tuple[float, ...] = _SCALES
-) -> _FigureFour:
+def figure_four(scene: EccentricScene, *, scales: tuple[float, ...] = _SCALES) -> _FigureFour:
     """Estimates of the four imbalances of the paper's Fig. 4, and of one under dishonest covariances."""
     turned = [changed(scene, "imbalance", phase=math.radians(phase)) for phase in _PHASES]
-    records = [imbalance_record(one, duration=duration) for one in turned]
+    records = [imbalance_record(one, duration=_RECORD) for one in turned]
     pairs = list(zip(turned, records, strict=True))
     found = [estimate_imbalance(*pair) for pair in pairs]
     first, record = pairs[0]
@@ -202,9 +204,9 @@ def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> 
     )
 
 
-def friction_runs(scene: EccentricScene, *, time_limit: float = 12.0) -> Mapping[float, EccentricRun]:
+def friction_runs(scene: EccentricScene) -> Mapping[float, EccentricRun]:
     """Runs by their true friction arm, m. Source: Fig. 5 of the paper on eccentric masses."""
-    level = at_constant_speed(scene, time_limit=time_limit)
+    level = at_constant_speed(scene, time_limit=_FRICTION_TIME)
     return {a: simulate_eccentric(changed(level, "masses", friction_arm=(a, a))) for a in _ARMS}
 
 

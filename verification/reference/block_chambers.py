@@ -34,20 +34,16 @@ def block_chamber(
     place: Callable[[FloatArray], FloatArray],
     *,
     kind: CellKind = "hexahedron27",
-    closed: bool = False,
 ) -> ChamberGeometry:
     """A mapped block of hexahedra, or of six tetrahedra in the place of each.
 
     Args:
         place: from the unit cube, shape (..., 3), to places, m; the first coordinate goes outward.
-        closed: whether the second coordinate comes back to where it begins, as in a full ring.
     """
     shape = tuple(2 * n + 1 for n in cells)
     steps = [np.linspace(0, 1, n) for n in shape]
     points = place(np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1)).reshape(-1, 3)
     numbers = np.arange(len(points)).reshape(shape)
-    if closed:
-        numbers[:, -1] = numbers[:, 0]
     starts = np.stack(np.meshgrid(*[2 * np.arange(n) for n in cells], indexing="ij"), axis=-1)
     local = _local(kind)
     at = (starts.reshape(-1, 1, 1, 3) + local).reshape(-1, local.shape[1], 3)
@@ -64,7 +60,6 @@ def block_chamber(
     boundaries = {
         name: facets[np.all(lattice[..., axis] == end * (shape[axis] - 1), axis=1)]
         for name, (axis, end) in _BOUNDARIES.items()
-        if not (closed and axis == 1)
     }
     return replace(bare, boundaries=boundaries)
 

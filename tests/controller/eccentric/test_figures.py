@@ -34,7 +34,7 @@ from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 
 def test_figure_four_honest_filters_need_no_seconds(paper: EccentricScene) -> None:
-    found = figure_four(paper, duration=6.0)
+    found = figure_four(paper)
     np.testing.assert_allclose(found.estimate[:, -1], found.true, atol=1e-4)
     assert max(found.honest_time) < 0.3
     assert np.all(found.covariance_norm[:, -1] < 1e-6 * found.covariance_norm[:, 0])
@@ -45,7 +45,7 @@ def test_figure_four_honest_filters_need_no_seconds(paper: EccentricScene) -> No
 
 
 def test_figure_five_finds_both_friction_arms(paper: EccentricScene) -> None:
-    for arm, run in friction_runs(paper, time_limit=8.0).items():
+    for arm, run in friction_runs(paper).items():
         assert run.estimates.friction_arm[-1] == pytest.approx((arm, arm), rel=0.02)
         assert friction_time(run, arm) < 1.0
 

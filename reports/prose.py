@@ -64,6 +64,7 @@ _ALONE: Final = ("accuracy", "environment", "run", "gas.ambient_pressure")
 _MESH: Final = "disc.mesh"
 _KEYS: Final = {
     "proportional": "gain",
+    "initial_phase": "phase of the initial vibration",
     "gas_time_offset": "offset of the valve-open time",
     "minimum_gas_time": "shortest valve-open time",
     "maximum_gas_time": "longest valve-open time",

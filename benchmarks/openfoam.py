@@ -50,7 +50,7 @@ from ringbalance.scene.loader import bundled_scene, load_scene
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.verification.cases.bent_tube import REYNOLDS, VISCOSITY, path_over_crest
-from ringbalance.verification.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.tube import (
     SectionMesh,
     developed_section,
     friction_ratio,

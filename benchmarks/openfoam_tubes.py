@@ -15,7 +15,7 @@ import numpy as np
 from openfoam_case import HexMesh, Run, extruded, field, last_number, run, sides, vector, write_case
 
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
+from ringbalance.verification.navier_stokes.tube import SectionMesh
 from ringbalance.verification.reference.bent_tube import Segment, swept_tube
 
 _SLAB = 0.05

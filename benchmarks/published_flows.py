@@ -10,13 +10,13 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
-from ringbalance.verification.navier_stokes.meshes import (
+from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
+from ringbalance.verification.navier_stokes.tube import (
     Patch,
     geometric_vertices,
     patch_mesh,
     with_midpoints,
 )
-from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
 
 Field = Callable[[FloatArray], FloatArray]
 

@@ -23,10 +23,12 @@ class DrawnInput:
     """Whether all devices have it alike, so that it is merely not known; else it varies between them."""
     measure: str
     """Code of the finding that says what to measure to know it better; empty: nothing can be measured."""
+    path: str = ""
+    """Of its key in the scene; empty: the scene has none."""
 
 
 def drawn_key(scene: SceneFile, path: str) -> DrawnInput:
     """An input of a scene by its path, such as "rotor.mass", which is measured as it is."""
     table, _, key = path.split("[")[0].partition(".")
     declared = scene_kind(scene.balancer).schema.key_at((table, key))
-    return DrawnInput(common=declared.common, measure=MEASURE_INPUT)
+    return DrawnInput(common=declared.common, measure=MEASURE_INPUT, path=path)

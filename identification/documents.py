@@ -14,11 +14,11 @@ from ringbalance.identification.fitting import FitResult, FittedParameter, Noise
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import covariance
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.likelihood import Block
 from ringbalance.identification.next_measurement import NextMeasurement
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.identification.parameters import MODEL_ERRORS
+from ringbalance.identification.reading import KINDS
 from ringbalance.results.numbers import rounded
 from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value

@@ -10,10 +10,16 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from ringbalance.identification.identifiability import Combination, Identified, combinations, verdicts
-from ringbalance.identification.intervals import Profile, covariance, profiles
-from ringbalance.identification.joint import Joint, about_pulls, joint_of, scene_as_fitted
+from ringbalance.identification.intervals import (
+    Joint,
+    Profile,
+    about_pulls,
+    covariance,
+    joint_of,
+    profiles,
+    scene_as_fitted,
+)
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS, kinds_of
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import (
@@ -28,6 +34,7 @@ from ringbalance.identification.parameters import (
     path_of,
     values_of,
 )
+from ringbalance.identification.reading import KINDS, kinds_of
 from ringbalance.results.rows import Finding, text_of
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.narrowing import AnyScene

@@ -27,8 +27,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ringbalance.identification.kinds.kind import Kind, Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.parameters import Parameter
+from ringbalance.identification.reading import KINDS
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 
 STEP: Final = 1e-3

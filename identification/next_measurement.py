@@ -16,9 +16,9 @@ import numpy as np
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS, kinds_of
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.parameters import both_sides
+from ringbalance.identification.reading import KINDS, kinds_of
 from ringbalance.results.rows import Value, text_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.narrowing import AnyScene

@@ -18,7 +18,7 @@ from typing import Any, Final
 from ringbalance.controller.balancer import Input, balancer_of
 from ringbalance.identification.device import Device, Models
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.identification.reading import KINDS
 from ringbalance.physics.tube.loss import BUILT_CAUSES, MODEL_CAUSES
 from ringbalance.reduced_model.tube.regime import driving_pressure
 from ringbalance.scene.faults import did_you_mean

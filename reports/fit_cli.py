@@ -7,7 +7,7 @@ from pathlib import Path
 from ringbalance.identification.cli import DONE, FitRequest, keep_inputs, run_fit
 from ringbalance.identification.documents import against_fit
 from ringbalance.identification.fitting import Loss
-from ringbalance.identification.kinds.registry import template as template_of
+from ringbalance.identification.reading import template as template_of
 from ringbalance.reports.simulate_cli import check_output
 from ringbalance.scene.platform.files import write_whole
 

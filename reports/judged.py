@@ -54,6 +54,7 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
             "path": tuning.along_name,
             "levels": [_level(each) for each in tuning.along],
         },
+        "ranking": tuning.ranking.document(),
         **_advice(tuning),
     }
 

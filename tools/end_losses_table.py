@@ -22,13 +22,13 @@ from rich.progress import Progress
 from ringbalance.physics.convergence import gci
 from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import Workers
-from ringbalance.verification.navier_stokes.end_losses import (
+from ringbalance.verification.navier_stokes.flow import FlowSystem
+from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, StepRule, follow
+from ringbalance.verification.navier_stokes.tube import (
     End,
     EndMesh,
     solve_end,
 )
-from ringbalance.verification.navier_stokes.flow import FlowSystem
-from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, StepRule, follow
 
 ENDS: tuple[End, End] = ("entrance", "exit")
 REYNOLDS_SCALE, REYNOLDS_LIMIT = 5.0, 2000.0

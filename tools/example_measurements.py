@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.parameters import models_for
+from ringbalance.identification.reading import KINDS
 from ringbalance.scene import AnyScene, bundled_scene, load_scene, write_whole
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.describe import in_usual_unit, usual_name, usual_unit

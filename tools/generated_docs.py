@@ -22,7 +22,7 @@ from drag_coefficient_doc import document_tables
 from typesetting import typeset
 
 from ringbalance.identification.kinds.kind import Kind
-from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.identification.reading import KINDS
 from ringbalance.reports.prose import equations as report_equations
 from ringbalance.reports.saved import saved_cases
 from ringbalance.results.rows import sentences

@@ -38,7 +38,7 @@ from ringbalance.scene.platform.files import write_whole
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, StepRule, follow
-from ringbalance.verification.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.tube import (
     SectionMesh,
     friction_ratio,
     solve_section,

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
+from ringbalance.verification.evidence import VOCABULARY, Kind, Metric, Role, Verdict
 from ringbalance.verification.standing import SUBJECTS
 from ringbalance.verification.typed_record import Pattern, RecordError, record_from
-from ringbalance.verification.verdicts import VOCABULARY, Kind, Metric, Role, Verdict
 
 Text = Annotated[str, Pattern(r".{3,}", "a text of three characters or more")]
 CAUSES: Final[Mapping[str, str]] = MappingProxyType(
@@ -112,7 +112,7 @@ class RestsOn:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeftOut:
+class _LeftOut:
     """Readings that a validation does not judge; the case's numbers `<name>_points` and so on count them."""
 
     name: Identifier
@@ -155,7 +155,7 @@ class Mutation:
 
 @dataclass(frozen=True, kw_only=True)
 class _Study:
-    """The function that computes a case, in place of a `case.py`."""
+    """The function that computes a case of the program's."""
 
     of: Annotated[str, Pattern(r"[a-z0-9_]+(\.[a-z0-9_]+){2,}", "folder.module.function")]
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -189,7 +189,7 @@ class CaseDefinition:
     equations: tuple[Text, ...] = ()
     reference: _ReferenceText
     study: _Study | None = None
-    """What computes it where the folder has no `case.py`."""
+    """What computes it; a user's own case has a `case.py`."""
     judged_on: Literal["scene", "paper"] = "scene"
     """Whether the scene at hand is judged, or always the paper's own disc, or rotor with eccentric masses."""
     shape: Literal["any", "sector"] = "any"
@@ -200,7 +200,7 @@ class CaseDefinition:
     """Why the criteria lead to this verdict and no other, where that may be disputed."""
     rests_on: tuple[RestsOn, ...] = ()
     """Inputs that decide the claim."""
-    left_out: tuple[LeftOut, ...] = ()
+    left_out: tuple[_LeftOut, ...] = ()
     """Of a validation: what the sources have and no verdict rests on."""
     headline: bool = False
     cost: Literal["light", "heavy"] = "light"

@@ -56,13 +56,12 @@ class UnknownCaseError(KeyError):
 
 
 def case_code(case_id: str) -> CaseCode:
-    """The function that a case's text names, with `<name>_ends` where there is one; else its `case.py`.
+    """The function that a case's text names, with `<name>_ends` where there is one.
 
     Raises: UnknownCaseError: no such id; the text names the nearest one.
     """
     study = load_case(case_id).study
-    if study is None:
-        return cast(CaseCode, getattr(cases, f"cases.{case_id}.case"))
+    assert study is not None, f"{case_id}: no [study]"
     place, _, name = study.of.rpartition(".")
     module = getattr(cases, place)
     compute = partial(getattr(module, name), **study.settings)

@@ -26,7 +26,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Convergence, Curve, Found, Series, figure, from_half_width
 from ringbalance.verification.papers import RING_RADIUS, with_plate
-from ringbalance.verification.reference.exact_chamber import exact_moment
+from ringbalance.verification.reference.chambers import exact_moment
 
 ROUND_OFF = 1e-13
 """Relative errors below this say nothing about the order."""

@@ -7,9 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numpy as np
-import numpy.typing as npt
-
 from ringbalance.results.numbers import given
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding
@@ -18,16 +15,14 @@ from ringbalance.verification.assumptions import Assumption
 from ringbalance.verification.case import CAUSES, NEEDS_REFERENCE, CaseDefinition, Quantity, fill
 from ringbalance.verification.evidence import (
     COVERAGE_FACTOR,
-    Convergence,
-    Curve,
+    Comparison,
     Evidence,
     Found,
     Level,
     Reference,
-    Series,
+    Verdict,
 )
 from ringbalance.verification.typed_record import plain
-from ringbalance.verification.verdicts import Comparison, Verdict
 
 Document = dict[str, Any]
 _LISTED: Final = {"id", "kind", "about", "paper", "number", "title", "claim", "cost"}
@@ -306,49 +301,11 @@ def _found(found: Found | None, reference: Reference | None) -> Document:
 def _evidence(evidence: Evidence | None) -> Document:
     if evidence is None:
         return {"numbers": {}, "series": [], "convergence": [], "tables": []}
-    return {
-        "numbers": {name: float(value) for name, value in evidence.numbers.items()},
-        "series": [_series(series) for series in evidence.series],
-        "convergence": [_convergence(study) for study in evidence.convergence],
-        "tables": [
-            {
-                "name": table.name,
-                "columns": {
-                    name: [value if isinstance(value, str) else float(value) for value in values]
-                    for name, values in table.columns.items()
-                },
-                "units": dict(table.units),
-            }
-            for table in evidence.tables
-        ],
-    }
-
-
-def _series(series: Series) -> Document:
-    return {
-        "name": series.name,
-        "x": {**vars(series.x), "values": _numbers(series.x.values)},
-        "y": [_curve(curve) for curve in series.y],
-        "log": series.log,
-    }
-
-
-def _curve(curve: Curve) -> Document:
-    given = {key: value for key, value in vars(curve).items() if value is not None}
-    return {
-        key: _numbers(value) if key in ("values", "uncertainty") else value for key, value in given.items()
-    }
-
-
-def _convergence(study: Convergence) -> Document:
-    lists = {key: getattr(study, key) for key in ("observed_order", "error", "value")}
-    shown = vars(study) | {key: None if v is None else _numbers(v) for key, v in lists.items()}
-    return {"h": _numbers(shown.pop("size")), **shown}
-
-
-def _numbers(values: npt.ArrayLike) -> list[float | None]:
-    """A curve may have gaps: a value that is not finite there is none."""
-    return [float(v) if np.isfinite(v) else None for v in np.asarray(values, dtype=np.float64).ravel()]
+    document = {name: plain(getattr(evidence, name)) for name in ("numbers", "series", "tables")}
+    for series in document["series"]:
+        series["y"] = [{k: v for k, v in curve.items() if v is not None} for curve in series["y"]]
+    studies = [{"h": (one := plain(study)).pop("size"), **one} for study in evidence.convergence]
+    return document | {"convergence": studies}
 
 
 def merge_saved(document: Sequence[Document], saved: Sequence[Mapping[str, Any]]) -> list[Document]:

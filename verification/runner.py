@@ -16,10 +16,19 @@ from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.assumptions import assumptions_of, overridden, widened
 from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
-from ringbalance.verification.evidence import CaseCode, Evidence, Found, Level, NotRunError, Reference
+from ringbalance.verification.evidence import (
+    CaseCode,
+    Evidence,
+    Found,
+    Level,
+    NotRunError,
+    Reference,
+    Verdict,
+    combine,
+    judge_quantity,
+)
 from ringbalance.verification.papers import driven_scene
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
-from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
 
 Progress = Callable[[CaseResult], None]
 PAPER_SCENE = "liquid_ring_paper"

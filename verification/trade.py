@@ -54,7 +54,7 @@ _FLOW_SHARES: Final = (0.2, 0.4, 0.5, 0.6, 0.8)
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeasuredModel:
+class _MeasuredModel:
     """One model on one quantity."""
 
     name: str
@@ -81,9 +81,9 @@ class MeasuredQuantity:
     uncertainty: float
     """Of the finest model, 95 %, relative, without that of the inputs."""
     status: Status
-    models: tuple[MeasuredModel, ...]
+    models: tuple[_MeasuredModel, ...]
 
-    def good_enough(self) -> list[MeasuredModel]:
+    def good_enough(self) -> list[_MeasuredModel]:
         """Models whose error is below what the finest is known to; the finest always is."""
         return [model for model in self.models if model.error <= self.uncertainty]
 
@@ -255,7 +255,7 @@ def _measured(
                 uncertainty=known[place],
                 status=status,
                 models=tuple(
-                    MeasuredModel(
+                    _MeasuredModel(
                         name=model,
                         values=tuple(map(float, value)),
                         error=float(np.max(np.abs(value - finest))) / scale,

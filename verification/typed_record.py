@@ -6,6 +6,7 @@ Understood: `str`, `float` (whole numbers too), `int`, `bool`, string enumeratio
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
@@ -13,6 +14,8 @@ from enum import Enum
 from functools import cache
 from types import MappingProxyType, NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
 
 Record = TypeVar("Record")
 
@@ -47,13 +50,17 @@ def record_from(kind: type[Record], table: Mapping[str, Any]) -> Record:
 
 
 def plain(value: Any) -> Any:
-    """A record as JSON-able values: dictionaries, lists, texts and numbers."""
+    """A record as JSON-able values: dictionaries, lists, texts and numbers; None where one is not finite."""
     if is_dataclass(value):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, Mapping):
         return {key: plain(each) for key, each in value.items()}
-    if isinstance(value, tuple):
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, tuple | list):
         return [plain(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
     return value.value if isinstance(value, Enum) else value
 
 

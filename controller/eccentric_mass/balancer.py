@@ -189,7 +189,7 @@ class EccentricMassBalancer:
     def drawn_input(self, name: str) -> DrawnInput:
         """See `Balancer`."""
         if name == PHASE:
-            return DrawnInput(common=False, measure="")
+            return DrawnInput(common=False, measure="", path=PHASE)
         if name.startswith(FITTED):
             return DrawnInput(common=True, measure=MEASURE_INPUT)
         return drawn_key(self.scene, name)

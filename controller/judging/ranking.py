@@ -1,5 +1,7 @@
 """Which drawn input decides whether a device meets what is asked, and what is worth measuring.
 
+Where all devices meet it, the input that decides how soon they settle, and where none does, what remains.
+
 The first-order index of an input x is S = Var(E[y | x])/Var(y), here by eighths of its distribution: of n
 devices with m_i of mean y_i in each, S = (sum m_i (y_i - y)^2/n - 7 v/n)/Var(y), with the mean variance v
 within an eighth.  Without any effect it is 0 with a standard deviation of sqrt(2 * 7)/n, about 4/n.
@@ -23,6 +25,10 @@ from ringbalance.results.proportion import Proportion
 from ringbalance.results.rows import Finding, Value
 from ringbalance.scene.arrays import FloatArray
 
+MEETS: Final = "meets"
+"""Whether a device meets every demand."""
+SETTLING_TIME, FINAL_AMPLITUDE = "settling_time", "final_amplitude"
+"""Names of `Outcomes`."""
 _PARTS: Final = 8
 _NOTABLE: Final = 0.05
 """Index from which an input is worth a measurement."""
@@ -36,8 +42,12 @@ class Deciding:
 
     name: str
     """As in `Outcomes.inputs`."""
+    path: str
+    """Of its key in the scene; empty: an error of a model."""
+    outcome: str
+    """That it is about: `MEETS`, or in the order of the devices `SETTLING_TIME` or `FINAL_AMPLITUDE`."""
     index: float
-    """First-order index of whether a device meets all that is asked."""
+    """First-order index of that outcome."""
     noise: float
     """Standard deviation of the index of an input without any effect."""
     common: bool
@@ -58,9 +68,16 @@ class Deciding:
         values: dict[str, Value] = {"input": self.name, "index": self.index, "fraction": self.middle.value}
         return Finding(code=self.measure, values=values)
 
+    @property
+    def shared(self) -> Finding:
+        """How much it decides, and whether it varies between devices."""
+        code = "input_not_known" if self.common else "input_varies"
+        return Finding(code=code, values={"input": self.path or self.name, "index": max(self.index, 0.0)})
+
     def document(self) -> dict[str, Any]:
         """For JSON."""
-        return {**asdict(self), "decides": self.decides, "middle": self.middle.document()}
+        middle = self.middle.document()
+        return {**asdict(self), "decides": self.decides, "middle": middle, "text": self.shared.text}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,18 +85,18 @@ class Ranking:
     """Drawn inputs by what they decide."""
 
     inputs: tuple[Deciding, ...] = ()
-    """The one that decides most first; none where all or none of the devices meet what is asked."""
+    """The one that decides most first."""
 
     @property
     def worth_measuring(self) -> tuple[Deciding, ...]:
-        """Those that decide and can be measured."""
-        return tuple(each for each in self.inputs if each.decides and each.measure)
+        """Those that decide whether a device meets what is asked, and can be measured."""
+        return tuple(each for each in self.inputs if each.decides and each.measure and each.outcome == MEETS)
 
     def findings(self) -> Iterator[Finding]:
         """What to measure, or that nothing is."""
         found = self.worth_measuring
         yield from (each.finding for each in found)
-        if self.inputs and not found:
+        if not found and any(each.outcome == MEETS for each in self.inputs):
             yield Finding(code="nothing_to_measure")
 
     def document(self) -> list[dict[str, Any]]:
@@ -89,23 +106,38 @@ class Ranking:
 
 def ranked(balancer: Balancer, judgement: Judgement) -> Ranking:
     """The inputs of judged devices."""
-    met, places = judgement.meets, judgement.outcomes.inputs
-    if met.all() or not met.any():
-        return Ranking()
-    outcome, found = met.astype(np.float64), []
-    for name, place in places.items():
-        drawn, half = balancer.drawn_input(name), np.abs(place - 0.5) < 0.25
-        found.append(
-            Deciding(
-                name=name,
-                index=first_order_index(outcome, place),
-                noise=math.sqrt(2 * (_PARTS - 1)) / met.size,
-                common=drawn.common,
-                measure=drawn.measure,
-                middle=Proportion(count=int(np.count_nonzero(met[half])), of=int(np.count_nonzero(half))),
-            )
-        )
-    return Ranking(inputs=tuple(sorted(found, key=lambda each: -each.index)))
+    name, outcome = _outcome(judgement)
+    places = judgement.outcomes.inputs.items()
+    rows = [
+        _row(balancer, judgement, of, place, name, first_order_index(outcome, place)) for of, place in places
+    ]
+    return Ranking(inputs=tuple(sorted(rows, key=lambda each: -each.index)))
+
+
+def _outcome(judgement: Judgement) -> tuple[str, FloatArray]:
+    """Name of what differs between the devices, and each one's."""
+    met, outcomes = judgement.meets, judgement.outcomes
+    if met.any() and not met.all():
+        return MEETS, met.astype(np.float64)
+    name = SETTLING_TIME if met.all() else FINAL_AMPLITUDE
+    # Ranks, so that a few devices far from all others do not decide alone.
+    return name, np.argsort(np.argsort(getattr(outcomes, name))).astype(np.float64)
+
+
+def _row(
+    balancer: Balancer, judgement: Judgement, name: str, place: FloatArray, outcome: str, index: float
+) -> Deciding:
+    drawn, half, met = balancer.drawn_input(name), np.abs(place - 0.5) < 0.25, judgement.meets
+    return Deciding(
+        name=name,
+        path=drawn.path,
+        outcome=outcome,
+        index=index,
+        noise=math.sqrt(2 * (_PARTS - 1)) / met.size,
+        common=drawn.common,
+        measure=drawn.measure,
+        middle=Proportion(count=int(np.count_nonzero(met[half])), of=int(np.count_nonzero(half))),
+    )
 
 
 def first_order_index(outcome: Sequence[float] | FloatArray, place: npt.ArrayLike) -> float:

@@ -7,7 +7,7 @@ from functools import partial
 
 from ringbalance.controller.balancer import Balancer, Settings
 from ringbalance.controller.judging.judge import Judgement, judged_all
-from ringbalance.controller.judging.ranking import Ranking, ranked
+from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import (
     Along,
@@ -67,7 +67,7 @@ def tuned(
         along_name=axis.name if axis else "",
         along_unit=axis.unit if axis else "1",
         information=information(with_values_at(balancer.scene, best.settings)),
-        ranking=ranked(balancer, best) if best.verdict != MET else Ranking(),
+        ranking=ranked(balancer, best),
         remedies=tried_remedies(balancer, best, search=settings, told=told) if mends else (),
         choices=tried_choices(balancer, search=settings, told=told) if remedies else (),
         open_choice=bool(balancer.choices()),

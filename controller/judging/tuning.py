@@ -57,7 +57,7 @@ class Tuning(PresentedResult):
     remedies: tuple[Remedied, ...] = ()
     """What remedies come to, the best first; tried where what is required is not met."""
     ranking: Ranking = field(default_factory=Ranking)
-    """Which input decides; where what is required is not met."""
+    """Which input decides what the recommended settings come to."""
     choices: tuple[Remedied, ...] = ()
     """What things that can be bought make of a scene that leaves them open."""
     open_choice: bool = False

@@ -187,7 +187,8 @@ def _mending(tuning: Tuning) -> Iterator[Finding]:
         code = "remedy_meets" if each.met else "remedy_best"
         values = {**_values(each.judgement), "what": _changes_text(each.changes)}
         yield Finding(code=code, values=values, change=each.changes)
-    yield from tuning.ranking.findings()
+    if best.verdict != MET:
+        yield from tuning.ranking.findings()
     states = any(each.stated and each.outcome == "final_amplitude" for each in best.demands)
     if best.verdict != MET and states and (reached := amplitude_reached(best)) is not None:
         yield Finding(code="amplitude_reached", values={"amplitude": reached, "asked": best.asked})

@@ -92,9 +92,10 @@ def drawn_input(name: str) -> DrawnInput:
     """What kind of thing an input of drawn devices is, by its name among them."""
     if table := UNCERTAIN_QUANTITIES.get(name):
         common = LIQUID_RING.tables[table].keys[name].common
-        return DrawnInput(common=common, measure=_MEASURED.get(name, MEASURE_INPUT))
+        measure = _MEASURED.get(name, MEASURE_INPUT)
+        return DrawnInput(common=common, measure=measure, path=f"{table}.{name}")
     measure = "measure_fitted" if name.startswith(FITTED) else _MEASURED.get(name, "")
-    return DrawnInput(common=name not in _VARY, measure=measure)
+    return DrawnInput(common=name not in _VARY, measure=measure, path=name if name in _VARY else "")
 
 
 def _of_bore(scene: Scene, model: BalancerModel) -> Iterator[Remedy]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from transfers import Drive
 
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.terms import dynamics_of
@@ -21,7 +22,6 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.arrays import BoolArray, FloatArray
-from ringbalance.verification.reference.transfers import Drive
 
 Velocity = Callable[[FloatArray, FloatArray, FloatArray, BoolArray], tuple[Any, Any]]
 

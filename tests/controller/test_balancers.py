@@ -15,7 +15,7 @@ import ringbalance as rb
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Balancer, balancer_of
 from ringbalance.controller.compare import compare
-from ringbalance.identification.kinds.registry import template
+from ringbalance.identification.reading import template
 from ringbalance.scene.loader import bundled_scene, load_scene, scene_from
 from ringbalance.scene.narrowing import scene_as
 from ringbalance.scene.registry import balancers, register

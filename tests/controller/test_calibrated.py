@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from transfers import Drive, adaptive_ode, marched
 
 from ringbalance import bundled_scene, load_scene
 from ringbalance.controller.liquid_ring.devices import Spread, devices
@@ -17,7 +18,6 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import InputUncertainty
-from ringbalance.verification.reference.transfers import Drive, adaptive_ode, marched
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 
@@ -109,5 +109,5 @@ def test_devices_differ_in_the_measured_factor_of_the_moment(
         uncertainty=(InputUncertainty(quantity="lambda_factor", half_width=0.04, relative=False),),
     )
     made = devices(measured, calibrated, Spread.of(measured, calibrated), range(64), seed=0)
-    factors = [made(place).scene.disc.lambda_factor or 0.0 for place in range(64)]
+    factors = [each.scene.disc.lambda_factor or 0.0 for each in made]
     assert np.std(factors) == pytest.approx(0.04 / 1.96, rel=0.1)

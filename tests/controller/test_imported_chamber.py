@@ -20,7 +20,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel, MomentCurve
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.verification.reference.block_chambers import disc_chamber
+from ringbalance.verification.reference.chambers import disc_chamber
 
 ANGLE = 0.35
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from transfers import Drive, adaptive_ode, closed_form, marched
 
 from ringbalance import bundled_scene, load_scene
 from ringbalance.controller.balancer import FURTHER
@@ -22,7 +23,6 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.transfers import Drive, adaptive_ode, closed_form, marched
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 

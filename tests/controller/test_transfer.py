@@ -8,12 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from ringbalance import bundled_scene, load_scene
-from ringbalance.reduced_model.injection.dynamics import Event
-from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.transfers import (
+from transfers import (
     Drive,
     Integrator,
     adaptive_ode,
@@ -21,6 +16,11 @@ from ringbalance.verification.reference.transfers import (
     explicit_segments,
     marched,
 )
+
+from ringbalance import bundled_scene, load_scene
+from ringbalance.reduced_model.injection.dynamics import Event
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.scene.narrowing import liquid_ring_scene
 
 MARCH = marched(liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper"))).tube)
 

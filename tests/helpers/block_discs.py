@@ -9,7 +9,7 @@ import numpy as np
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc
-from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
+from ringbalance.verification.reference.chambers import block_chamber, disc_chamber
 
 
 def sector_chamber(

@@ -20,8 +20,8 @@ from ringbalance.controller.rotor import chamber_letters
 from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import FitResult, fit
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.parameters import MODEL_ERRORS
+from ringbalance.identification.reading import KINDS
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ringbalance.identification.kinds.registry import template
+from ringbalance.identification.reading import template
 
 ROWS = {
     "trial_weight": ("0,0,10,90,a", "100,0,11.5,85,a", "100,180,9.2,97,a"),

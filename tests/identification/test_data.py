@@ -13,8 +13,7 @@ import pytest
 import ringbalance as rb
 from ringbalance.identification import tables
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS, template
-from ringbalance.identification.reading import observations_of, read_observations
+from ringbalance.identification.reading import KINDS, observations_of, read_observations, template
 from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.models import Scene
 

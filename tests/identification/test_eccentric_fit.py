@@ -22,9 +22,9 @@ from ringbalance.identification.criticism import Review
 from ringbalance.identification.fitting import fit
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import _offered_rows, _words_of, next_measurement
 from ringbalance.identification.parameters import FitError
+from ringbalance.identification.reading import KINDS
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.paths import value_at, with_values_at

@@ -15,9 +15,9 @@ from synthetic_rigs import covered, fitted, measured, observations, rig
 from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import FitResult, fit, problem_of
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.likelihood import Block, Problem
 from ringbalance.identification.parameters import MODEL_ERRORS, FitError
+from ringbalance.identification.reading import KINDS
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty

@@ -15,9 +15,8 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.identification.criticism import Criticism, LawComparison, Review
-from ringbalance.identification.kinds.registry import KINDS, template
 from ringbalance.identification.parameters import informed
-from ringbalance.identification.reading import observations_of, read_observations
+from ringbalance.identification.reading import KINDS, observations_of, read_observations, template
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene

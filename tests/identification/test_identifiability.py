@@ -14,7 +14,7 @@ from ringbalance.identification.device import Models
 from ringbalance.identification.fitting import FitResult, fit
 from ringbalance.identification.identifiability import DEPENDENT, Identified, _power_text
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.identification.reading import KINDS
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty

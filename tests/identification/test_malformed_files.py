@@ -12,8 +12,7 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
-from ringbalance.identification.reading import read_observations
+from ringbalance.identification.reading import KINDS, read_observations
 from ringbalance.scene import SceneError, bundled_scene
 from ringbalance.scene.faults import MOST_SHOWN
 from ringbalance.scene.models import Scene

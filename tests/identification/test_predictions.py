@@ -14,7 +14,7 @@ from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.identification.device import Device, Models
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
+from ringbalance.identification.reading import KINDS
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrated_model

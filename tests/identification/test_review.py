@@ -13,7 +13,6 @@ from ringbalance.identification.criticism import Review
 from ringbalance.identification.device import Device, Models
 from ringbalance.identification.fitting import FitResult, fit
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import (
     NextMeasurement,
     _offered_rows,
@@ -21,6 +20,7 @@ from ringbalance.identification.next_measurement import (
     next_measurement,
 )
 from ringbalance.identification.other_laws import LAMINAR, UNBROKEN, power_of
+from ringbalance.identification.reading import KINDS
 from ringbalance.identification.saving import save_result
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray

@@ -15,8 +15,8 @@ from ringbalance.identification.criticism import Review
 from ringbalance.identification.fitting import FitResult, fit
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
 from ringbalance.identification.next_measurement import next_measurement
+from ringbalance.identification.reading import KINDS
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.validation.comparison import measurements

@@ -28,7 +28,7 @@ from ringbalance.mesh.wall_integrals import LONGEST, integrals, split_patches, w
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import STRETCHED, CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc
-from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
+from ringbalance.verification.reference.chambers import block_chamber, disc_chamber
 
 KINDS = get_args(CellKind)
 X0, X1, HALF, WIDTH = 0.02, 0.045, 0.02, 0.06

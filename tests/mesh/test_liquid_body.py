@@ -20,7 +20,7 @@ from ringbalance.physics.pressure.solve import quadratic_basis, side
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.block_chambers import block_chamber
+from ringbalance.verification.reference.chambers import block_chamber
 
 _ANGLE, _WIDTH = np.pi / 2, 1.3
 

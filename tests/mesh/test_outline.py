@@ -12,7 +12,7 @@ from ringbalance.mesh.section import outlines
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc
-from ringbalance.verification.reference.block_chambers import disc_chamber
+from ringbalance.verification.reference.chambers import disc_chamber
 
 
 def area(loop: FloatArray) -> float:

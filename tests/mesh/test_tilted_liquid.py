@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from ringbalance.mesh.chamber_table import ChamberTable, TiltedLiquid, chamber_table, tilted_liquid
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.reference.block_chambers import block_chamber
+from ringbalance.verification.reference.chambers import block_chamber
 
 X0, X1, HALF, WIDTH = 0.02, 0.045, 0.02, 0.06
 FILLS = (0.1, 0.4, 0.8)

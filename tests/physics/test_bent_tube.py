@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
-from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
+from ringbalance.verification.navier_stokes.tube import SectionMesh
 from ringbalance.verification.reference.bent_tube import (
     BentTubeFlow,
     Segment,

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 
 from ringbalance.physics.results import StatusCode
 from ringbalance.physics.tube.local_losses import end_table, laminar_entrance_loss, laminar_exit_loss
-from ringbalance.verification.navier_stokes.end_losses import (
+from ringbalance.verification.navier_stokes.flow import FlowSystem
+from ringbalance.verification.navier_stokes.newton import FlowSolution
+from ringbalance.verification.navier_stokes.tube import (
     End,
     EndMesh,
     solve_end,
 )
-from ringbalance.verification.navier_stokes.flow import FlowSystem
-from ringbalance.verification.navier_stokes.newton import FlowSolution
 
 
 def _cells(end: End) -> EndMesh:

@@ -13,7 +13,7 @@ from ringbalance.mesh.section import NoPlaneWavesError, middle_section
 from ringbalance.physics.sloshing import resonant_fills, sloshing_modes, sloshing_response
 from ringbalance.scene.chamber_file.record import CellKind
 from ringbalance.scene.models import Disc
-from ringbalance.verification.reference.block_chambers import block_chamber, disc_chamber
+from ringbalance.verification.reference.chambers import block_chamber, disc_chamber
 
 _FILL = 0.3
 

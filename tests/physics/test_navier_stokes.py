@@ -23,11 +23,11 @@ from skfem import MeshHex
 
 from ringbalance.physics.results import StatusCode
 from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
-from ringbalance.verification.navier_stokes.meshes import Patch, patch_mesh
 from ringbalance.verification.navier_stokes.newton import (
     NewtonSettings,
     solve_flow,
 )
+from ringbalance.verification.navier_stokes.tube import Patch, patch_mesh
 
 DATA = Path(__file__).parent / "data"
 

@@ -15,7 +15,7 @@ from ringbalance.physics.results import StatusCode
 from ringbalance.physics.sloshing import SloshingResponse, resonant_fills, sloshing_modes, sloshing_response
 from ringbalance.physics.sloshing_system import SloshingSystem, sloshing_system
 from ringbalance.scene.models import Disc
-from ringbalance.verification.reference.sloshing_exact import CosineWaves
+from ringbalance.verification.reference.chambers import CosineWaves
 
 OMEGA = 10_000 * np.pi / 30
 

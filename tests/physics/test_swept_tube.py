@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from skfem import Basis, ElementHex2, FacetBasis
 
-from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
+from ringbalance.verification.navier_stokes.tube import SectionMesh
 from ringbalance.verification.reference.bent_tube import Segment, SweptTube, swept_tube
 
 BEND = Segment(length=np.pi, turn=-np.pi / 2, cells=4)

@@ -22,7 +22,7 @@ from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.verification.cases.sections import decay_length, slowest_decay
 from ringbalance.verification.navier_stokes.flow import Coefficients, FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
-from ringbalance.verification.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.tube import (
     SectionMesh,
     developed_section,
     solve_section_without_inertia,

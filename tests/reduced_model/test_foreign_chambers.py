@@ -20,7 +20,7 @@ from ringbalance.scene.chamber_file.elements import boundary_facets
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.verification.reference.block_chambers import block_chamber
+from ringbalance.verification.reference.chambers import block_chamber
 
 OUTER, INNER, WIDTH, HALF = 44.5, 20.5, 62.0, float(np.radians(34.0))
 """mm and rad, of all chambers but for what each says."""

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.verification.evidence import from_rounding
-from ringbalance.verification.verdicts import compare
+from ringbalance.verification.evidence import compare, from_rounding
 
 SMALL = st.floats(min_value=0, max_value=1e6)
 ANY = st.floats(min_value=-1e6, max_value=1e6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ringbalance.verification.cases.uncertainties import error_ratios, how_fared
+from ringbalance.verification.cases.finite_elements import error_ratios, how_fared
 
 
 @pytest.mark.parametrize(

@@ -19,11 +19,10 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.toml import toml_bytes
 from ringbalance.verification.extremes import design as extremes_design
 from ringbalance.verification.extremes import point as extremes_point
-from ringbalance.verification.extremes.axes import AXES, fitted, varied
-from ringbalance.verification.extremes.design import CHUNK, Base, Point, design
+from ringbalance.verification.extremes.design import AXES, CHUNK, Base, Point, design, fitted, varied
 from ringbalance.verification.extremes.point import Defect, Ending, Judgement, judge_point
 from ringbalance.verification.extremes.study import Size, Sweep, find_extremes
-from ringbalance.verification.reference.exact_chamber import exact_moment
+from ringbalance.verification.reference.chambers import exact_moment
 
 
 @pytest.fixture(scope="module")

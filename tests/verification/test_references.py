@@ -14,7 +14,7 @@ from ringbalance.mesh.geometry import chamber_volume, half_angle, liquid_area, s
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.cases import sections as case
 from ringbalance.verification.evidence import input_uncertainty
-from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment, exact_wall_pressure
+from ringbalance.verification.reference.chambers import central_lambda, exact_moment, exact_wall_pressure
 from ringbalance.verification.reference.pressure import Manufactured, exact_ring
 
 

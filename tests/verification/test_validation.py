@@ -17,16 +17,15 @@ from scipy.stats import binomtest
 from ringbalance.identification.kinds import bench
 from ringbalance.identification.kinds.bench import laminar_ratio, tank_frequency
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
-from ringbalance.identification.reading import read_observations
+from ringbalance.identification.reading import KINDS, read_observations
 from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95
-from ringbalance.verification.cases.measured_laminar_tubes.case import CALIBRATING
+from ringbalance.verification.cases.measured import CALIBRATING
 from ringbalance.verification.catalogue import case_code, load_case
-from ringbalance.verification.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.tube import (
     DuctMesh,
     friction_ratio,
     solve_section_without_inertia,

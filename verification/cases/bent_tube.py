@@ -23,7 +23,7 @@ from ringbalance.verification.evidence import (
     Table,
     figure,
 )
-from ringbalance.verification.navier_stokes.rotating_section import SectionMesh
+from ringbalance.verification.navier_stokes.tube import SectionMesh
 from ringbalance.verification.reference.bent_tube import BentTubeFlow, Segment, bend_shift
 
 REYNOLDS: Final = 200.0

@@ -45,7 +45,7 @@ from ringbalance.verification.papers import (
     rounded_radius,
     with_plate,
 )
-from ringbalance.verification.reference.exact_chamber import central_lambda, exact_moment
+from ringbalance.verification.reference.chambers import central_lambda, exact_moment
 
 _LAMBDA_DIGIT: Final = 1e-3
 _LAMBDA_UNCERTAINTY: Final = math.hypot(

@@ -149,7 +149,7 @@ def _positioning_effort(
             else:
                 extra = friction_torque(law, believed_arm, 0.0, speed, rate[i], -angle[i])
             net = asked[i] + extra - law.track.damping * rate[i]
-            rate[i] = later_rate(law, arm, speed, rate[i], net, step)
+            rate[i] = _later_rate(law, arm, speed, rate[i], net, step)
             angle[i] += step * rate[i]
         total += step * math.hypot(asked[0], asked[1])
     return total
@@ -166,7 +166,7 @@ def printed_compensation(law: DriveLaw, arm: float, speed: float, angle: float, 
 
 
 @compiled
-def later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float, step: float) -> float:
+def _later_rate(law: DriveLaw, arm: float, speed: float, rate: float, net: float, step: float) -> float:
     """Rate one step later under dry friction; a mass that would turn round within the step rests first."""
     most = arm * law.track.moment * (speed + rate) ** 2
     if rate == 0:
@@ -213,7 +213,7 @@ def _rest(law: DriveLaw, arm: float, compensated: float, speed: float, step: flo
     for _ in range(round(duration / step)):
         torque = regulator_torque(law, angle, rate, 0.0)
         torque += friction_torque(law, compensated, 0.0, speed, rate, -angle)
-        rate = later_rate(law, arm, speed, rate, torque - law.track.damping * rate, step)
+        rate = _later_rate(law, arm, speed, rate, torque - law.track.damping * rate, step)
         angle += step * rate
         if abs(angle) > abs(10 * _START):
             break

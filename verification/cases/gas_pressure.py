@@ -28,7 +28,7 @@ from ringbalance.verification.evidence import (
 from ringbalance.verification.finite_elements import found_of, ring_of
 from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.papers import DENSITY, HIGHEST_PRESSURE, LOWEST_PRESSURE
-from ringbalance.verification.reference.exact_chamber import exact_moment, wall_pressure_of
+from ringbalance.verification.reference.chambers import exact_moment, wall_pressure_of
 
 _POINTS: Final = 101
 _STANDARD: Final = 1e-6

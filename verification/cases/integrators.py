@@ -1,29 +1,33 @@
-"""One operation under a flow law by every integrator: the program's march, Eq. 20's segments, adaptive steps.
+"""One operation under a flow law by the program's march and by Eq. 20's segments.
 
-Laws with exact solutions: the paper's, and one without its parabola in time.  Near a stall u goes like the
-square root of the distance d: u = c sqrt(d), and with kappa = (S/V) c dt one segment takes d to
-d - kappa sqrt(d).  The exact flow stalls after tau = 2 sqrt(d)/((S/V) c).  A segment stays on its side of
-the stall only while kappa <= sqrt(d), which is dt <= tau/2: however short the segments, the last ones are too
-long.  What steps over lands kappa sqrt(d) - d beyond the stall, kappa^2/4 at the most.  A full tube would let
-it flow back from there: the map's slope 1 - kappa/(2 sqrt(d)) leaves (-1, 1) where sqrt(d) < kappa/4, and the
-steps end in the cycle d = +-kappa^2/4, in which that slope is zero, so that every start is drawn into it.
+Exact are the closed form of the paper's law, and for any other one the time t = (V/S) int dx/u to a fill x.
+Near a stall u goes like the square root of the distance d: u = c sqrt(d), and with kappa = (S/V) c dt one
+segment takes d to d - kappa sqrt(d). The exact flow stalls after tau = 2 sqrt(d)/((S/V) c). A segment stays
+on its side of the stall only while kappa <= sqrt(d), which is dt <= tau/2: however short the segments, the
+last ones are too long. What steps over lands kappa sqrt(d) - d beyond the stall, kappa^2/4 at the most. A
+full tube would let it flow back from there: the map's slope 1 - kappa/(2 sqrt(d)) leaves (-1, 1) where
+sqrt(d) < kappa/4, and the steps end in the cycle d = +-kappa^2/4, in which that slope is zero, so that
+every start is drawn into it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, Final
+from itertools import pairwise
+from typing import Any, Final, cast
 
 import numpy as np
+import numpy.typing as npt
+from scipy.integrate import quad
 
-from ringbalance.reduced_model.law.flow_law import Flow
+from ringbalance.reduced_model.injection.dynamics import Column, Dynamics, Event
+from ringbalance.reduced_model.injection.pair import Motion, PairState, opened, pass_time
+from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.paper import stall_pressure
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import Scene, Tube
 from ringbalance.verification.evidence import (
     Curve,
     Evidence,
@@ -32,21 +36,11 @@ from ringbalance.verification.evidence import (
     NotRunError,
     Reference,
     Series,
-    Table,
     as_found,
     figure,
     from_half_width,
 )
 from ringbalance.verification.finite_elements import OrderStudy
-from ringbalance.verification.reference.transfers import (
-    Drive,
-    Integrator,
-    adaptive_ode,
-    closed_form,
-    explicit_segments,
-    marched,
-    paper_drive,
-)
 
 _SHARE: Final = 0.9
 """Of the time until the chamber is empty or the flow stalls; at a stall itself no scheme has its order."""
@@ -59,15 +53,6 @@ _BELOW_STALL: Final = 0.6
 """Gas pressures in units of the one that empties a chamber."""
 _KINK: Final = 0.6
 """Fill, in units of the largest, below which the kinked law slows down."""
-_WAYS: Final[Mapping[str, Integrator]] = {
-    "closed form": closed_form,
-    "adaptive, 1e-5": adaptive_ode(tolerance=1e-5),
-    "adaptive, 1e-8": adaptive_ode(tolerance=1e-8),
-    "adaptive, 1e-11": adaptive_ode(tolerance=1e-11),
-    "Eq. 20, 16 segments": explicit_segments(16),
-    "Eq. 20, 128 segments": explicit_segments(128),
-    "Eq. 20, 1024 segments": explicit_segments(1024),
-}
 _SEGMENTS: Final = (8, 16, 32, 64, 128)
 _PHASES: Final = np.linspace(1.0, 1.3, 31)
 """Durations, in units of the time to the stall: each lets the segments meet the stall differently."""
@@ -77,34 +62,99 @@ _CYCLES: Final = 5
 """Times to the stall after which a tube that stays full has found its cycle."""
 
 
-def _from_full(law: PaperLaw, gas_pressure: float) -> Drive:
-    return paper_drive(law, gas_pressure=gas_pressure, fill=law.max_fill_ratio, total=law.max_fill_ratio)
+@dataclass(frozen=True, kw_only=True)
+class _Operation:
+    """One chamber under a constant gas pressure that empties; its tube is dry, the other one vented.
+
+    dx/dt = -(S/V) u(x, x_max - x, p).
+    """
+
+    law: FlowLaw
+    fill: float
+    """x at the start; the pair holds the largest fill in all."""
+    exchange_rate: float
+    """S/V, 1/m."""
+    gas_pressure: float
+
+    @classmethod
+    def from_full(cls, law: PaperLaw, gas_pressure: float) -> _Operation:
+        """From the largest fill."""
+        rate = law.tube_area / law.chamber_volume
+        return cls(law=law, fill=law.max_fill_ratio, exchange_rate=rate, gas_pressure=gas_pressure)
+
+    def velocity(self, fill: npt.ArrayLike) -> FloatArray:
+        """m/s."""
+        largest = self.law.max_fill_ratio
+        x, pressure = np.clip(fill, 0.0, largest), self.gas_pressure
+        flow = self.law.evaluate(
+            fill_ratio=x, opposite_fill_ratio=largest - x, gas_pressure=pressure, primed=True
+        )
+        return flow.velocity
+
+    def _parabola(self) -> tuple[float, float, float]:
+        """By the paper's law u^2 = a (p + b (2 x - x_max)), so that u falls evenly in time.
+
+        Returns: u at the start, m/s; its fall, m/s^2; time until u or the fill is zero, s, or nan.
+        """
+        law, rate = cast(PaperLaw, self.law), self.exchange_rate
+        a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
+        squared = a * (self.gas_pressure + b * (2 * self.fill - law.max_fill_ratio))
+        if squared <= 0 or self.gas_pressure <= 0:
+            return 0.0, 0.0, math.nan
+        first, slowing = math.sqrt(squared), a * b * rate
+        left = squared - 2 * slowing * self.fill / rate
+        if left <= 0:
+            return first, slowing, first / slowing
+        return first, slowing, 2 * self.fill / rate / (first + math.sqrt(left))
+
+    @property
+    def end(self) -> float:
+        """Time at which the flow ends by itself, s; nan where it does not begin."""
+        return self._parabola()[2]
+
+    def exact(self, time: npt.ArrayLike) -> FloatArray:
+        """Fills x0 - (S/V) (u0 t - u' t^2/2): Eqs. 19 and 20 in the limit of small segments."""
+        first, slowing, end = self._parabola()
+        t = np.minimum(time, end)
+        return np.asarray(np.maximum(self.fill - self.exchange_rate * t * (first - slowing * t / 2), 0.0))
+
+    def by_segments(self, duration: float, count: int) -> float:
+        """Fill after equal explicit segments, x_i = x_(i-1) - u_(i-1) S dt/V: Eq. 20.
+
+        Near a stall a segment may step over it; the law then answers with zero, and the fill stays there.
+        """
+        x = self.fill
+        for _ in range(count):
+            x = max(x - float(self.velocity(x)) * self.exchange_rate * duration / count, 0.0)
+        return x
+
+    def marched(self, tube: Tube, time: FloatArray) -> tuple[FloatArray, float | None]:
+        """Fills by the march that every run takes, the law alone at work, and when the flow ended, s."""
+        dynamics = Dynamics(
+            column=Column.of(law=self.law, tube=tube),
+            inertia=False,
+            line=None,
+            valve_lag=0.0,
+            gas_pressure=self.gas_pressure,
+            ambient_pressure=1e5,
+            dead_volume=0.0,
+            tube_area=self.exchange_rate,
+            chamber_volume=1.0,
+            max_fill_ratio=self.law.max_fill_ratio,
+        )
+        valve = opened(dynamics, chamber=0, duration=2 * float(time[-1]) + 1)
+        pair = PairState(
+            fill=self.fill, total=self.law.max_fill_ratio, primed=False, motion=Motion(pending=valve)
+        )
+        path = pass_time(dynamics, pair, instants=time)
+        return path.fills, path.ended if path.motion.record.event is not Event.NONE else None
 
 
-def _end(drive: Drive) -> float:
-    """Time at which the flow ends by itself, s; nan where it does not begin."""
-    return closed_form(drive, np.array([1e9])).event_time or math.nan
-
-
-def _last_fill(way: Integrator, drive: Drive, duration: float) -> float:
-    return float(way(drive, np.array([duration])).fill[-1])
-
-
-def _moved(way: Integrator, drive: Drive, duration: float) -> float:
-    """Fill ratio given away."""
-    return drive.fill - _last_fill(way, drive, duration)
-
-
-def _by_segments(
-    drive: Drive, duration: float, counts: Sequence[int], *, frozen: bool
-) -> tuple[list[float], OrderStudy]:
-    """Fill that segments move, and their relative errors. Args: `frozen`: the first velocity is kept."""
-    exact = _moved(closed_form, drive, duration)
-    moved = [_moved(explicit_segments(count), drive, duration) for count in counts]
-    if frozen:
-        moved = [float(drive.flow(drive.fill).velocity) * drive.exchange_rate * duration] * len(counts)
-    error = [abs(one / exact - 1) for one in moved]
-    return moved, OrderStudy.of(size=[counts[0] / count for count in counts], error=error)
+def _moved(operation: _Operation, duration: float, count: int | None = None) -> float:
+    """Fill ratio given away, by so many segments, or exactly."""
+    if count is None:
+        return operation.fill - float(operation.exact(duration))
+    return operation.fill - operation.by_segments(duration, count)
 
 
 def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -112,12 +162,17 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
 
     Raises: NotRunError: the gas pressure does not start the flow.
     """
-    drive = _from_full(paper_law(scene), scene.gas.pressure)
-    duration = _SHARE * _end(drive)
+    operation = _Operation.from_full(paper_law(scene), scene.gas.pressure)
+    duration, exact = _SHARE * operation.end, _moved(operation, _SHARE * operation.end)
     if math.isnan(duration):
         raise NotRunError("the gas pressure of this scene does not start the flow by Eq. 19: raise it")
-    moved, study = _by_segments(drive, duration, _COUNTS, frozen=defect == "frozen_velocity")
-    exact = _moved(closed_form, drive, duration)
+    moved = [_moved(operation, duration, count) for count in _COUNTS]
+    if defect == "frozen_velocity":
+        first = float(operation.velocity(operation.fill))
+        moved = [first * operation.exchange_rate * duration] * len(_COUNTS)
+    study = OrderStudy.of(
+        size=[_COUNTS[0] / count for count in _COUNTS], error=[abs(one / exact - 1) for one in moved]
+    )
     # Richardson's extrapolation at first order; half of the last correction bounds what it has left.
     limit = moved[-1] + (moved[-1] - moved[-2])
     counts = np.array(_COUNTS, dtype=np.float64)
@@ -137,23 +192,23 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         numbers={
             "duration": duration,
             "moved": exact,
-            "single": abs(_moved(explicit_segments(1), drive, duration) / exact - 1),
-            "segments_percent": _segments_for(drive, duration, 1e-2),
-            "segments_per_mille": _segments_for(drive, duration, 1e-3),
+            "single": abs(_moved(operation, duration, 1) / exact - 1),
+            "segments_percent": _segments_for(operation, duration, 1e-2),
+            "segments_per_mille": _segments_for(operation, duration, 1e-3),
             "short": _SHORT * duration,
-            "short_segments": _segments_for(drive, _SHORT * duration, 1e-3),
+            "short_segments": _segments_for(operation, _SHORT * duration, 1e-3),
         },
         series=(shown,),
         convergence=(study.table("moved fill ratio, relative", 1.0),),
     )
 
 
-def _segments_for(drive: Drive, duration: float, tolerance: float) -> float:
+def _segments_for(operation: _Operation, duration: float, tolerance: float) -> float:
     """Smallest number of segments within a tolerance: first guessed from the error of many, then counted."""
-    exact, many = _moved(closed_form, drive, duration), _COUNTS[-1]
+    exact, many = _moved(operation, duration), _COUNTS[-1]
 
     def error(count: int) -> float:
-        return abs(_moved(explicit_segments(count), drive, duration) / exact - 1)
+        return abs(_moved(operation, duration, count) / exact - 1)
 
     count = max(1, math.ceil(many * error(many) / tolerance))
     while error(count) > tolerance:
@@ -162,61 +217,54 @@ def _segments_for(drive: Drive, duration: float, tolerance: float) -> float:
 
 
 def orders(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
-    """Every integrator on one operation, and Eq. 20's segments into a stall."""
-    law, march = paper_law(scene), marched(scene.tube)
+    """The march on one operation, and Eq. 20's segments into a stall."""
+    law, tube = paper_law(scene), scene.tube
     empties = stall_pressure(
         disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
     )
-    long, low = (_from_full(law, share * empties) for share in (_ABOVE_STALL, _BELOW_STALL))
+    long, low = (_Operation.from_full(law, share * empties) for share in (_ABOVE_STALL, _BELOW_STALL))
     spoiled = 1.001 if defect == "exchange_rate_off" else 1.0
-    used, used_low = (replace(drive, exchange_rate=drive.exchange_rate * spoiled) for drive in (long, low))
-    duration = _SHARE * _end(long)
+    used, used_low = (replace(one, exchange_rate=one.exchange_rate * spoiled) for one in (long, low))
+    duration = _SHARE * long.end
     t, fine = (np.linspace(0, duration, count + 1)[1:] for count in (20, _INSTANTS))
-    stalls = march(used_low, np.array([2 * _end(low)])).event_time
-    _, study = _by_segments(long, duration, _COUNTS[1:-1], frozen=defect == "frozen_velocity")
-    kinked = replace(long, law=_SlowedLaw(law, _kinked))
+    _, stalls = used_low.marched(tube, np.array([2 * low.end]))
+    kinked = _KinkedLaw(law)
+    path, _ = replace(used, law=kinked).marched(tube, t)
     stalled, longest, drawn = _stall_study(low, law, spoiled=defect == "stall_rate_off")
     return Evidence(
         found=as_found(
-            march_error=_difference(march(used, fine).fill, closed_form(long, fine).fill),
-            stall_error=1.0 if stalls is None else abs(stalls / _end(low) - 1),
-            moved_error=_moved_error(march, long, duration),
-            explicit_order=study.settled_order,
-            kinked_difference=_difference(
-                march(kinked, t).fill, adaptive_ode(tolerance=1e-11)(kinked, t).fill
-            ),
-            tapered_march=_tapered_error(long, law, t, march),
-            tapered_adaptive=_tapered_error(long, law, t, adaptive_ode(tolerance=1e-10)),
+            march_error=np.max(np.abs(used.marched(tube, fine)[0] - long.exact(fine))),
+            stall_error=1.0 if stalls is None else abs(stalls / low.end - 1),
+            kinked_difference=_off_in_fill(replace(long, law=kinked), t, path),
             **stalled,
         ),
-        numbers={"longest_for_per_mille": longest, "time_to_stall": _end(low)},
+        numbers={"longest_for_per_mille": longest, "time_to_stall": low.end},
         series=(drawn,),
-        tables=(_side_by_side(march, long, law, duration),),
-        convergence=(study.table("fill by explicit segments, relative error", 1.0),),
     )
 
 
-def _difference(fill: FloatArray, other: FloatArray) -> float:
-    return float(np.max(np.abs(fill - other)))
+def _off_in_fill(operation: _Operation, time: FloatArray, fill: FloatArray) -> float:
+    """Largest error of falling fills at instants, by the exact time (V/S) int dx/u to each."""
 
+    def slowness(x: float) -> float:
+        return 1 / (operation.exchange_rate * float(operation.velocity(x)))
 
-def _moved_error(march: Integrator, drive: Drive, duration: float) -> float:
-    """S times the integral of u along the march's own path, by Gauss's rule in time."""
-    abscissa, weight = np.polynomial.legendre.leggauss(20)
-    t = duration * (1 + abscissa) / 2
-    path = march(drive, np.append(t, duration))
-    passed = drive.exchange_rate * duration / 2 * float(weight @ drive.flow(path.fill[:-1]).velocity)
-    return abs(passed / (drive.fill - float(path.fill[-1])) - 1)
+    cuts = [operation.fill, *fill.tolist()]
+    kink = [_KINK * operation.law.max_fill_ratio]
+    steps = [
+        quad(slowness, low, high, points=kink if low < kink[0] < high else None, epsabs=0, epsrel=1e-12)[0]
+        for high, low in pairwise(cuts)
+    ]
+    speed = operation.exchange_rate * operation.velocity(fill)
+    return float(np.max(np.abs((np.cumsum(steps) - time) * speed)))
 
 
 @dataclass(frozen=True)
-class _SlowedLaw:
-    """The paper's law, slower in the share of its velocity that a function of the fill gives."""
+class _KinkedLaw:
+    """The paper's law, slower in proportion to the fill once that is below a kink; continuous, not smooth."""
 
     base: PaperLaw
-    share: Callable[[FloatArray, float], FloatArray]
-    """From x of the driven chamber and the largest x."""
-    name: str = "slowed"
+    name: str = "kinked"
 
     @property
     def max_fill_ratio(self) -> float:
@@ -226,70 +274,12 @@ class _SlowedLaw:
     def evaluate(self, **asked: Any) -> Flow:
         """As the paper's law, slowed."""
         flow = self.base.evaluate(**asked)
-        share = self.share(np.asarray(asked["fill_ratio"], dtype=np.float64), self.max_fill_ratio)
-        return replace(flow, velocity=flow.velocity * share)
-
-
-def _kinked(fill_ratio: FloatArray, largest: float) -> FloatArray:
-    """Slower in proportion to the fill once that is below a kink; continuous, not smooth."""
-    return np.asarray(np.minimum(1.0, 0.5 + 0.5 * fill_ratio / (_KINK * largest)))
-
-
-def _tapered(fill_ratio: FloatArray, largest: float) -> FloatArray:
-    """Smooth, and with an exact solution of its own."""
-    return np.asarray((1 + fill_ratio / largest) / 2)
-
-
-def _tapered_error(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrator) -> float:
-    """Largest error in fill of an integrator under the tapered law, from a pressure that empties the chamber.
-
-    With s = sqrt(alpha + beta x) and u = s (1 + x/x_max)/2 the fill obeys ds/dt = -(S/V) (A + D s^2)/2, so
-    s = sqrt(A/D) tan(atan(s_0 sqrt(D/A)) - (S/V) sqrt(A D) t/2).
-    """
-    a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
-    alpha, beta = a * (drive.gas_pressure - b * drive.total), 2 * a * b
-    d = 0.5 / law.max_fill_ratio
-    rest = beta / 2 - d * alpha
-    start = math.atan(math.sqrt(alpha + beta * drive.fill) * math.sqrt(d / rest))
-    s = math.sqrt(rest / d) * np.tan(start - drive.exchange_rate * math.sqrt(rest * d) / 2 * time)
-    tapered = replace(drive, law=_SlowedLaw(law, _tapered))
-    return _difference(way(tapered, time).fill, (s**2 - alpha) / beta)
-
-
-def _side_by_side(march: Integrator, drive: Drive, law: PaperLaw, duration: float) -> Table:
-    """Error at the end of a long operation, and what it costs; the closed form is the reference."""
-    t, exact = np.array([duration]), _last_fill(closed_form, drive, duration)
-    ways = {"march": march, **_WAYS}
-    others = [way for way in ways.values() if way is not closed_form]
-    tapered = {way: f"{_tapered_error(drive, law, t, way):.1e}" for way in others}
-    taken = {way: _velocities_taken(drive, law, t, way) for way in others}
-    errors = [abs(_last_fill(way, drive, duration) - exact) for way in ways.values()]
-    round_off = np.finfo(np.float64).eps
-    return Table(
-        name="integrators side by side: error in fill at the end of a long operation",
-        columns={
-            "integrator": list(ways),
-            "error, paper's law": [f"{e:.1e}" if e > round_off else "round-off" for e in errors],
-            "error, tapered law": [tapered.get(way, "does not apply") for way in ways.values()],
-            "velocities taken": [taken.get(way, "none") for way in ways.values()],
-        },
-    )
-
-
-def _velocities_taken(drive: Drive, law: PaperLaw, time: FloatArray, way: Integrator) -> str:
-    """At how many points an integrator asks the law, its table included where it makes one."""
-    sizes: list[int] = []
-
-    def count(fill_ratio: FloatArray, _: float) -> FloatArray:
-        sizes.append(fill_ratio.size)
-        return np.ones_like(fill_ratio)
-
-    way(replace(drive, law=_SlowedLaw(law, count)), time)
-    return f"{sum(sizes)}"
+        share = np.asarray(asked["fill_ratio"]) / (_KINK * self.max_fill_ratio)
+        return replace(flow, velocity=flow.velocity * np.minimum(1.0, 0.5 + 0.5 * share))
 
 
 def _stall_study(
-    drive: Drive, law: PaperLaw, *, spoiled: bool = False
+    operation: _Operation, law: PaperLaw, *, spoiled: bool = False
 ) -> tuple[dict[str, float], float, Series]:
     """Run the segments into the stall; `spoiled`: with the derivation's rate off by a tenth on purpose.
 
@@ -297,14 +287,14 @@ def _stall_study(
         thousandth of the fill at the most, s; and both over the number of segments.
     """
     a, b = law.velocity_squared_per_pressure, law.pressure_per_fill_difference
-    stall = (drive.total - drive.gas_pressure / b) / 2
-    per_root = drive.exchange_rate * math.sqrt(2 * a * b)  # (S/V) c
+    stall = (law.max_fill_ratio - operation.gas_pressure / b) / 2
+    per_root = operation.exchange_rate * math.sqrt(2 * a * b)  # (S/V) c
     rate = per_root * (1.1 if spoiled else 1.0)
-    end = 2 * math.sqrt(drive.fill - stall) / per_root
+    end = 2 * math.sqrt(operation.fill - stall) / per_root
     counts = np.array(_SEGMENTS, dtype=np.float64)
     bound = (rate * end / counts) ** 2 / 4
-    over = np.array([_overshoots(drive, stall, end, n) for n in _SEGMENTS])
-    cycle = np.array([_cycle(per_root, drive.fill - stall, end, n) for n in _SEGMENTS])
+    over = np.array([_overshoots(operation, stall, end, n) for n in _SEGMENTS])
+    cycle = np.array([_cycle(per_root, operation.fill - stall, end, n) for n in _SEGMENTS])
     # Durations differ a little between the runs of one count, so each is compared with its own bound.
     share = over / (bound[:, None] * _PHASES**2)
     judged = {
@@ -312,7 +302,7 @@ def _stall_study(
         # At the number of segments where it is least: the bound is met, not only kept.
         "overshoot_reach": float(share.max(axis=1).min()),
         "cycle_error": float(np.max(np.abs(cycle / bound - 1))),
-        "limit_error": max(abs(_longest(drive, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),
+        "limit_error": max(abs(_longest(operation, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),
     }
     drawn = figure(
         "fill beyond the stall against the length of a segment",
@@ -325,10 +315,10 @@ def _stall_study(
     return judged, 2 * math.sqrt(1e-3) / rate, drawn
 
 
-def _overshoots(drive: Drive, stall: float, end: float, count: int) -> FloatArray:
+def _overshoots(operation: _Operation, stall: float, end: float, count: int) -> FloatArray:
     """How far beyond the stall segments land, for durations that are a little different."""
-    landed = map(partial(_last_fill, explicit_segments(count), drive), (end * _PHASES).tolist())
-    return np.maximum(stall - np.array(list(landed)), 0.0)
+    landed = [operation.by_segments(duration, count) for duration in (end * _PHASES).tolist()]
+    return np.maximum(stall - np.array(landed), 0.0)
 
 
 def _cycle(per_root: float, distance: float, end: float, count: int) -> float:
@@ -338,12 +328,12 @@ def _cycle(per_root: float, distance: float, end: float, count: int) -> float:
     return abs(distance)
 
 
-def _longest(drive: Drive, stall: float, distance: float) -> float:
+def _longest(operation: _Operation, stall: float, distance: float) -> float:
     """Longest single segment from a distance that ends on the same side of the stall, by runs."""
-    near = replace(drive, fill=stall + distance)
-    low, high = 0.0, _end(near)
+    near = replace(operation, fill=stall + distance)
+    low, high = 0.0, near.end
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2
-        stays = _last_fill(explicit_segments(1), near, middle) >= stall
+        stays = near.by_segments(middle, 1) >= stall
         low, high = (middle, high) if stays else (low, middle)
     return low

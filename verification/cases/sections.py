@@ -1,4 +1,5 @@
-"""Flow in the section of a turning tube: exact limits, a manufactured solution, decay rates along it.
+"""Flow in the section of a turning tube: exact limits, a manufactured solution, decay rates along it; and the
+friction formula's blend of laminar and turbulent flow.
 
 The manufactured flow on the curved half section, every term of the equation at work: in the plane
 u = d psi/dz, v = -d psi/dy with psi = sin(a y + 0.3) exp(b z)/5, so that div u = 0; along the tube
@@ -31,6 +32,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigs
 
+from ringbalance.physics.tube.friction import friction_factor
 from ringbalance.physics.tube.loss import developing_length
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -47,7 +49,7 @@ from ringbalance.verification.evidence import (
 from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found
 from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
 from ringbalance.verification.navier_stokes.newton import Factors, FlowSolution, solve_flow
-from ringbalance.verification.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.tube import (
     CORIOLIS,
     SectionMesh,
     developed_section,
@@ -392,3 +394,37 @@ def _modes(matrices: tuple[Any, Any, Any], shift: float, count: int) -> tuple[Co
     rest = zero @ q + (one @ q) * mu + (two @ q) * mu**2
     scale = abs(zero) @ np.abs(q) + (abs(one) @ np.abs(q)) * np.abs(mu)
     return mu, np.linalg.norm(rest, axis=0) / np.linalg.norm(scale, axis=0)
+
+
+_TURBULENT: Final = 4000.0
+_STEP: Final = 1.01
+
+
+def blend(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Exact where laminar, without a jump, one velocity a head."""
+
+    def friction_of(reynolds: FloatArray) -> FloatArray:
+        f = friction_factor(reynolds=reynolds, relative_roughness=0.0)
+        if defect == "sudden_switch":
+            f = np.where(reynolds < _TURBULENT, 0.316 * reynolds**-0.25, f)
+            return np.where(reynolds < 2040, 64 / reynolds, f)
+        return f / 4 if defect == "fanning_factor" else f
+
+    laminar = np.geomspace(1, 1000, 200)
+    sweep = np.exp(np.arange(np.log(100), np.log(1e5), np.log(_STEP)))
+    curve = friction_of(sweep)
+    shown = figure(
+        "friction factor of a smooth tube",
+        ("Reynolds number", "1", sweep),
+        Curve("blend", "1", curve),
+        Curve("64/Re", "1", 64 / sweep, style="reference"),
+        log=True,
+    )
+    return Evidence(
+        found=as_found(
+            laminar=np.max(np.abs(friction_of(laminar) * laminar / 64 - 1)),
+            jump=np.max(np.abs(np.diff(curve) / curve[:-1])),
+            head_slope=np.min(np.diff(np.log(curve * sweep**2)) / np.log(_STEP)),
+        ),
+        series=(shown,),
+    )

@@ -36,7 +36,7 @@ from ringbalance.verification.evidence import (
 )
 from ringbalance.verification.loops import flow_law_of
 from ringbalance.verification.papers import fig_7_readings
-from ringbalance.verification.reference.exact_chamber import wall_pressure_of
+from ringbalance.verification.reference.chambers import wall_pressure_of
 
 _PRESSURES: Final = np.geomspace(0.77, 2.53, 9)
 """In units of the scene's."""

@@ -38,7 +38,7 @@ from ringbalance.verification.papers import (
     rounded_radius,
     with_plate,
 )
-from ringbalance.verification.reference.exact_chamber import (
+from ringbalance.verification.reference.chambers import (
     exact_moment,
     wall_pressure_of,
     whole_ring_pressure,

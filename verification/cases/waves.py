@@ -31,8 +31,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
 from ringbalance.verification.finite_elements import OrderStudy
-from ringbalance.verification.reference.block_chambers import disc_chamber
-from ringbalance.verification.reference.sloshing_exact import CosineWaves
+from ringbalance.verification.reference.chambers import CosineWaves, disc_chamber
 
 _MODES: Final = 4
 _FILLS: Final = (0.1, 0.25, 0.5)

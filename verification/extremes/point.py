@@ -22,7 +22,7 @@ from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
-from ringbalance.verification.reference.exact_chamber import exact_wall_pressure
+from ringbalance.verification.reference.chambers import exact_wall_pressure
 
 PERIODS: Final = 20
 """Of the controller that a point's closed loop may take."""

@@ -30,8 +30,7 @@ from ringbalance.scene.platform.processes import checked_workers
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 from ringbalance.scene.toml import toml_text
 from ringbalance.verification.evidence import Level
-from ringbalance.verification.extremes.axes import AXES, Axis
-from ringbalance.verification.extremes.design import Base, Point, design
+from ringbalance.verification.extremes.design import AXES, Axis, Base, Point, design
 from ringbalance.verification.extremes.design import Progress as Counting
 from ringbalance.verification.extremes.point import Ending, Judgement
 

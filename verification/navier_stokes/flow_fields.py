@@ -16,13 +16,15 @@ from skfem.helpers import dot, grad
 
 from ringbalance.physics.results import Status, StatusCode
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.end_losses import End, EndMesh, solve_end
 from ringbalance.verification.navier_stokes.flow import Dirichlet, FlowSpace, FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, flow_at
-from ringbalance.verification.navier_stokes.rotating_section import (
+from ringbalance.verification.navier_stokes.tube import (
+    End,
+    EndMesh,
     SectionMesh,
     developed_section,
     friction_ratio,
+    solve_end,
 )
 
 LARGEST_KL: Final = 1e6

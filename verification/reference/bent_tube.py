@@ -44,7 +44,7 @@ from ringbalance.verification.navier_stokes.newton import (
     follow,
     solve_flow,
 )
-from ringbalance.verification.navier_stokes.rotating_section import SectionMesh, developed_section
+from ringbalance.verification.navier_stokes.tube import SectionMesh, developed_section
 
 # Corner of the section (0 to 3) and end of the slab for each vertex, in scikit-fem's order.
 _HEXAHEDRON = ((2, 1), (2, 0), (1, 1), (3, 1), (1, 0), (3, 0), (0, 1), (0, 0))

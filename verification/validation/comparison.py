@@ -16,13 +16,21 @@ import numpy as np
 from scipy import special
 
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.kinds.registry import KINDS
-from ringbalance.identification.reading import observations_of, read_observations
+from ringbalance.identification.reading import KINDS, observations_of, read_observations
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Series, as_found, figure
-from ringbalance.verification.verdicts import Verdict, judge_quantity
+from ringbalance.verification.evidence import (
+    Curve,
+    Evidence,
+    Found,
+    Level,
+    Series,
+    Verdict,
+    as_found,
+    figure,
+    judge_quantity,
+)
 
 PROMISED: Final = 0.93
 """Fraction of the points that both 95 % uncertainties must hold: 0.95, less the chance of a small sample."""

@@ -20,15 +20,13 @@ from ringbalance.verification.cases import driven_balancing
 from ringbalance.verification.cases.driven_balancing import (
     balanced_at_constant_speed,
     beside_the_targets,
-    motion_bound,
-    run_up,
-)
-from ringbalance.verification.cases.driven_estimation import (
     estimate_imbalance,
     figure_four,
     friction_runs,
     friction_time,
     imbalance_record,
+    motion_bound,
+    run_up,
 )
 from ringbalance.verification.cases.driven_positioning import efforts, growth, printed_compensation
 from ringbalance.verification.papers import RPM, at_constant_speed, changed

@@ -95,13 +95,28 @@ def test_what_decides_is_measured_where_it_can_be() -> None:
     assert alone.inputs[0].decides
     assert [each.code for each in alone.findings()] == ["nothing_to_measure"]
     nobody = judgement(np.zeros(256, dtype=bool), drawn)
-    assert ranked(balancer, nobody).inputs == ()
-    assert ranked(balancer, replace(nobody, outcomes=judgement(drawn["a"] < 2, drawn).outcomes)).inputs == ()
+    assert not list(ranked(balancer, nobody).findings())
+
+
+def test_where_all_or_none_meet_time_or_amplitude_is_ranked() -> None:
+    """By eighths of a ramp S is 1 - 1/64."""
+    drawn = places(256)
+    balancer: Any = Named()
+    for settled, outcome in ((True, "settling_time"), (False, "final_amplitude")):
+        found = judgement(np.full(256, settled), drawn)
+        ranks: dict[str, Any] = {outcome: drawn["a"]}
+        ranking = ranked(balancer, replace(found, outcomes=replace(found.outcomes, **ranks)))
+        best = ranking.inputs[0]
+        assert (best.name, best.outcome) == ("a", outcome)
+        assert best.index == pytest.approx(1 - 1 / 64, abs=0.01)
+        assert not list(ranking.findings())
 
 
 def test_kinds_of_inputs_of_a_liquid_ring() -> None:
     """A tolerance varies; a model's error is common to all discs, and another quantity shows it."""
-    assert drawn_input("bore") == DrawnInput(common=False, measure="measure_input")
-    assert drawn_input("draw_down_factor") == DrawnInput(common=True, measure="measure_residual")
+    assert drawn_input("bore") == DrawnInput(common=False, measure="measure_input", path="tube.bore")
+    assert drawn_input("draw_down_factor") == DrawnInput(
+        common=True, measure="measure_residual", path=drawn_input("draw_down_factor").path
+    )
     assert drawn_input(LOSS) == drawn_input(CAVITY) == DrawnInput(common=True, measure="measure_flow")
-    assert drawn_input(PHASE) == DrawnInput(common=False, measure="")
+    assert drawn_input(PHASE) == DrawnInput(common=False, measure="", path="rotor.initial_phase")

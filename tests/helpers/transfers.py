@@ -1,5 +1,5 @@
-"""One operation of a pair under its flow law alone: by the program's own march, the paper's closed form, Eq.
-20's explicit segments and an adaptive Runge-Kutta method with events.
+"""One operation of a pair under its flow law alone: by the program's own march, the paper's closed form and
+Eq. 20's explicit segments.
 
 The driven chamber's fill ratio x obeys dx/dt = -(S/V) u(x_A, x_C, p) with x_C = total - x, which is taken in
 `Drive.opposite` and nowhere else: liquid is conserved by construction.
@@ -186,18 +186,6 @@ def _parabola(drive: Drive, fill: float) -> tuple[float, float, float, bool]:
     return u0, slowing, 2.0 * distance / (u0 + math.sqrt(left)), False
 
 
-def paper_drive(law: PaperLaw, *, gas_pressure: float, fill: float, total: float) -> Drive:
-    """One chamber that gives liquid away from a fill ratio, by the paper's law, its tube empty."""
-    return Drive(
-        law=law,
-        fill=fill,
-        total=total,
-        exchange_rate=law.tube_area / law.chamber_volume,
-        gas_pressure=gas_pressure,
-        primed=False,
-    )
-
-
 def explicit_segments(segments: int) -> Integrator:
     """An integrator with n equal explicit segments, x_i = x_(i-1) - u_(i-1) S dt/V; first order in dt.
 
@@ -227,6 +215,44 @@ def explicit_segments(segments: int) -> Integrator:
                 break
         fill = np.interp(t, edges, x)
         return drive.finished(t, fill, regime_start=regime, event=event, event_time=event_time)
+
+    return integrate
+
+
+def marched(tube: Tube) -> Integrator:
+    """The march that every run takes, without a term beyond the flow law; its error is that of one run."""
+
+    def integrate(drive: Drive, t: FloatArray) -> Transfer:
+        dynamics = Dynamics(
+            column=Column.of(law=drive.law, tube=tube),
+            inertia=False,
+            line=None,
+            valve_lag=0.0,
+            gas_pressure=drive.gas_pressure,
+            ambient_pressure=1e5,
+            dead_volume=0.0,
+            tube_area=drive.exchange_rate,
+            chamber_volume=1.0,
+            max_fill_ratio=drive.law.max_fill_ratio,
+        )
+        valve = opened(dynamics, chamber=0, duration=2 * float(t[-1]) + 1)
+        pair = PairState(
+            fill=drive.fill,
+            total=drive.total,
+            primed=drive.primed,
+            motion=Motion(pending=valve if drive.gas_pressure > 0 else ()),
+        )
+        path = pass_time(dynamics, pair, instants=t)
+        record = path.motion.record
+        return Transfer(
+            instants=t,
+            fill=path.fills,
+            regime_start=record.regime_start,
+            regime_end=record.regime_end,
+            event=record.event,
+            event_time=path.ended if record.event is not Event.NONE else None,
+            primed=path.primed,
+        )
 
     return integrate
 
@@ -314,41 +340,3 @@ def _path(drive: Drive, u0: float, end: float, duration: float, tolerance: float
         dense_output=True,
         events=(at_end, at_stall, at_priming),
     )
-
-
-def marched(tube: Tube) -> Integrator:
-    """The march that every run takes, without a term beyond the flow law; its error is that of one run."""
-
-    def integrate(drive: Drive, t: FloatArray) -> Transfer:
-        dynamics = Dynamics(
-            column=Column.of(law=drive.law, tube=tube),
-            inertia=False,
-            line=None,
-            valve_lag=0.0,
-            gas_pressure=drive.gas_pressure,
-            ambient_pressure=1e5,
-            dead_volume=0.0,
-            tube_area=drive.exchange_rate,
-            chamber_volume=1.0,
-            max_fill_ratio=drive.law.max_fill_ratio,
-        )
-        valve = opened(dynamics, chamber=0, duration=2 * float(t[-1]) + 1)
-        pair = PairState(
-            fill=drive.fill,
-            total=drive.total,
-            primed=drive.primed,
-            motion=Motion(pending=valve if drive.gas_pressure > 0 else ()),
-        )
-        path = pass_time(dynamics, pair, instants=t)
-        record = path.motion.record
-        return Transfer(
-            instants=t,
-            fill=path.fills,
-            regime_start=record.regime_start,
-            regime_end=record.regime_end,
-            event=record.event,
-            event_time=path.ended if record.event is not Event.NONE else None,
-            primed=path.primed,
-        )
-
-    return integrate

@@ -1,0 +1,276 @@
+"""Measurements that a case predicts in a way of its own: friction in tubes and ducts, pressure, a rotor."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Final
+
+import numpy as np
+
+from ringbalance.identification.kinds.bench import tube_numbers
+from ringbalance.identification.kinds.kind import Observations
+from ringbalance.physics.tube.rotation_table import laminar_ratio
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.loop_models import Rotor
+from ringbalance.scene.models import Scene
+from ringbalance.verification.evidence import Curve, Evidence, Found, Level, Reference, as_found, figure
+from ringbalance.verification.navier_stokes.flow import FlowSystem
+from ringbalance.verification.navier_stokes.tube import (
+    POISEUILLE_GRADIENT,
+    DuctMesh,
+    SectionMesh,
+    march_section,
+)
+from ringbalance.verification.validation.comparison import (
+    MUTATIONS,
+    beside_judged,
+    compare,
+    data_evidence,
+    friction,
+    measurements,
+)
+
+_LAMINAR: Final = 1800.0
+_TURBULENT: Final = 4000.0
+_CRITICAL: Final = 2300.0
+"""Up to which McKeon's readings go on as in laminar flow."""
+_SMOOTH: Final = ("stanton_pannell_1914", "stanton_pannell_1914_oil", "huebscher_1947_round", "senecal_1951")
+_FULLY_ROUGH: Final = 70.0
+"""ks+ above which the wall is fully rough."""
+CALIBRATING: Final = (*(f"tube {number} (bore)" for number in range(1, 6)), "cut (bore)")
+"""Points of Eisenklam that gave the bore of their tube, and are not judged."""
+_DEVELOPED: Final = 0.0125
+"""L/(d Re) from which an undeveloped profile was expected to cost no more than the interval of the outlet."""
+_CONTRADICTED: Final = 1.5e5
+"""Pressure, Pa, below which the cut tube contradicts the others."""
+_SQUARE: Final = ((0.5, 2000.0, 8e-6, 0.06), (1.0, 1000.0, 1e-5, 0.06), (1.0, 2000.0, 4e-6, 0.04))
+_FAST: Final = (3.3, 1810.0, 4e-6, 0.03)
+"""S = omega d/U, Re, step and time over d^2/nu; the last is the end of the correlated simulations."""
+_TUBE: Final = (0.5, 2000.0, 5e-6, 0.05)
+_CELLS: Final = {"light": DuctMesh(across=16, along=10), "heavy": DuctMesh(across=24, along=16)}
+_WASHER: Final = 12.4e-6
+"""Unbalance of a washer, kg m."""
+_WASHER_UNCERTAINTY: Final = 0.5e-6
+"""Of each, 95 %, kg m."""
+_TAUGHT: Final = (0, 1, 2)
+"""Numbers of washers that gave the coefficient."""
+_PREDICTED: Final = (3, 4)
+
+
+def smooth_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Friction in smooth tubes, laminar to turbulent.
+
+    McKeon's readings below Re 4000 are not judged: the laminar ones their own authors found up to 14 % high.
+    """
+    points = friction(*map(measurements, _SMOOTH), _mckeon(_TURBULENT, np.inf), mutation=defect)
+    left_out = {
+        "mckeon_laminar": friction(_mckeon(0.0, _CRITICAL)),
+        "mckeon_transition": friction(_mckeon(_CRITICAL, _TURBULENT)),
+    }
+    reynolds, whole = points.columns["reynolds"], points.statistics
+    parts = {
+        "laminar": points.where(reynolds < _LAMINAR),
+        "transitional": points.where((reynolds >= _LAMINAR) & (reynolds < _TURBULENT)),
+        "turbulent": points.where(reynolds >= _TURBULENT),
+    }
+    numbers = whole.numbers() | beside_judged(points, left_out)
+    for name, part in parts.items():
+        numbers |= {f"{name}_{key}": value for key, value in part.statistics.numbers().items()}
+    return Evidence(
+        found=as_found(share_within=whole.share_within, bias=abs(numbers["turbulent_bias"])),
+        numbers=numbers,
+        series=(parts["turbulent"].over_reynolds("smooth tubes"),),
+    )
+
+
+def _mckeon(low: float, high: float) -> Observations:
+    data = measurements("mckeon_2004")
+    reynolds = data.columns["reynolds"]
+    return data.where((reynolds >= low) & (reynolds < high))
+
+
+def rough_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Friction in tubes roughened with sand."""
+    data = measurements("nikuradse_1933")
+    points = friction(data, mutation=defect if defect in MUTATIONS else None)
+    if defect == "roughness_ignored":
+        smooth = data.with_columns(relative_roughness=np.zeros(len(data)))
+        points = dataclasses.replace(points, predicted=friction(smooth).predicted)
+    wall, statistics = points.columns["relative_roughness"], points.statistics
+    grain = points.columns["reynolds"] * np.sqrt(points.measured / 8) * wall
+    rough = points.where(grain > _FULLY_ROUGH).statistics
+    return Evidence(
+        found=as_found(share_within=statistics.share_within, fully_rough=abs(rough.bias)),
+        numbers={
+            **statistics.numbers(),
+            **beside_judged(points),
+            "worst": float(np.max(points.predicted / points.measured - 1)),
+            "rough_points": float(rough.points),
+            "rough_bias": rough.bias,
+            "rough_standard_deviation": rough.standard_deviation,
+        },
+        series=tuple(
+            points.where(wall == one).over_reynolds(f"a tube with ks/d = {one:.2g}")
+            for one in np.unique(wall)[[0, -1]]
+        ),
+    )
+
+
+def ducts(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Friction in rectangular ducts, laminar to turbulent."""
+    sets = [measurements(name) for name in ("cornish_1928", "huebscher_1947_ducts")]
+    if defect == "circular_section":
+        # An aspect ratio of zero stands for a tube.
+        sets = [each.with_columns(aspect_ratio=np.zeros(len(each))) for each in sets]
+    mutation = defect if defect in MUTATIONS else None
+    points = friction(*sets, mutation=mutation)
+    wide = np.char.find(points.series, "8:1") >= 0
+    narrow, reynolds = points.where(~wide), points.columns["reynolds"][~wide]
+    whole, laminar, turbulent = (
+        part.statistics
+        for part in (narrow, narrow.where(reynolds < _LAMINAR), narrow.where(reynolds >= _TURBULENT))
+    )
+    return Evidence(
+        found=as_found(share_within=whole.share_within, laminar=abs(laminar.bias)),
+        numbers={
+            **whole.numbers(),
+            "laminar_points": float(laminar.points),
+            "laminar_bias": laminar.bias,
+            "turbulent_points": float(turbulent.points),
+            "turbulent_bias": turbulent.bias,
+            "turbulent_standard_deviation": turbulent.standard_deviation,
+            **beside_judged(narrow, {"wide": points.where(wide)}),
+        },
+        series=(friction(sets[0], mutation=mutation).over_reynolds("a rectangular duct (2.9 to 1)"),),
+    )
+
+
+def laminar_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Pressure over whole tubes in laminar flow.
+
+    Not judged are points that taught a bore, that contradict others, or whose flow could not develop.
+    """
+    data = measurements("eisenklam_1958")
+    reynolds, slenderness = tube_numbers(data)
+    taught, cut = np.isin(data.series, CALIBRATING), np.char.startswith(data.series, "cut")
+    contradicted = cut & (data.columns["pressure"] < _CONTRADICTED) & ~taught
+    usable, developed = ~taught & ~contradicted, slenderness >= _DEVELOPED * reynolds
+    judged = data.where(usable & developed)
+    found = data_evidence(judged, unit="Pa", mutation=defect)
+    left_out = {
+        "contradicted": compare(data.where(contradicted)),
+        "short": compare(data.where(usable & ~developed)),
+    }
+    uncut = compare(data.where(usable & np.char.startswith(data.series, "tube")))
+    more = {
+        **beside_judged(compare(judged, mutation=defect), left_out, taught=int(taught.sum())),
+        "laminar_points": found.numbers["points"],
+        "long_worst": float(np.max(np.abs(uncut.predicted / uncut.measured - 1))),
+    }
+    return dataclasses.replace(found, numbers={**found.numbers, **more})
+
+
+def rotating_duct(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Friction in a square duct that rotates, laminar flow being free to fluctuate."""
+    square, points = _CELLS[level].system(), (*_SQUARE, _FAST)
+    s, re = (np.array([point[i] for point in points]) for i in (0, 1))
+    slower = 1.0 if defect is None else 0.9
+    gradients = [_mean_gradient(square, point, slower) for point in points]
+    # 1.09 (C_f/Ek^(1/2))^1.25 = Ro with Ro = 2 S and Ek = 1/(S Re).
+    fanning, measured = np.array(gradients) / (2 * re), (2 * s / 1.09) ** 0.8 / np.sqrt(s * re)
+    deviation = fanning / measured - 1
+    shown = figure(
+        "Fanning friction factor of a rotating square duct, computed and measured",
+        ("rotation number 2 omega d/U", "1", 2 * s),
+        Curve("computed", "1", fanning, style="points"),
+        Curve("correlation of measurements", "1", measured, style="reference"),
+        log=True,
+    )
+    return Evidence(
+        found=as_found(bias=abs(np.mean(deviation)), worst=np.max(np.abs(deviation))),
+        numbers={"signed_bias": float(np.mean(deviation))} | ({} if defect else _tube()),
+        series=(shown,),
+    )
+
+
+def _mean_gradient(system: FlowSystem, point: tuple[float, ...], rotation: float = 1.0) -> float:
+    """Over the second half of the time."""
+    s, re, step, time = point
+    gradients = march_section(
+        system=system, kl=rotation * s * re**2, s=rotation * s, step=step, steps=round(time / step)
+    )
+    return float(np.mean(gradients[-round(gradients.size / 2) :]))
+
+
+def _tube() -> dict[str, float]:
+    """Friction of the circular tube, solved in time as well, over the table's steady one, less one."""
+    tube = SectionMesh(around=7, across=11, wall_ratio=15.0).system()
+    s, re, _, _ = _TUBE
+    steady = float(laminar_ratio(reynolds=re, rotation_reynolds=s * re))
+    return {"tube": _mean_gradient(tube, _TUBE) / POISEUILLE_GRADIENT / steady - 1}
+
+
+def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
+    """Vibration of a rotor with known unbalances: what small ones teach, compared with larger ones."""
+    run = measurements("rodrigues_2011")
+    readings = {count: _readings(run, "plain", count) for count in range(5)}
+    amplitudes = [float(np.mean(reading)) for reading in readings.values()]
+    taught = _calibrated(scene.rotor, amplitudes[:3])
+    kappa = MUTATIONS[defect] * taught.influence_coefficient
+    unbalance = _WASHER * np.arange(5)
+    predicted = np.abs(dataclasses.replace(taught, influence_coefficient=kappa).vibration(unbalance))
+    spread = kappa * _WASHER_UNCERTAINTY / 2
+    shown = figure(
+        "vibration of a rotor, measured and predicted",
+        ("unbalance", "kg*m", unbalance),
+        Curve("predicted", "m", predicted),
+        Curve("measured", "m", np.array(amplitudes), style="points"),
+    )
+    return Evidence(
+        found={
+            # Two washers taught the coefficient, so their error counts n/2 times, as sqrt(2) of one.
+            f"washers_{count}": Found(value=float(predicted[count]), input=spread * count / math.sqrt(2))
+            for count in _PREDICTED
+        },
+        reference={f"washers_{count}": _amplitude(readings[count], count) for count in _PREDICTED},
+        numbers={
+            "points": float(sum(readings[count].size for count in _PREDICTED)),
+            "taught_points": float(sum(readings[count].size for count in _TAUGHT)),
+            "worst_mean": max((predicted[n] / amplitudes[n] - 1 for n in _PREDICTED), key=abs),
+            "influence_coefficient": kappa,
+            "balls_up": float(np.mean(_readings(run, "abb_runup", 4))),
+            "balls_down": float(np.mean(_readings(run, "abb_rundown", 4))),
+        },
+        series=(shown,),
+    )
+
+
+def _amplitude(readings: FloatArray, count: int) -> Reference:
+    """Mean over all speeds; u_D of the scatter over these and of the washers on the disc."""
+    mean, scatter = float(np.mean(readings)), float(np.std(readings, ddof=1))
+    washers = mean * _WASHER_UNCERTAINTY / (2 * _WASHER * math.sqrt(count))
+    return Reference(value=mean, uncertainty=math.hypot(washers, scatter))
+
+
+def _readings(run: Observations, series: str, washers: int) -> FloatArray:
+    here = (run.series == series) & (run.columns["washers"] == washers)
+    return np.asarray(run.columns["amplitude"][here], dtype=np.float64)
+
+
+def _calibrated(given: Rotor, amplitudes: list[float]) -> Rotor:
+    """The rotor whose amplitudes with none, one and two washers are the measured ones.
+
+    |V0 + n K u|^2 = |V0|^2 + 2 n Re(V0* K u) + n^2 |K u|^2 for n = 0, 1, 2 gives |V0|, |K u| and the angle
+    between them.
+    """
+    none, one, two = (a**2 for a in amplitudes)
+    square = (two - 2 * one + none) / 2
+    cosine = (one - none - square) / (2 * math.sqrt(square * none))
+    return dataclasses.replace(
+        given,
+        influence_coefficient=math.sqrt(square) / _WASHER,
+        lag_angle=0.0,
+        initial_amplitude=amplitudes[0],
+        initial_phase=math.acos(cosine),
+    )

@@ -83,9 +83,8 @@ def simulate(
     plan = LoopPlan.of(
         scene=scene,
         model=balancer,
-        dynamics=dynamics,
+        plant=dynamics.plant(total=2 * scene.disc.initial_fill, relative_error=RELATIVE_ERROR),
         controller=algorithm,
-        relative_error=RELATIVE_ERROR,
         most_samples=MAX_SAMPLES,
         sensed=sensor is not None,
         to_time_limit=to_time_limit,

@@ -29,7 +29,7 @@ from ringbalance.controller.loop_records import (
 )
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
-from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE, Dynamics
+from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
@@ -88,9 +88,8 @@ class LoopPlan:
         *,
         scene: Scene,
         model: BalancerModel,
-        dynamics: Dynamics,
+        plant: Records,
         controller: Controller[Any] | BuiltIn,
-        relative_error: float,
         most_samples: int,
         sensed: bool = False,
         to_time_limit: bool = False,
@@ -100,7 +99,7 @@ class LoopPlan:
         """Prepare the runs of a scene.
 
         Args:
-            relative_error: allowed to one step of a pair's states.
+            plant: what moves its liquid, type `PLANT`, shape (1,).
             most_samples: after which a run ends undecided.
             sensed: whether the caller's sensor writes its samples into the run.
             to_time_limit: whether a settled run continues.
@@ -109,7 +108,6 @@ class LoopPlan:
         """
         loop, memory = np.zeros(1, dtype=LOOP), np.zeros(1, dtype=RUN)
         total, chambers = 2 * scene.disc.initial_fill, scene.disc.chambers
-        plant = dynamics.plant(total=total, relative_error=relative_error)
         built_in = isinstance(controller, BuiltIn)
         loop["algorithm"] = OWN
         if isinstance(controller, BuiltIn):

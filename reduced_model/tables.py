@@ -116,12 +116,21 @@ def table_from_samples(*, start: float, stop: float, value: npt.ArrayLike) -> He
 
     Source: not-a-knot spline; error O(step^6).
     """
+    return tables_from_samples(start=start, stop=stop, value=np.asarray(value)[:, None])[0]
+
+
+def tables_from_samples(*, start: float, stop: float, value: npt.ArrayLike) -> tuple[HermiteTable, ...]:
+    """The same of many tables at once. Args: `value`: shape (samples, tables)."""
     y = np.asarray(value, dtype=np.float64)
-    step, places = (stop - start) / (y.size - 1), np.arange(y.size)
+    count = y.shape[0]
+    step, places = (stop - start) / (count - 1), np.arange(count)
     # A large common value would cost digits.
-    spline = make_interp_spline(places, y - y[0], k=min(5, y.size - 1))
-    slope, curvature = (spline(places, nu=order) for order in (1, 2))
-    return HermiteTable(start=start, step=step, value=y, slope=slope / step, curvature=curvature / step**2)
+    spline = make_interp_spline(places, y - y[0], k=min(5, count - 1))
+    slope, curvature = (spline(places, nu=order).T for order in (1, 2))
+    return tuple(
+        HermiteTable(start=start, step=step, value=v, slope=d / step, curvature=c / step**2)
+        for v, d, c in zip(y.T, slope, curvature, strict=True)
+    )
 
 
 def level_table(*, start: float, stop: float, value: npt.ArrayLike) -> HermiteTable:

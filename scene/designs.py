@@ -121,12 +121,8 @@ def _alike(first: Any, second: Any) -> bool:
     return bool(np.all(first == second))
 
 
-def in_batches(scenes: Sequence[Scene], function: Callable[[Designs], FloatArray]) -> FloatArray:
-    """Values of a function of designs for scenes that may differ in more than numbers, kind by kind.
-
-    Args: `function`: returns an array whose last axis runs over the designs.
-    Returns: The same over the scenes, in their order.
-    """
+def alike(scenes: Sequence[Scene]) -> list[list[int]]:
+    """Places of scenes that differ in numbers alone, kind by kind."""
     batches: list[list[int]] = []
     for place, scene in enumerate(scenes):
         same = next((rows for rows in batches if _alike(scenes[rows[0]], scene)), None)
@@ -134,7 +130,16 @@ def in_batches(scenes: Sequence[Scene], function: Callable[[Designs], FloatArray
             batches.append([place])
         else:
             same.append(place)
-    parts = []
+    return batches
+
+
+def in_batches(scenes: Sequence[Scene], function: Callable[[Designs], FloatArray]) -> FloatArray:
+    """Values of a function of designs for scenes that may differ in more than numbers, kind by kind.
+
+    Args: `function`: returns an array whose last axis runs over the designs.
+    Returns: The same over the scenes, in their order.
+    """
+    parts, batches = [], alike(scenes)
     for rows in batches:
         value = function(Designs.stacked([scenes[i] for i in rows]))
         # Where no number of the batch differs, or none that the function knows, one value is that of all.

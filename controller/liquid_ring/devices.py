@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.common_rotor import CommonRotor, Rotors
+from ringbalance.controller.loop_records import MomentTable
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
-from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, nominal_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, nominal_laws
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_model
 from ringbalance.reduced_model.tables import HermiteTable
@@ -114,6 +116,11 @@ class Device:
     clipped: tuple[str, ...]
     """Inputs that lie nearer to the scene's value than drawn, since no device has the drawn one."""
 
+    @cached_property
+    def moments(self) -> MomentTable:
+        """Of a pair, as runs have them."""
+        return MomentTable.of(model=self.model, total=2 * self.scene.disc.initial_fill)
+
     def under(self, settings: Scene, *, of: Scene) -> Scene:
         """The device with a scene's controller and gas pressure; its gauge is as wrong as it was.
 
@@ -139,23 +146,22 @@ def devices(
     *,
     seed: int,
     rotors: Rotors | None = None,
-) -> Callable[[int], Device]:
-    """The device at a place among numbers, made when it is asked for.
+) -> tuple[Device, ...]:
+    """The devices of some numbers, with their laws made at once.
 
     Args: `rotors`: that the devices run on; default their own, drawn.
     """
-    places = {name: quantiles(name, numbers, seed=seed) for name in spread.names}
-    normal = {name: deviates(name, numbers, seed=seed) / NORMAL_95 for name in spread.names}
-
-    def made(place: int) -> Device:
-        z = {name: float(each[place]) for name, each in normal.items()}
-        q = {name: float(each[place]) for name, each in places.items()}
-        drawn, clipped = _drawn(scene, spread, z, q)
-        if rotors is not None:
-            drawn = replace(drawn, rotor=rotor_like(drawn.rotor, rotors(numbers[place])))
-        law, speed = _law(drawn, model, spread, z, q)
-        return Device(
-            number=numbers[place],
+    normal = _rows({name: deviates(name, numbers, seed=seed) / NORMAL_95 for name in spread.names})
+    places = _rows({name: quantiles(name, numbers, seed=seed) for name in spread.names})
+    found = [_drawn(scene, spread, z, q) for z, q in zip(normal, places, strict=True)]
+    scenes = [drawn for drawn, _ in found]
+    if rotors is not None:
+        pairs = zip(scenes, numbers, strict=True)
+        scenes = [replace(drawn, rotor=rotor_like(drawn.rotor, rotors(number))) for drawn, number in pairs]
+    laws = _laws(scenes, scene, model, spread, normal, places)
+    return tuple(
+        Device(
+            number=number,
             scene=drawn,
             model=law,
             speed=speed,
@@ -163,8 +169,15 @@ def devices(
             inputs=q,
             clipped=clipped,
         )
+        for number, drawn, (law, speed), z, q, (_, clipped) in zip(
+            numbers, scenes, laws, normal, places, found, strict=True
+        )
+    )
 
-    return made
+
+def _rows(columns: Mapping[str, FloatArray]) -> list[dict[str, float]]:
+    """What each device has of every column."""
+    return [dict(zip(columns, row, strict=True)) for row in np.stack(list(columns.values()), axis=1).tolist()]
 
 
 def rotor_like(own: Rotor, rotor: CommonRotor) -> Rotor:
@@ -204,23 +217,42 @@ def _drawn(
     return replace(device, rotor=started), tuple(clipped)
 
 
-def _law(
-    device: Scene, model: BalancerModel, spread: Spread, z: Mapping[str, float], q: Mapping[str, float]
-) -> tuple[BalancerModel, float]:
-    """Law of a device, and the factor on its velocity where only that is known to be uncertain."""
+def _laws(
+    scenes: Sequence[Scene],
+    scene: Scene,
+    model: BalancerModel,
+    spread: Spread,
+    normal: Sequence[Mapping[str, float]],
+    places: Sequence[Mapping[str, float]],
+) -> list[tuple[BalancerModel, float]]:
+    """Law of each device, and the factor on its velocity where only that is known to be uncertain.
+
+    Whether they hold gravity is the scene's own question.
+    """
     if isinstance(model.flow, PaperLaw):
-        k = model.flow.drag_coefficient
-        drag = k * math.exp(math.log1p(2.0 * spread.loss * (k + 1.0) / k) * z[LOSS])
-        return paper_model(replace(device, tube=replace(device.tube, drag_coefficient=drag))), 1.0
+        drags = [_drag(model.flow.drag_coefficient, spread, z) for z in normal]
+        tubes = zip(scenes, drags, strict=True)
+        drawn = [replace(each, tube=replace(each.tube, drag_coefficient=drag)) for each, drag in tubes]
+        return [(paper_model(each), 1.0) for each in drawn]
     if not spread.remade:
-        return model, math.exp(math.log1p(spread.loss) * z[LOSS])
-    law = nominal_law(device, gravity=gravity_shares(device).mean > device.tolerance)
+        return [(model, math.exp(math.log1p(spread.loss) * z[LOSS])) for z in normal]
+    laws = nominal_laws(scenes, gravity=gravity_shares(scene).mean > scene.tolerance)
+    return [(_as_drawn(law, spread, z, q), 1.0) for law, z, q in zip(laws, normal, places, strict=True)]
+
+
+def _drag(k: float, spread: Spread, z: Mapping[str, float]) -> float:
+    return k * math.exp(math.log1p(2.0 * spread.loss * (k + 1.0) / k) * z[LOSS])
+
+
+def _as_drawn(
+    law: CalibratedLaw, spread: Spread, z: Mapping[str, float], q: Mapping[str, float]
+) -> BalancerModel:
+    """With its loss and its cavity."""
     more = math.log1p(spread.loss) * z[LOSS]
     tables = ("head", "hump_head", "return_hump_head")
     raised: dict[str, Any] = {name: _raised(getattr(law.heads, name), more) for name in tables}
-    heads = replace(law.heads, **raised)
     path = replace(law.path, released=q[CAVITY]) if spread.cavity else law.path
-    return BalancerModel.of(replace(law, heads=heads, path=path)), 1.0
+    return BalancerModel.of(replace(law, heads=replace(law.heads, **raised), path=path))
 
 
 def _raised(table: HermiteTable | None, more: float) -> HermiteTable | None:

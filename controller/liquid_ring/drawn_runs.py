@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
+from itertools import groupby
 from typing import Any, Final
 
 import numpy as np
@@ -18,14 +19,16 @@ from ringbalance.controller.common_rotor import Rotors
 from ringbalance.controller.liquid_ring.devices import Device, Spread, devices
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_plan import LoopPlan, Records
-from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING, MomentTable
+from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING
 from ringbalance.controller.simulation import Outcome
 from ringbalance.controller.terms import check_settings, dynamics_of, run_models, terms_modelled
 from ringbalance.physics.gas import compression_work
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
-from ringbalance.reduced_model.injection.dynamics import Dynamics
+from ringbalance.reduced_model.injection.dynamics import PLANT, Dynamics
+from ringbalance.reduced_model.injection.limits import hold_liquid, residual_fills, stalled_fills
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
+from ringbalance.reduced_model.terms import HELD
+from ringbalance.scene.designs import Designs, alike
 from ringbalance.scene.draws import run_noise
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
@@ -36,8 +39,10 @@ RELATIVE_ERROR: Final = 1e-4
 within 3e-5 without inertia."""
 MOST_SAMPLES: Final = 100_000
 """Of one run without a trace."""
-_KEPT: Final = 512
-"""Devices, and devices under a pressure."""
+_GROUP: Final = 16
+"""Devices that are made at once, by consecutive numbers: each has the same bits whichever are asked for."""
+_KEPT: Final = 32
+"""Groups of devices, and groups under a pressure."""
 _OUT_OF_REACH: Final = 2.0
 """Times the limit that remain with the liquid at its best, from which on a run need not be carried
 out: none settles, and each would take its whole time limit."""
@@ -80,13 +85,17 @@ class DrawnRuns:
         """
         check_ring(self.scene)
         asked = [self._setting(place, each) for place, each in enumerate(settings)]
-        ended = [[_Ended() for _ in draws.numbers] for _ in asked]
-        drawn = []
-        for place, number in enumerate(draws.numbers):
-            device = self.device(number) if draws.devices else _as_given(self.scene, self.model, number)
-            drawn.append(device)
-            for at, done in self._runs(device, asked, further, whole=draws.whole):
-                ended[at][place] = done
+        ended: list[list[_Ended]] = [[] for _ in asked]
+        drawn: list[Device] = []
+        for group, numbers in groupby(draws.numbers, lambda number: number // _GROUP):
+            some = list(numbers)
+            made = self._devices(group) if draws.devices else self._as_given(group)
+            drawn += [made[number % _GROUP] for number in some]
+            for pressure, tried in _grouped(asked, lambda each: each.scene.gas.pressure):
+                under = self._under(made, pressure)
+                for number in some:
+                    for at, done in self._runs(under[number % _GROUP], tried, further, whole=draws.whole):
+                        ended[at].append(done)
         return tuple(_outcomes(rows, drawn) for rows in ended)
 
     def _setting(self, place: int, setting: Settings) -> _Setting:
@@ -95,60 +104,65 @@ class DrawnRuns:
         return _Setting(place=place, scene=scene, controller=controller_of(scene, self.model))
 
     def _runs(
-        self, device: Device, asked: Sequence[_Setting], further: float, *, whole: bool
+        self, under: _Under, asked: Sequence[_Setting], further: float, *, whole: bool
     ) -> Iterator[tuple[int, _Ended]]:
         """Place of a setting and how the device's run under it ended."""
-        moments = MomentTable.of(model=device.model, total=2 * device.scene.disc.initial_fill)
-        for _, some in _grouped(asked, lambda each: each.scene.gas.pressure):
-            under = self._under(device, some[0].scene.gas.pressure)
-            if not whole and under.unreachable > _OUT_OF_REACH * self.limit:
-                yield from ((each.place, _Ended.at_best(under, limit=self.limit)) for each in some)
-                continue
-            for settings, alike in _grouped(
-                some, lambda each: replace(each.scene.controller, proportional=1)
-            ):
-                plan = LoopPlan.of(
-                    scene=replace(under.scene, controller=settings),
-                    model=device.model,
-                    dynamics=under.dynamics,
-                    controller=alike[0].controller,
-                    relative_error=RELATIVE_ERROR,
-                    most_samples=MOST_SAMPLES,
-                    further=further,
-                    moments=moments,
-                )
-                plan.loop["limit"] = self.limit
-                gains = [each.scene.controller.proportional for each in alike]
-                runs = under.carried(plan, device, gains, seed=self.scene.run.seed)
-                for each, run in zip(alike, runs, strict=True):
-                    yield each.place, _Ended.of(under, run, limit=self.limit)
+        if not whole and under.unreachable > _OUT_OF_REACH * self.limit:
+            yield from ((each.place, _Ended.at_best(under, limit=self.limit)) for each in asked)
+            return
+        for settings, tried in _grouped(asked, lambda each: replace(each.scene.controller, proportional=1)):
+            plan = LoopPlan.of(
+                scene=replace(under.scene, controller=settings),
+                model=under.device.model,
+                plant=under.plant,
+                controller=tried[0].controller,
+                most_samples=MOST_SAMPLES,
+                further=further,
+                moments=under.device.moments,
+            )
+            plan.loop["limit"] = self.limit
+            gains = [each.scene.controller.proportional for each in tried]
+            runs = under.carried(plan, gains, seed=self.scene.run.seed)
+            for each, run in zip(tried, runs, strict=True):
+                yield each.place, _Ended.of(under, run, limit=self.limit)
 
     def device(self, number: int) -> Device:
         """One of the devices."""
-        return self._devices(number)
+        return self._devices(number // _GROUP)[number % _GROUP]
+
+    def _as_given(self, group: int) -> tuple[Device, ...]:
+        """The scene's own device, over and over."""
+        own = Device(
+            number=0, scene=self.scene, model=self.model, speed=1.0, moment=1.0, inputs={}, clipped=()
+        )
+        return tuple(replace(own, number=number) for number in _numbers(group))
 
     def __getstate__(self) -> dict[str, Any]:
         """What is kept stays behind."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
-    def _devices(self) -> Callable[[int], Device]:
-        """By number; the last ones are kept, as a search runs the same again and again."""
+    def _devices(self) -> Callable[[int], tuple[Device, ...]]:
+        """Of a group; the last ones are kept, as a search runs the same again and again."""
 
-        def made(number: int) -> Device:
+        def made(group: int) -> tuple[Device, ...]:
             seed, rotors = self.scene.run.seed, self.rotors
-            return devices(self.scene, self.model, self.spread, (number,), seed=seed, rotors=rotors)(0)
+            return devices(self.scene, self.model, self.spread, _numbers(group), seed=seed, rotors=rotors)
 
         return lru_cache(_KEPT)(made)
 
     @cached_property
-    def _under(self) -> Callable[[Device, float], _Under]:
-        """By device and gas pressure of the settings; kept likewise."""
+    def _under(self) -> Callable[[tuple[Device, ...], float], tuple[_Under, ...]]:
+        """By devices and gas pressure of the settings; kept likewise."""
 
-        def made(device: Device, pressure: float) -> _Under:
-            gas = replace(self.scene.gas, pressure=pressure)
-            scene = device.under(replace(self.scene, gas=gas), of=self.scene)
-            return _Under.of(scene, device, modelled=self.terms)
+        def made(drawn: tuple[Device, ...], pressure: float) -> tuple[_Under, ...]:
+            settings = replace(self.scene, gas=replace(self.scene.gas, pressure=pressure))
+            scenes = [each.under(settings, of=self.scene) for each in drawn]
+            found: dict[int, _Under] = {}
+            for places in alike(scenes):
+                some = [(drawn[place], scenes[place]) for place in places]
+                found |= zip(places, _under(*zip(*some, strict=True), modelled=self.terms), strict=True)
+            return tuple(found[place] for place in range(len(drawn)))
 
         return lru_cache(_KEPT)(made)
 
@@ -157,8 +171,12 @@ class DrawnRuns:
 class _Under:
     """A device under one gas pressure."""
 
+    device: Device
     scene: Scene
-    dynamics: Dynamics
+    plant: Records
+    """Type `PLANT`, shape (1,)."""
+    residual: float
+    """Fill of a driven chamber at which gas enters its port."""
     unreachable: float
     """Vibration that remains with the liquid where the gas can bring it, m."""
     beyond_disc: float
@@ -169,19 +187,17 @@ class _Under:
     """kg m."""
 
     @classmethod
-    def of(cls, scene: Scene, device: Device, *, modelled: Sequence[str]) -> _Under:
-        law, total = device.model.flow, 2 * scene.disc.initial_fill
-        residual = residual_fill_ratio(scene, law=law)
-        stalled = stalled_fill_ratio(law=law, total=total, gas_pressure=scene.gas.pressure)
-        least = min(max(residual, stalled), total / 2)
-        dynamics = dynamics_of(
-            scene=scene, model=device.model, modelled=modelled, residual_fill=residual, checked=True
-        )
+    def of(
+        cls, device: Device, scene: Scene, plant: Records, dynamics: Dynamics, residual: float, stalled: float
+    ) -> _Under:
         total = 2 * scene.disc.initial_fill
+        least = min(max(residual, stalled), total / 2)
         ring = LiquidRing(model=device.model, chambers=scene.disc.chambers, dynamics=dynamics, total=total)
         return cls(
+            device=device,
             scene=scene,
-            dynamics=dynamics,
+            plant=plant,
+            residual=residual,
             unreachable=ring.unreachable_vibration(rotor=scene.rotor, least_fill=least),
             beyond_disc=ring.unreachable_vibration(rotor=scene.rotor, least_fill=residual),
             usable_moment=device.moment
@@ -189,14 +205,34 @@ class _Under:
             unbalance=device.moment * abs(scene.rotor.initial_unbalance),
         )
 
-    def carried(self, plan: LoopPlan, device: Device, gains: Sequence[float], *, seed: int) -> Records:
+    def carried(self, plan: LoopPlan, gains: Sequence[float], *, seed: int) -> Records:
         """Runs to their ends, one for each gain, all with the noise of the device's number."""
         runs = plan.runs(len(gains))
-        runs["speed"], runs["proportional"] = device.speed, gains
+        runs["speed"], runs["proportional"] = self.device.speed, gains
         runs["gain"] = self.scene.rotor.influence
-        runs["residual_fill"] = self.dynamics.residual
-        plan.finish(runs, lambda _: run_noise(seed, device.number))
+        runs["residual_fill"] = self.residual
+        plan.finish(runs, lambda _: run_noise(seed, self.device.number))
         return runs
+
+
+def _under(drawn: Sequence[Device], scenes: Sequence[Scene], *, modelled: Sequence[str]) -> Iterator[_Under]:
+    """Devices under one gas pressure whose scenes are alike; with each its scene there."""
+    plants, stack = np.zeros(len(drawn), dtype=PLANT), Designs.stacked(scenes)
+    # What is held in the tube follows from the other terms, of all devices at once.
+    before = [term for term in modelled if term != HELD]
+    dynamics = [
+        dynamics_of(scene=scene, model=device.model, modelled=before, checked=True)
+        for device, scene in zip(drawn, scenes, strict=True)
+    ]
+    for place, (each, scene) in enumerate(zip(dynamics, scenes, strict=True)):
+        each.fill(plants[place : place + 1], total=2 * scene.disc.initial_fill, relative_error=RELATIVE_ERROR)
+    if HELD in modelled:
+        hold_liquid(plants, stack)
+    stalled, residual = np.zeros(len(drawn)), residual_fills(plants, stack)
+    stalled_fills(plants, stalled)
+    rows = zip(drawn, scenes, dynamics, residual.tolist(), stalled.tolist(), strict=True)
+    for place, (device, scene, each, drawn_to, stalls_at) in enumerate(rows):
+        yield _Under.of(device, scene, plants[place : place + 1], each, drawn_to, stalls_at)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -258,8 +294,9 @@ def _why(under: _Under, run: np.void, limit: float) -> Outcome:
     return Outcome.GAS_TIME_TOO_SHORT if run["cause"] == IDLE else Outcome.TIME_LIMIT
 
 
-def _as_given(scene: Scene, model: BalancerModel, number: int) -> Device:
-    return Device(number=number, scene=scene, model=model, speed=1.0, moment=1.0, inputs={}, clipped=())
+def _numbers(group: int) -> range:
+    """Of its devices."""
+    return range(group * _GROUP, (group + 1) * _GROUP)
 
 
 def _but_for_gain(setting: _Setting) -> ControllerSettings:

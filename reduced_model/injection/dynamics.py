@@ -26,6 +26,7 @@ from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.heads import entrance_fraction
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.reduced_model.tube.regime import TubePath
+from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.models import Scene, Tube
 
 
@@ -180,10 +181,16 @@ class Lift:
             return None
         half = law.max_fill_ratio / 2
         flow = law.evaluate(fill_ratio=half, gas_pressure=scene.gas.pressure, primed=True)
-        straight = (
-            0.0 if tube.hump_shape == "arc" else 2 * tube.hump_radius / (tube.port_radius + tube.hump_radius)
-        )
-        return cls(straight=straight, entrance=entrance_fraction(scene, float(flow.velocity) or 1.0))
+        return cls.at(scene, np.asarray(flow.velocity))
+
+    @classmethod
+    def at(cls, scene: Scene, velocity: FloatArray) -> Lift:
+        """The same with the velocity of a full tube at equal fills, m/s, of many designs too."""
+        tube = scene.tube
+        crest = 0.0 if tube.hump_radius is None else tube.hump_radius
+        straight = 0.0 if tube.hump_shape == "arc" else 2 * crest / (tube.port_radius + crest)
+        entrance = entrance_fraction(scene, np.where(velocity > 0, velocity, 1.0))
+        return cls(straight=plain(straight), entrance=plain(entrance))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -351,7 +358,13 @@ class Dynamics:
 
     def plant(self, *, total: float, relative_error: float | None = None) -> npt.NDArray[np.void]:
         """Record of type `PLANT`, shape (1,), of a pair with a sum of fill ratios."""
-        return _filled(self, total, self.relative_error if relative_error is None else relative_error)
+        plant = np.zeros(1, dtype=PLANT)
+        self.fill(plant, total=total, relative_error=relative_error)
+        return plant
+
+    def fill(self, plant: npt.NDArray[np.void], *, total: float, relative_error: float | None = None) -> None:
+        """The same into a record of zeros, shape (1,)."""
+        _fill(plant, self, total, self.relative_error if relative_error is None else relative_error)
 
     @cached_property
     def _plants(self) -> dict[float, npt.NDArray[np.void]]:
@@ -387,8 +400,8 @@ _OF_DYNAMICS: Final = (
 )
 
 
-def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDArray[np.void]:
-    plant, column = np.zeros(1, dtype=PLANT), dynamics.column
+def _fill(plant: npt.NDArray[np.void], dynamics: Dynamics, total: float, relative_error: float) -> None:
+    column = dynamics.column
     for source, names in ((column, _OF_COLUMN), (column.path, _OF_PATH), (dynamics, _OF_DYNAMICS)):
         for name in names if source is not None else ():
             plant[name] = getattr(source, name)
@@ -411,7 +424,6 @@ def _filled(dynamics: Dynamics, total: float, relative_error: float) -> npt.NDAr
         plant["cells"][0, which, : len(pieces)] = pieces
         plant["pieces"][0, which] = len(pieces)
         plant["table_start"][0, which], plant["nodes_per"][0, which] = table.start, 1.0 / table.step
-    return plant
 
 
 def _fill_velocities(plant: npt.NDArray[np.void], law: FlowLaw) -> None:

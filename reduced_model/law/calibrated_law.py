@@ -6,7 +6,7 @@ Beside it the moment of a pair of chambers, from the same chamber.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -16,11 +16,11 @@ import numpy.typing as npt
 
 from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_table
+from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_tables
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
 from ringbalance.reduced_model.chamber.values import RingValues, share_across
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, Conditions, Flow, Regime, law_text, save_record
-from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
+from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples, tables_from_samples
 from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty, siphon_margin
 from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
@@ -32,6 +32,7 @@ from ringbalance.reduced_model.tube.regime import (
     possible_cavity,
 )
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray
+from ringbalance.scene.designs import Designs, alike
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import FITTED, direction_sides, independent_half_widths
 
@@ -296,8 +297,9 @@ def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
     gravity = gravity_shares(scene).mean > scene.tolerance
 
     def laws(turned: FloatArray | None = None) -> tuple[CalibratedLaw, ...]:
-        sides = direction_sides(scene, turned=turned).values()
-        return tuple(_variant(scene, side, gravity=gravity) for both in sides for side in both)
+        sides = [side for both in direction_sides(scene, turned=turned).values() for side in both]
+        made = zip(nominal_laws(sides, gravity=gravity), sides, strict=True)
+        return tuple(_variant(scene, law, side) for law, side in made)
 
     pressure = _VARIED_PRESSURES * scene.gas.pressure
     fill = _VARIED_FILLS[:, None] * scene.disc.max_fill_ratio
@@ -309,9 +311,9 @@ def _variants(scene: Scene) -> tuple[CalibratedLaw, ...]:
     return laws(turned[size > _LITTLE * size[0]].T) if size[0] > 0 else ()
 
 
-def _variant(scene: Scene, side: Scene, *, gravity: bool) -> CalibratedLaw:
+def _variant(scene: Scene, law: CalibratedLaw, side: Scene) -> CalibratedLaw:
     """Law of a scene beside another one; gas pressures are asked for as that has them."""
-    law, asked = nominal_law(side, gravity=gravity), scene.gas.pressure
+    asked = scene.gas.pressure
     return replace(law, gas_factor=law.gas_factor * side.gas.pressure / asked) if asked else law
 
 
@@ -324,22 +326,41 @@ def nominal_law(scene: Scene, *, gravity: bool) -> CalibratedLaw:
     Raises: ValueError: bends that do not fit into the tube.
     Source: Eqs. 13 to 18 of the liquid-ring paper; `RingValues.of`, `TubeHeads.nominal`.
     """
-    fills = fill_nodes(largest=scene.disc.max_fill_ratio)[0]
+    return nominal_laws([scene], gravity=gravity)[0]
+
+
+def nominal_laws(scenes: Sequence[Scene], *, gravity: bool) -> tuple[CalibratedLaw, ...]:
+    """The same of many scenes; those that differ in numbers alone, and not in their fills, at once."""
+    laws: dict[int, CalibratedLaw] = {}
+    for places in alike(scenes):
+        some = [scenes[place] for place in places]
+        laws |= zip(places, _nominal(some, gravity=gravity), strict=True)
+    return tuple(laws[place] for place in range(len(scenes)))
+
+
+def _nominal(scenes: Sequence[Scene], *, gravity: bool) -> Iterator[CalibratedLaw]:
+    """Of scenes that are alike."""
+    fills = fill_nodes(largest=scenes[0].disc.max_fill_ratio)[0]
     ends = {"start": 0.0, "stop": float(fills[-1])}
-    ring = RingValues.of(scene, fill_ratio=fills, gravity=gravity)
+    heads = TubeHeads.nominal(Designs.stacked(scenes))
+    rings = [RingValues.of(scene, fill_ratio=fills, gravity=gravity) for scene in scenes]
+    moments = [
+        scene.disc.moment_factor * ring.moment.value for scene, ring in zip(scenes, rings, strict=True)
+    ]
+    levels = pressure_tables(scenes, fills, [ring.hydrostatic_pressure.value for ring in rings])
+    curves = tables_from_samples(value=np.stack(moments, axis=1), **ends)
     exact = flat_table(**ends)
-    return _put_together(
-        scene,
-        heads=TubeHeads.nominal(scene),
-        hydrostatic_pressure=pressure_table(scene, fills, ring.hydrostatic_pressure.value)[0],
-        hydrostatic_pressure_uncertainty=exact,
-        inputs=DriveUncertainty(),
-        moment=CalibratedMoment(
-            chamber_moment=table_from_samples(value=scene.disc.moment_factor * ring.moment.value, **ends),
-            half_width=exact,
-            across=_across_table(scene, fills),
-        ),
-    )
+    for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True):
+        yield _put_together(
+            scene,
+            heads=head,
+            hydrostatic_pressure=level,
+            hydrostatic_pressure_uncertainty=exact,
+            inputs=DriveUncertainty(),
+            moment=CalibratedMoment(
+                chamber_moment=moment, half_width=exact, across=_across_table(scene, fills)
+            ),
+        )
 
 
 def _put_together(

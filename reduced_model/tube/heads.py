@@ -17,15 +17,16 @@ from ringbalance.physics.tube.loss import (
     with_errors,
 )
 from ringbalance.physics.tube.state import TubeState, tube_state
-from ringbalance.reduced_model.tables import HermiteTable, flat_table, level_table, table_from_samples
+from ringbalance.reduced_model.tables import HermiteTable, flat_table, level_table, tables_from_samples
 from ringbalance.reduced_model.tube.path import (
     crest_end_uncertainty,
     crest_span,
     head_behind_crest,
     reversed_tube,
 )
-from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, plain
 from ringbalance.scene.describe import scene_fault
+from ringbalance.scene.designs import Designs
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.scene.toml import toml_text
@@ -60,38 +61,36 @@ class TubeHeads:
     """Expanded uncertainty (95 %) of k_up over alpha + k_up, with the place of the crest's end."""
     fraction_uncertainty: HermiteTable
     """Expanded uncertainty (95 %) of (alpha + k_up)/(k + 1)."""
-    interpolation_error: float
-    """Largest relative error of the head tables found between their nodes."""
+    interpolation_error: float = 0.0
+    """Largest relative error of the head tables found between their nodes; zero where none was looked for."""
 
     @classmethod
-    def nominal(cls, scene: Scene, *, nodes: int = _NOMINAL_NODES) -> TubeHeads:
-        """The heads without uncertainties and, unless asked for more, on few nodes.
+    def nominal(cls, designs: Designs) -> tuple[TubeHeads, ...]:
+        """The heads of every design without uncertainties and on few nodes.
 
         These do not depend on the scene: their error, below 1e-4 of a head, is smooth in its values.
         Raises: ValueError: as `TubeHeads.of`. SceneError: the scene's `model_errors` make no loss.
         """
+        return cls._tabled(designs.scene, _sampled(designs.scene, _NOMINAL_NODES))
+
+    @classmethod
+    def _tabled(cls, scene: Scene, values: list[FloatArray]) -> tuple[TubeHeads, ...]:
+        """From `log_heads` over the velocities, shape (nodes, designs)."""
+        if not all(np.all(np.diff(value, axis=0) > 0) for value in values):
+            raise _inconsistent(scene)
         start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
-        places = np.linspace(start, stop, 2 * nodes - 1)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            values = log_heads(scene, places)
-        if not np.all(np.isfinite(values)):
-            raise _inconsistent(scene)
-        if scene.tube.model_errors:
-            values = [_growing(scene, places, value) for value in values]
-        tables = [table_from_samples(start=start, stop=stop, value=value[::2]) for value in values]
-        if not all(np.all(np.diff(table.value) > 0) for table in tables):
-            raise _inconsistent(scene)
-        missed = [table(places) - value for table, value in zip(tables, values, strict=True)]
-        between, *to_crest = tables
         exact = flat_table(start=start, stop=stop)
-        return cls(
-            head=between,
-            hump_head=to_crest[0] if to_crest else None,
-            return_hump_head=to_crest[1] if to_crest else None,
-            uncertainty=exact,
-            hump_uncertainty=exact,
-            fraction_uncertainty=exact,
-            interpolation_error=float(np.max(np.abs(missed))),
+        tables = [tables_from_samples(start=start, stop=stop, value=value) for value in values]
+        return tuple(
+            cls(
+                head=between,
+                hump_head=to_crest[0] if to_crest else None,
+                return_hump_head=to_crest[1] if to_crest else None,
+                uncertainty=exact,
+                hump_uncertainty=exact,
+                fraction_uncertainty=exact,
+            )
+            for between, *to_crest in zip(*tables, strict=True)
         )
 
     @classmethod
@@ -104,7 +103,15 @@ class TubeHeads:
         place = crest_end_uncertainty(scene.tube, independent_half_widths(scene).get("hump_position", 0.0))
         start, stop = np.log(TABLE_VELOCITIES)
         widths = _widths(scene, np.linspace(start, stop, _UNCERTAINTY_NODES), place=place)
-        return replace(TubeHeads.nominal(scene, nodes=_NODES), **widths)  # type: ignore[arg-type]
+        places, values = np.linspace(start, stop, 2 * _NODES - 1), _sampled(scene, 2 * _NODES - 1)
+        heads = cls._tabled(scene, [value[::2] for value in values])[0]
+        tables = (heads.head, heads.hump_head, heads.return_hump_head)
+        missed = [
+            np.max(np.abs(table(places) - value[:, 0]))
+            for table, value in zip(tables, values, strict=False)
+            if table is not None
+        ]
+        return replace(heads, interpolation_error=float(max(missed)), **widths)
 
     def to_crest(self, *, reverse: bool) -> HermiteTable | None:
         """From the chamber that gives liquid; None without a crest."""
@@ -126,8 +133,27 @@ def _inconsistent(scene: Scene) -> Exception:
     fault = scene_fault(
         scene, "tube.model_errors", problem=f"with these corrections {problem}", allowed="smaller ones"
     )
-    written = [{"cause": each.cause, "even": each.even, "odd": each.odd} for each in scene.tube.model_errors]
+    written = [
+        {"cause": each.cause, "even": plain(np.mean(each.even)), "odd": plain(np.mean(each.odd))}
+        for each in scene.tube.model_errors
+    ]
     return SceneError([replace(fault, value=toml_text(written))])
+
+
+def _sampled(scene: Scene, count: int) -> list[FloatArray]:
+    """`log_heads` over even places, shape (count, designs).
+
+    Raises: as `TubeHeads.nominal`.
+    """
+    start, stop = (float(v) for v in np.log(TABLE_VELOCITIES))
+    places = np.linspace(start, stop, count)[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        values = log_heads(scene, places)
+    if not np.all(np.isfinite(values)):
+        raise _inconsistent(scene)
+    if scene.tube.model_errors:
+        values = [_growing(scene, places, value) for value in values]
+    return values
 
 
 def velocity_of(*, table: HermiteTable, head: npt.ArrayLike, where: BoolArray) -> FloatArray:
@@ -147,7 +173,7 @@ def _growing(scene: Scene, log_velocity: FloatArray, log_head: FloatArray) -> Fl
     rising by `_RISE` per unit of ln u, so that one velocity belongs to each.
     Raises: SceneError: it falls by more than `_LEVELLED`, or is none.
     """
-    highest = np.maximum.accumulate(log_head)
+    highest = np.maximum.accumulate(log_head, axis=0)
     if not np.all(highest - log_head <= _LEVELLED):
         raise _inconsistent(scene)
     return highest + _RISE * log_velocity
@@ -221,9 +247,11 @@ def crest_head(
     return np.asarray(fall + behind)
 
 
-def entrance_fraction(scene: Scene, velocity: float) -> float:
-    """Fraction of the head up to the crest that is lost at the entrance, (alpha + K_ent)/(alpha + k_up)."""
-    u = np.array([velocity])
+def entrance_fraction(scene: Scene, u: FloatArray) -> FloatArray:
+    """Fraction of the head up to the crest that is lost at the entrance, (alpha + K_ent)/(alpha + k_up).
+
+    Args: `u`: velocities, m/s, of the designs if there are many.
+    """
     state = corrected_state(scene, u)
     entrance = (state.kinetic_factor + state.terms.get("entrance", 0.0)) * u**2 / 2
-    return float((entrance / crest_head(scene=scene, tube=scene.tube, state=state, velocity=u))[0])
+    return np.asarray(entrance / crest_head(scene=scene, tube=scene.tube, state=state, velocity=u))

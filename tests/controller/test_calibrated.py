@@ -109,5 +109,5 @@ def test_devices_differ_in_the_measured_factor_of_the_moment(
         uncertainty=(InputUncertainty(quantity="lambda_factor", half_width=0.04, relative=False),),
     )
     made = devices(measured, calibrated, Spread.of(measured, calibrated), range(64), seed=0)
-    factors = [made(place).scene.disc.lambda_factor or 0.0 for place in range(64)]
+    factors = [each.scene.disc.lambda_factor or 0.0 for each in made]
     assert np.std(factors) == pytest.approx(0.04 / 1.96, rel=0.1)

@@ -61,7 +61,7 @@ def test_a_device_is_the_same_alone_and_under_any_setting(
 def test_devices_have_the_stated_spread(paper_scene: Scene) -> None:
     model = paper_model(paper_scene)
     made = devices(paper_scene, model, Spread.of(paper_scene, model), range(64), seed=0)
-    drawn = [made(place).scene for place in range(64)]
+    drawn = [each.scene for each in made]
     for name in ("bore", "density", "influence_coefficient", "pressure"):
         values = [nominal_value(scene=scene, quantity=name) or math.nan for scene in drawn]
         sigma = half_widths(paper_scene)[name] / 1.96
@@ -78,7 +78,7 @@ def test_a_scene_may_restrict_the_direction(paper_scene: Scene) -> None:
     narrow = replace(paper_scene, requirement=replace(paper_scene.requirement, phase_range=0.1))
     model = paper_model(narrow)
     made = devices(narrow, model, Spread.of(narrow, model), range(64), seed=0)
-    phases = [made(place).scene.rotor.initial_phase for place in range(64)]
+    phases = [each.scene.rotor.initial_phase for each in made]
     assert np.max(np.abs(np.array(phases) - paper_scene.rotor.initial_phase)) <= 0.1
 
 
@@ -112,8 +112,7 @@ def test_the_papers_pressure_is_too_high_for_its_disc(balancer: LiquidRingBalanc
 
 
 def test_static_intervals_are_those_of_the_draws(paper_scene: Scene, calibrated: BalancerModel) -> None:
-    made = devices(paper_scene, calibrated, Spread.of(paper_scene, calibrated), range(128), seed=0)
-    drawn = [made(place) for place in range(128)]
+    drawn = devices(paper_scene, calibrated, Spread.of(paper_scene, calibrated), range(128), seed=0)
 
     def flow(scene: Scene, model: BalancerModel) -> Flow:
         return model.flow.evaluate(

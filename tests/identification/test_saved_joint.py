@@ -139,7 +139,7 @@ def test_drawn_devices_spread_as_the_posterior(result: FitResult, scene: Scene) 
     # other does so to the first order alone.
     spread = replace(whole, directions=0.2 * whole.directions, inputs={}, loss=0.0, moment=0.0, cavity=False)
     made = devices(scene, model, spread, range(64), seed=0)
-    drawn = np.std([log_rate(made(place).scene) for place in range(64)])
+    drawn = np.std([log_rate(each.scene) for each in made])
     assert drawn == pytest.approx(0.2 * posterior, rel=0.1)
     assert alone > 3 * posterior
 

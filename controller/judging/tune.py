@@ -23,8 +23,7 @@ from ringbalance.controller.judging.tuning_rows import LONGER, tuning_document, 
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Presentation
 from ringbalance.scene.draws import BLOCK
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 
 
 def tuned(

@@ -1,8 +1,8 @@
 """Two balancers side by side on one rotor, each with settings chosen by runs: what fractions settle.
 
 Both are run as the devices of one number: with the same drawn rotor (speed, influence coefficient, unbalance
-in size and direction), each with its own inputs drawn, and with noise by that number.  The rotor is as uncertain
-as that of the two scenes which states more, so that the order of the scenes does not matter to it.
+in size and direction), each with its own inputs drawn, and with noise by that number.  The rotor is as
+uncertain as that of the two scenes which states more, so that the order of the scenes does not matter to it.
 """
 
 from __future__ import annotations

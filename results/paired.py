@@ -35,7 +35,7 @@ class Paired:
         """
         n = self.first_alone + self.second_alone
         tail = sum(comb(n, k) for k in range(min(self.first_alone, self.second_alone) + 1))
-        return min(1.0, 2 * tail / 2**n)
+        return min(1.0, float(2 * tail) / float(1 << n))
 
     def better(self, level: float) -> int | None:
         """0 or 1, the one under which more devices do; None: no difference is shown at a level."""

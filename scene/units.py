@@ -88,7 +88,7 @@ DIMENSIONS: Mapping[str, Dimension] = _dimensions()
 _LONGEST_TEXT = 60
 _READS_BACK = 1e-6
 """Relative change of a value that is written and read again."""
-_SAVED = 3
+_SAVED = 4
 """Characters that another unit than the usual one must save."""
 _NUMBER = re.compile(
     r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![0-9.,])\s*(.*?)\s*", re.DOTALL

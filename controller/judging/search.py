@@ -143,9 +143,7 @@ def _best_of(balancer: Balancer, trials: Trials, along: float | None, progress: 
     return _final(balancer, _climbed(balancer, coarse, rounds=_ROUNDS, progress=progress))
 
 
-def _climbed(
-    balancer: Balancer, field: list[Candidate], *, rounds: int, progress: Progress
-) -> list[Tried]:
+def _climbed(balancer: Balancer, field: list[Candidate], *, rounds: int, progress: Progress) -> list[Tried]:
     """All that ran on every device, of a field and of the neighbours of the best again and again."""
     tried: dict[object, Tried | None] = {}
     for _ in range(rounds):
@@ -199,9 +197,7 @@ def chosen(tried: Iterable[Tried]) -> Tried | None:
     return max(fast, key=lambda each: (amid(each), -each.time(at)))
 
 
-def _raced(
-    balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | None = None
-) -> list[Tried]:
+def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | None = None) -> list[Tried]:
     """Those that are not surely worse than the best after each heat. Args: `leading`: the best before."""
     asked, demands = balancer.asked_fraction(), balancer.demands()
     running: dict[int, Tried | None] = {i: None for i, each in enumerate(field) if each.settings is not None}
@@ -269,9 +265,7 @@ def _outwards(axis: Axis, places: Sequence[int], along: float | None) -> list[in
     return sorted(places, key=lambda at: abs(at - start))
 
 
-def _beside(
-    balancer: Balancer, best: Tried, chosen_at: Mapping[int, Tried], *, at: int, axis: Axis
-) -> Tried:
+def _beside(balancer: Balancer, best: Tried, chosen_at: Mapping[int, Tried], *, at: int, axis: Axis) -> Tried:
     """The best at a level, from the best at the nearest level that serves any device."""
     serving = {place: each for place, each in chosen_at.items() if each.count}
     near = serving[min(serving, key=lambda place: abs(place - at))] if serving else best

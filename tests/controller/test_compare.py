@@ -166,7 +166,7 @@ def test_both_are_run_on_the_same_drawn_rotor_whichever_is_first(
 ) -> None:
     """Speed, influence coefficient and unbalance of each device; what else is drawn is each one's own."""
     ring, masses = under_paper_law(paper_scene), balancer_of(small)
-    both = {}
+    both: dict[int, CommonRotor] = {}
     for first, second in ((ring, masses), (masses, ring)):
         rotors = rotors_of(first.rotor, second.rotor)
         placed = [each.on_rotor(first.rotor(), rotors) for each in (first, second)]

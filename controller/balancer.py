@@ -14,9 +14,8 @@ from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
-from ringbalance.controller.common_rotor import CommonRotor, Rotors
-from ringbalance.controller.drawn_input import DrawnInput
-from ringbalance.controller.trials import Trials
+from ringbalance.controller.rotor import CommonRotor, Rotors
+from ringbalance.controller.trials import DrawnInput, Trials
 from ringbalance.reduced_model.law.flow_law import CALIBRATED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows

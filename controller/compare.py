@@ -15,10 +15,10 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
-from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotors_of, vibrating
 from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.judging.tuning_rows import plain_settings, setting_text
+from ringbalance.controller.rotor import CommonRotor, Rotors, rotors_of, vibrating
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.paired import Paired
 from ringbalance.results.proportion import Proportion
@@ -26,8 +26,7 @@ from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.faults import Fault, SceneError
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 
 FEWEST: Final = 16
 MOST: Final = 64

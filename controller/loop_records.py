@@ -12,7 +12,7 @@ import numpy as np
 
 from ringbalance.controller.rotor import MAX_CHAMBERS
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.arrays import ComplexArray
 from ringbalance.scene.platform.compiled import in_place
 
 GAS_POINTS: Final = 8
@@ -233,14 +233,13 @@ class MomentTable(NamedTuple):
         lowest, highest = max(0.0, total - largest), min(total, largest)
         step = (highest - lowest) / (MOMENT_NODES - 1)
 
-        def of(x: FloatArray) -> ComplexArray:
-            held = np.clip(x, lowest, highest)
-            return model.moment.pair_vector(fill_ratio=held, opposite_fill_ratio=total - held)
-
-        x = np.linspace(lowest, highest, MOMENT_NODES)
-        before, after = np.maximum(x - step / 2, lowest), np.minimum(x + step / 2, highest)
-        slope = (of(after) - of(before)) / (after - before) * step
-        return cls(lowest=float(lowest), step=float(step), nodes=np.stack([of(x), slope], axis=1))
+        # Nodes and their middles: a slope is that between the middles on both sides.
+        x = np.linspace(lowest, highest, 2 * MOMENT_NODES - 1)
+        moment = model.moment.pair_vector(fill_ratio=x, opposite_fill_ratio=np.maximum(total - x, 0.0))
+        middle = np.concatenate([moment[:1], moment[1::2], moment[-1:]])
+        slope = np.diff(middle)
+        slope[[0, -1]] *= 2.0
+        return cls(lowest=float(lowest), step=float(step), nodes=np.stack([moment[::2], slope], axis=1))
 
 
 @in_place

@@ -12,7 +12,6 @@ import numpy as np
 
 from ringbalance.controller.algorithms.built_in import BELOW_MINIMUM, NO_SAMPLE
 from ringbalance.controller.balancer import FURTHER
-from ringbalance.controller.liquid_ring.dead_time import dead_time
 from ringbalance.controller.liquid_ring.loop_factor import LoopFactor
 from ringbalance.controller.liquid_ring.plant import (
     LEAST_PRESSURE,
@@ -23,6 +22,7 @@ from ringbalance.controller.liquid_ring.plant import (
 from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING, SAMPLES
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.simulation import NOISE_DEVIATIONS, Injection, Outcome, Sample, noise_floor
+from ringbalance.controller.terms import dead_time
 from ringbalance.reduced_model.injection.dynamics import Event
 from ringbalance.reduced_model.residual_liquid import Holding
 from ringbalance.results.rows import Finding, Value, sentences

@@ -11,6 +11,7 @@ from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.gas import GasLine
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.injection.dynamics import Dynamics, gives_forces
+from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import FILLING, HELD, IN_INJECTIONS, INERTIA, LAG, ModelUsed, models_used
@@ -165,3 +166,18 @@ def _volume_faults(scene: Scene, model: BalancerModel) -> Iterator[Fault]:
         )
         allowed = "that disc, or a law made for this one"
         yield scene_fault(scene, "disc.axial_width", problem=problem, allowed=allowed)
+
+
+def dead_time(scene: Scene, model: BalancerModel, *, rate: float) -> float:
+    """Of an injection of the size of the limit at equal fills, while gas fills the chamber and liquid rises.
+
+    At least the valve's lag and its shortest opening, s.
+    """
+    modelled, total = terms_modelled(run_models(scene=scene, model=model)), 2 * scene.disc.initial_fill
+    least = max(scene.gas.valve_lag or 0.0, scene.controller.minimum_gas_time)
+    if not modelled or rate <= 0.0:
+        return least
+    dynamics = dynamics_of(scene=scene, model=model, modelled=modelled, checked=True)
+    injections = Injections.of(dynamics, model, fill=scene.disc.initial_fill, total=total)
+    lost = injections.dead_time(scene.controller.limit / rate * injections.steady)
+    return max(lost or 0.0, least)

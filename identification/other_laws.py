@@ -17,7 +17,7 @@ from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.tables import HermiteTable, table_from_samples
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import with_values_at
 
 _BY_LAW: Final = ("injection", "transfer", "flow")
 """Kinds that the law of the tube's flow decides on."""

@@ -25,8 +25,7 @@ from ringbalance.scene.faults import did_you_mean
 from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 from ringbalance.scene.uncertain import (
     NORMAL_95,
     SHAPE,

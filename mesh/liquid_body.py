@@ -41,42 +41,34 @@ _HALVINGS: Final = 6
 """Of a move that folds a cell, before it is given up."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Level:
-    """Potential of centrifugal force and gravity over omega^2: liquid is where it is positive.
+def _level(places: FloatArray, radius: float) -> FloatArray:
+    """Centrifugal potential over omega^2 above that of the surface, m^2: liquid is where it is positive.
 
-    value = (x^2 + y^2)/2 + t . x - constant, m^2, with t = g/omega^2.
+    Args: `places`: m, shape (..., 3). `radius`: a of the concentric surface, m.
     """
-
-    constant: float
-    """m^2; a^2/2 for a concentric surface."""
-    tilt: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """t, m, in the chamber's axes."""
-
-    def value(self, places: FloatArray) -> FloatArray:
-        """At places of shape (..., 3)."""
-        x, y = places[..., 0], places[..., 1]
-        return np.asarray((x**2 + y**2) / 2 + places @ np.array(self.tilt) - self.constant)
-
-    def gradient(self, places: FloatArray) -> FloatArray:
-        """Force on the liquid over rho omega^2, m, the shape of `places`."""
-        return np.asarray(places * np.array([1.0, 1.0, 0.0]) + np.array(self.tilt))
+    return np.asarray((places[..., 0] ** 2 + places[..., 1] ** 2 - radius**2) / 2)
 
 
-def liquid_body(body: Tetrahedra, level: Level) -> Tetrahedra:
-    """The part of a chamber in which a level is positive; its new boundary is `free_surface`.
+def _outward(places: FloatArray) -> FloatArray:
+    """Gradient of the level, m, the shape of `places`."""
+    return np.asarray(places * np.array([1.0, 1.0, 0.0]))
 
+
+def liquid_body(body: Tetrahedra, radius: float) -> Tetrahedra:
+    """The part of a chamber outside a concentric surface, which is its new boundary `free_surface`.
+
+    Args: `radius`: a, m.
     Raises: ValueError: the surface leaves no liquid, or does not meet the body at all.
     """
-    snapped, on = _snapped(body, level)
-    value = np.where(on, 0.0, level.value(snapped.nodes))
+    snapped, on = _snapped(body, radius)
+    value = np.where(on, 0.0, _level(snapped.nodes, radius))
     sign = np.sign(value)[snapped.cells[:, :4]]
     if not (sign > 0).any():
         raise ValueError("no liquid is left outside the free surface: choose a smaller surface radius")
     if not (sign <= 0).any():
         raise ValueError("the free surface does not meet the chamber: choose a larger surface radius")
-    cut = _divided(snapped, level, value)
-    return compacted(_on_surface(cut, level))
+    cut = _divided(snapped, radius, value)
+    return compacted(_on_surface(cut, radius))
 
 
 def _edge_lengths(body: Tetrahedra) -> FloatArray:
@@ -109,25 +101,25 @@ def _tangents(body: Tetrahedra) -> FloatArray:
     return np.asarray(np.einsum("nia,na,nja->nij", axes, free, axes))
 
 
-def _move(level: Level, places: FloatArray, tangents: FloatArray) -> FloatArray:
+def _move(radius: float, places: FloatArray, tangents: FloatArray) -> FloatArray:
     """Step along walls to the surface; zero where none leads there."""
-    along = np.einsum("nij,nj->ni", tangents, level.gradient(places))
+    along = np.einsum("nij,nj->ni", tangents, _outward(places))
     square = np.einsum("ni,ni->n", along, along)
-    full = np.einsum("ni,ni->n", level.gradient(places), level.gradient(places))
+    full = np.einsum("ni,ni->n", _outward(places), _outward(places))
     usable = square > 0.1 * full
-    size = np.where(usable, -level.value(places) / np.where(usable, square, 1.0), 0.0)
+    size = np.where(usable, -_level(places, radius) / np.where(usable, square, 1.0), 0.0)
     return np.asarray(along * size[:, None])
 
 
-def _snapped(body: Tetrahedra, level: Level) -> tuple[Tetrahedra, BoolArray]:
+def _snapped(body: Tetrahedra, radius: float) -> tuple[Tetrahedra, BoolArray]:
     """Corners near the surface moved onto it; which nodes are on it now."""
     tangents, room = _tangents(body), _shortest(body)
     corner = np.isfinite(room)
     moved = body.nodes.copy()
     for _ in range(3):
-        moved[corner] += _move(level, moved[corner], tangents[corner])
+        moved[corner] += _move(radius, moved[corner], tangents[corner])
     shift = moved - body.nodes
-    near = np.abs(level.value(moved)) < _ON * np.linalg.norm(level.gradient(moved), axis=1) * room
+    near = np.abs(_level(moved, radius)) < _ON * np.linalg.norm(_outward(moved), axis=1) * room
     taken = corner & near & (np.linalg.norm(shift, axis=1) < _SNAP * np.where(corner, room, 0.0))
     for _ in range(10):
         result = _shifted(body, np.where(taken[:, None], shift, 0.0))
@@ -135,8 +127,8 @@ def _snapped(body: Tetrahedra, level: Level) -> tuple[Tetrahedra, BoolArray]:
         if not taken[body.cells[folded, :4]].any():
             break
         taken[body.cells[folded, :4]] = False
-    reach = np.linalg.norm(level.gradient(result.nodes), axis=1) * np.where(corner, room, 0.0)
-    return result, taken | (np.abs(level.value(result.nodes)) < _ON * reach)
+    reach = np.linalg.norm(_outward(result.nodes), axis=1) * np.where(corner, room, 0.0)
+    return result, taken | (np.abs(_level(result.nodes, radius)) < _ON * reach)
 
 
 def _shifted(body: Tetrahedra, shift: FloatArray) -> Tetrahedra:
@@ -173,14 +165,14 @@ class _Cuts:
     """Of the new nodes, shape (new, 3)."""
 
 
-def _cuts(body: Tetrahedra, level: Level, value: FloatArray) -> _Cuts:
+def _cuts(body: Tetrahedra, radius: float, value: FloatArray) -> _Cuts:
     ends = body.cells[:, EDGES]
     crossing = np.sign(value[ends]).prod(axis=2) < 0
     middles = body.cells[:, 4:][crossing]
     kept, first, inverse = np.unique(middles, return_index=True, return_inverse=True)
     first_end, second_end = ends[crossing][first].T
     curve = body.nodes[np.stack([first_end, second_end, kept])]
-    share = _crossing(level, curve)
+    share = _crossing(radius, curve)
     number = np.full(crossing.shape, -1)
     number[crossing] = len(body.nodes) + inverse
     along = np.zeros(crossing.shape)
@@ -195,13 +187,13 @@ def _on_curve(curve: FloatArray, share: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("nk,knx->nx", values, curve))
 
 
-def _crossing(level: Level, curve: FloatArray) -> FloatArray:
+def _crossing(radius: float, curve: FloatArray) -> FloatArray:
     """Share of each edge, start, end and middle given, at which it crosses: bisection."""
     low, high = np.zeros(curve.shape[1]), np.ones(curve.shape[1])
-    start = np.sign(level.value(curve[0]))
+    start = np.sign(_level(curve[0], radius))
     for _ in range(50):
         middle = (low + high) / 2
-        before = np.sign(level.value(_on_curve(curve, middle))) == start
+        before = np.sign(_level(_on_curve(curve, middle), radius)) == start
         low, high = np.where(before, middle, low), np.where(before, high, middle)
     return np.asarray((low + high) / 2)
 
@@ -244,8 +236,8 @@ def _is_on(signs: tuple[int, ...], corner: int) -> bool:
 _EDGE_NUMBER: Final = {frozenset((int(a), int(b))): k for k, (a, b) in enumerate(EDGES)}
 
 
-def _divided(body: Tetrahedra, level: Level, value: FloatArray) -> Tetrahedra:
-    cuts = _cuts(body, level, value)
+def _divided(body: Tetrahedra, radius: float, value: FloatArray) -> Tetrahedra:
+    cuts = _cuts(body, radius, value)
     signs = np.sign(value)[body.cells[:, :4]].astype(np.int64)
     parents, barycentric, corners = [], [], []
     own = np.concatenate([body.cells[:, :4], cuts.number], axis=1)
@@ -300,7 +292,7 @@ def _joined(
     )
 
 
-def _on_surface(body: Tetrahedra, level: Level) -> Tetrahedra:
+def _on_surface(body: Tetrahedra, radius: float) -> Tetrahedra:
     """Mid-nodes of the free surface moved onto it along the walls, as far as no cell folds."""
     free = body.names.index(FREE_SURFACE)
     walls = replace(body, faces=np.where(body.faces == free, -1, body.faces))
@@ -310,7 +302,7 @@ def _on_surface(body: Tetrahedra, level: Level) -> Tetrahedra:
     surface = np.unique(surface)
     tangents, moved = _tangents(walls)[surface], body.nodes.copy()
     for _ in range(3):
-        moved[surface] += _move(level, moved[surface], tangents)
+        moved[surface] += _move(radius, moved[surface], tangents)
     for attempt in range(10):
         result = replace(body, nodes=moved)
         folded = _folded(body, result)

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from skfem import MeshTri1
 
 from ringbalance.mesh.chamber import FREE_SURFACE
-from ringbalance.mesh.liquid_body import Level, liquid_body
+from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import FACES, face_nodes, tetrahedra
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
 from ringbalance.scene.chamber_file.elements import boundary_facets, corners_of, edges_of
@@ -66,7 +66,7 @@ def middle_section(geometry: ChamberGeometry, *, surface_radius: float, coarse: 
     Raises: NoPlaneWavesError: the free surface is not one chain of edges from wall to wall, or a wall is
         closed in itself: stream functions would differ from wall to wall.
     """
-    body = liquid_body(tetrahedra(geometry), Level(constant=surface_radius**2 / 2))
+    body = liquid_body(tetrahedra(geometry), surface_radius)
     low, high = geometry.points[:, 2].min(), geometry.points[:, 2].max()
     height = body.nodes[:, 2] - (low + high) / 2 - _BESIDE * (high - low)
     cells, facets = body.cells[:, :4], body.cells[:, FACES].reshape(-1, 3)

@@ -17,11 +17,10 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.balancer import AS_GIVEN, Draws, balancer_of
-from ringbalance.controller.eccentric_mass.band import amplitude_band
-from ringbalance.controller.eccentric_mass.loop_rows import loops_document
 from ringbalance.controller.eccentric_mass.plant import rotor_record
 from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
-from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
+from ringbalance.controller.eccentric_mass.run_record import amplitude_band
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, loops_document
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint
 from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.loop import simulate
@@ -327,7 +326,7 @@ def _eccentric_study(scene: EccentricScene) -> Record:
         "locked": locked_run(scene).to_dict(),
         "rotor": rotor_record(scene),
         "tuning": loops_document(RecommendedGains.of(scene)),
-        "drawn": amplitude_band(several.traced, start=0.0, end=scene.run.time_limit),
+        "drawn": amplitude_band(several.traced, end=scene.run.time_limit),
     }
 
 

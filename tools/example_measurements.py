@@ -23,7 +23,7 @@ from ringbalance.scene import AnyScene, bundled_scene, load_scene, write_whole
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.describe import in_usual_unit, usual_name, usual_unit
 from ringbalance.scene.models import Scene
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import with_values_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, with_value
 from ringbalance.scene.units import format_quantity
 

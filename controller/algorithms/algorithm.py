@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -21,11 +20,6 @@ class Measurement:
     """rad, any multiple of a full turn away."""
     at_residual: tuple[bool, ...] = ()
     """Of every chamber, whether its last injection was shortened to keep its residual fill; empty: none."""
-
-    def usable(self, *, needs_phase: bool) -> bool:
-        """Whether it holds finite numbers in what the algorithm reads."""
-        finite = math.isfinite(self.time) and math.isfinite(self.amplitude)
-        return finite and (not needs_phase or math.isfinite(self.phase))
 
 
 @dataclass(frozen=True, kw_only=True)

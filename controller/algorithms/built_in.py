@@ -116,7 +116,7 @@ def show(run: Record, measurement: Measurement | None) -> None:
     run["usable"] = 0
     if measurement is not None:
         run["seen_amplitude"], run["seen_phase"] = measurement.amplitude, measurement.phase
-        if measurement.usable(needs_phase=False):
+        if math.isfinite(measurement.time) and math.isfinite(measurement.amplitude):
             run["usable"] = USABLE if math.isfinite(measurement.phase) else NO_PHASE
 
 
@@ -203,7 +203,7 @@ def target_vector_step(loop: Record, run: Record) -> None:
     if run.seen_amplitude <= loop.rest_limit:
         run.resting, run.integral, run.before_time = 1, 0.0, math.inf
         return
-    wanted, run.integral = vector_gas_time(
+    wanted, run.integral = _vector_gas_time(
         run.seen_amplitude,
         run.seen_phase,
         run.time,
@@ -226,7 +226,7 @@ def target_vector_step(loop: Record, run: Record) -> None:
 
 
 @in_place
-def vector_gas_time(
+def _vector_gas_time(
     amplitude: float,
     phase: float,
     time: float,

@@ -9,15 +9,12 @@ from ringbalance.controller.rotor import chamber_letters
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
-from ringbalance.scene.describe import scene_fault
-from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
 
 
 def controller_of(scene: Scene, model: BalancerModel | None = None) -> BuiltIn:
     """The control algorithm that a scene asks for; `model` is the balancer as the law-based one assumes it.
 
-    Raises: SceneError: an algorithm that this program does not have.
     Raises: ValueError: the law-based algorithm without a model.
     """
     kind = scene.controller.kind
@@ -25,17 +22,9 @@ def controller_of(scene: Scene, model: BalancerModel | None = None) -> BuiltIn:
         return target_vector_of(scene)
     if kind == "trial":
         return _trial_of(scene)
-    if kind == "law_based":
-        if model is None:
-            raise ValueError("the law-based algorithm needs a model, such as calibrate(scene).model")
-        return law_based_of(scene, model)
-    fault = scene_fault(
-        scene,
-        "controller.kind",
-        problem="this version does not simulate this algorithm",
-        allowed='"target_vector", "trial", "law_based"',
-    )
-    raise SceneError([fault])
+    if model is None:
+        raise ValueError("the law-based algorithm needs a model, such as calibrate(scene).model")
+    return law_based_of(scene, model)
 
 
 def target_vector_of(scene: Scene) -> TargetVector:

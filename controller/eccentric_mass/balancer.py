@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -26,15 +27,17 @@ from ringbalance.controller.balancer import (
     outcomes_of,
     settles_within,
 )
-from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
-from ringbalance.controller.drawn_input import MEASURE_INPUT, DrawnInput, drawn_key
 from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device, on_rotor
-from ringbalance.controller.eccentric_mass.loop_rows import loops_document, loops_quantities, loops_status
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
-from ringbalance.controller.eccentric_mass.remedies import advised_remedies
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
-from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
+from ringbalance.controller.eccentric_mass.sampled_loops import (
+    RecommendedGains,
+    advised,
+    loops_document,
+    loops_quantities,
+    loops_status,
+)
 from ringbalance.controller.eccentric_mass.scene_records import (
     EccentricRequirement,
     EccentricRotor,
@@ -45,13 +48,13 @@ from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
-from ringbalance.controller.trials import Axis, Trials
+from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
+from ringbalance.controller.trials import MEASURE_INPUT, Axis, DrawnInput, Trials, drawn_key
 from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.draws import run_noise
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, value_at, with_values_at
 
 _FINEST_SHARE: Final = 0.01
 """Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
@@ -170,7 +173,7 @@ class EccentricMassBalancer:
     def trials(self) -> tuple[Trials, ...]:
         """The gains of the drives with their margins, where the scene's have less: no other gain decides
         whether masses settle."""
-        changes = advised(self.scene)[1]
+        changes = advised(self.scene)
         if all(loop.value <= loop.recommended for loop in RecommendedGains.of(self.scene).loops):
             return ()
         loops = Axis(name="margins of the drives", levels=(0.0, 1.0), first=(0, 1))
@@ -351,3 +354,52 @@ def _check_rotor(rotor: CommonRotor, scene: EccentricScene, found: EccentricRoto
         problem = f"no bearing of this kind gives a lag of {lag:.4g} deg with this influence coefficient"
         allowed = "a lag_angle above 0 deg and below 180 deg, the greater the lighter the rotor"
         raise rotor_fault(scene, "rotor.stiffness", problem, allowed)
+
+
+MOST: Final = 4
+"""Remedies that are tried."""
+_Kind = frozenset[tuple[str, str]]
+"""Paths that change, each with "up", "down" or the text that is set."""
+
+
+def advised_remedies(scene: EccentricScene, runs: Iterable[Any]) -> tuple[Remedy, ...]:
+    """Those that most runs advise first, each with its largest change.
+
+    None that moves a value the other way than one before it: the two would undo each other.
+    Args: `runs`: each an `EccentricRun`.
+    """
+    counted: Counter[_Kind] = Counter()
+    largest: dict[_Kind, Mapping[str, float | str]] = {}
+    for run in runs:
+        for finding in run.remedies:
+            kind = frozenset((path, _way(scene, path, value)) for path, value in finding.change.items())
+            counted[kind] += 1
+            if kind not in largest or _size(scene, finding.change) > _size(scene, largest[kind]):
+                largest[kind] = finding.change
+    found, ways = [], dict[str, str]()
+    for kind, _ in counted.most_common():
+        if all(ways.get(path, way) == way for path, way in kind):
+            ways |= dict(kind)
+            found.append(Remedy(code=_code(kind), changes=dict(largest[kind])))
+    return tuple(found[:MOST])
+
+
+def _way(scene: EccentricScene, path: str, value: float | str) -> str:
+    if isinstance(value, str):
+        return value
+    before = _before(scene, path)
+    return "up" if before is None or value > before else "down"
+
+
+def _before(scene: EccentricScene, path: str) -> float | None:
+    table, _, key = path.partition(".")
+    return None if getattr(getattr(scene, table), key) is None else value_at(scene, path)
+
+
+def _size(scene: EccentricScene, changes: Mapping[str, float | str]) -> float:
+    numbers = [(_before(scene, path), value) for path, value in changes.items() if not isinstance(value, str)]
+    return math.fsum(abs(math.log(value / before)) for before, value in numbers if before and value > 0)
+
+
+def _code(kind: _Kind) -> str:
+    return "_and_".join(sorted(path.partition(".")[2] for path, _ in kind))

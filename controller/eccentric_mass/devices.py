@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricRotor, EccentricScene, SpeedPoint
+from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.scene.draws import deviates, quantiles
-from ringbalance.scene.origins import InputUncertainty
-from ringbalance.scene.paths import moved_at
+from ringbalance.scene.origins import InputUncertainty, moved_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 ASSUMED_AMPLITUDE: Final = 0.05

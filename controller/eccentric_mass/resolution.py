@@ -35,7 +35,7 @@ from ringbalance.controller.eccentric_mass.settings import (
     track_model,
 )
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.paths import value_at, with_values_at
+from ringbalance.scene.origins import value_at, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 _LONGEST_STEPS = 2_000

@@ -5,138 +5,43 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Any, Final, NamedTuple
+from functools import cached_property
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
+from ringbalance.controller.balancer import TracedRun
 from ringbalance.controller.document import amplitude_line
-from ringbalance.controller.eccentric_mass.targets import Targets
+from ringbalance.controller.eccentric_mass.advice import ended, found_beforehand, remedies_of, warnings_of
+from ringbalance.controller.eccentric_mass.run_facts import RunFacts
 from ringbalance.results.numbers import given
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, around
-from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.uncertain import NORMAL_95
 
-_NOTHING: Final = 1e-6
-"""Share of the limit below which a vibration is round-off."""
-_FINAL_TIME: Final = 1.0
-"""Over which the final amplitude is averaged, s."""
 
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class EccentricRun(RunFacts, Result):
+    """One run of the whole strategy on the plant, with what is said of it."""
 
-class Record(NamedTuple):
-    """What one run leaves, a row for each sample."""
+    balancer: ClassVar = "eccentric_mass"
 
-    state: FloatArray
-    """Of the plant, shape (n, 8)."""
-    voltage: FloatArray
-    """V, from this sample on, shape (n, 2)."""
-    energy: FloatArray
-    """Electrical, taken since the start, J, shape (n,)."""
-    stage: IntArray
-    """Shape (n,)."""
-    cause: IntArray
-    """Shape (n,)."""
-    hold: IntArray
-    """Shape (n,)."""
-    goal: FloatArray
-    """rad, shape (n, 2)."""
-    imbalance: FloatArray
-    """Estimate along the rotor's axes, kg m, shape (n, 2)."""
-    imbalance_covariance: FloatArray
-    """kg^2 m^2, shape (n, 2, 2)."""
-    friction_arm: FloatArray
-    """Estimates, m, shape (n, 2)."""
-    friction_variance: FloatArray
-    """m^2, shape (n, 2)."""
+    @cached_property
+    def ended(self) -> Finding:
+        """How the run ended."""
+        return ended(self)
 
+    @cached_property
+    def warned(self) -> tuple[Finding, ...]:
+        """What the user should know although the run continued."""
+        known = self.friction_known
+        return (*found_beforehand(self.scene, friction_known=known), *warnings_of(self))
 
-class EccentricOutcome(StrEnum):
-    """How a run ended."""
-
-    SETTLED = "settled"
-    RISES_AGAIN = "rises_again"
-    SATURATED = "saturated"
-    RESIDUAL = "residual"
-    TUNING_TIME = "tuning_time"
-    SPEED_CHANGED = "speed_changed"
-    TOO_SLOW = "too_slow"
-    SPEED_NOT_CONSTANT = "speed_not_constant"
-    MASSES_MOVE = "masses_move"
-    IMBALANCE_UNCERTAIN = "imbalance_uncertain"
-    FRICTION_UNCERTAIN = "friction_uncertain"
-    STALLED = "stalled"
-    NOT_ARRIVED = "not_arrived"
-    TIME_LIMIT = "time_limit"
-    DIVERGED = "diverged"
-    LOCKED = "locked"
-
-
-@dataclass(frozen=True, kw_only=True)
-class StageSpan:
-    """One stage of the strategy."""
-
-    name: str
-    start: float
-    """s."""
-    end: float
-    """s."""
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class EccentricRun(Result):
-    """One run of the whole strategy on the plant."""
-
-    balancer: str
-    """ "eccentric_mass"."""
-    scene: str
-    """Its name."""
-    source: str
-    """File name of the scene without its folder."""
-    sha256: str
-    """Of the scene."""
-    outcome: EccentricOutcome
-    settled: bool
-    """Whether the amplitude ends at or below the limit and stays there."""
-    settling_time: float | None
-    """s, from which on the amplitude stays at or below the limit; None when not settled."""
-    ended: Finding
-    """How the run ended."""
-    warned: tuple[Finding, ...]
-    """What the user should know although the run continued."""
-    remedies: tuple[Finding, ...]
-    """Each by itself, the likeliest first; empty for a settled run, and where no single value will do."""
-    innovation: float | None
-    """Mean square of the imbalance filter's normalised innovations: 1 for a true model; None without any."""
-    limit: float
-    """m."""
-    time: FloatArray
-    """s, shape (n,)."""
-    speed: FloatArray
-    """W, rad/s, shape (n,)."""
-    whirl: ComplexArray
-    """True displacement of the rotor along its own axes, m, shape (n,)."""
-    mass_angle: FloatArray
-    """True angles of the masses, rad, not wrapped, shape (2, n)."""
-    mass_rate: FloatArray
-    """rad/s, shape (2, n)."""
-    goal: FloatArray
-    """Where the masses should be, rad, shape (2, n)."""
-    voltage: FloatArray
-    """V, shape (2, n)."""
-    drive_off: BoolArray
-    """Whether both drives are off, shape (n,)."""
-    energy: FloatArray
-    """Electrical, taken from the supply since the start, J, shape (n,)."""
-    estimates: Record
-    """Those of the filters are constant outside their stages; their covariances are of the noise alone."""
-    rotor_covariance: FloatArray
-    """Of the estimated imbalance, from what the scene states of rotor and masses, kg^2 m^2, shape (2, 2)."""
-    stages: tuple[StageSpan, ...]
-    targets: Targets | None
-    """For the imbalance as it was estimated; None when it never came to that."""
-    unbalanced_amplitude: float
-    """Steady amplitude that the masses' first places would give at the last speed, m."""
+    @cached_property
+    def remedies(self) -> tuple[Finding, ...]:
+        """Each by itself, the likeliest first; empty for a settled run, and where no single value will do."""
+        return remedies_of(self)
 
     def to_dict(self) -> dict[str, Any]:
         """See `_document`."""
@@ -157,44 +62,6 @@ class EccentricRun(Result):
         """What the user should know, as sentences."""
         return tuple(each.text for each in self.warned)
 
-    @property
-    def amplitude(self) -> FloatArray:
-        """True vibration, m zero-to-peak, shape (n,)."""
-        return np.asarray(np.abs(self.whirl), dtype=np.float64)
-
-    @property
-    def phase(self) -> FloatArray:
-        """Of the true vibration in the rotor's frame, rad within (-pi, pi], shape (n,)."""
-        return np.asarray(np.angle(self.whirl), dtype=np.float64)
-
-    @property
-    def imbalance_covariance(self) -> FloatArray:
-        """Of the imbalance as estimated at the end, from noise and rotor, kg^2 m^2, shape (2, 2)."""
-        return np.asarray(self.estimates.imbalance_covariance[-1] + self.rotor_covariance)
-
-    @property
-    def final_amplitude(self) -> float:
-        """Mean over the last second, m."""
-        last = self.time >= self.time[-1] - _FINAL_TIME
-        return float(np.mean(self.amplitude[last]))
-
-    @property
-    def residual_ratio(self) -> float | None:
-        """Final amplitude over that of the first places at this speed; None where nothing would vibrate."""
-        if self.unbalanced_amplitude < _NOTHING * self.limit:
-            return None
-        return self.final_amplitude / self.unbalanced_amplitude
-
-    @property
-    def electrical_energy(self) -> float:
-        """Taken by both motors in the whole run, J."""
-        return float(self.energy[-1])
-
-    @property
-    def worst_amplitude(self) -> float:
-        """Largest true vibration on the way, m."""
-        return float(np.max(self.amplitude))
-
 
 _MOST_ROWS: Final = 2500
 """Instants in the document; a run has a hundred times as many."""
@@ -210,7 +77,7 @@ def _document(run: EccentricRun) -> dict[str, Any]:
     kept = _thinned(run)
     return {
         "balancer": run.balancer,
-        "scene": {"name": run.scene, "source": run.source, "sha256": run.sha256},
+        "scene": {"name": run.scene.name, "source": run.scene.source, "sha256": run.scene.sha256},
         "settled": run.settled,
         "settling_time_s": run.settling_time,
         "outcome": run.outcome.value,
@@ -261,7 +128,7 @@ def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
         **_each("mass_rate_{}_rad_s", run.mass_rate),
         **_each("goal_{}_rad", run.goal),
         **_each("voltage_{}_V", run.voltage),
-        "energy_J": run.energy,
+        "energy_J": run.estimates.energy,
         "imbalance_x_kg_m": told.imbalance[:, 0],
         "imbalance_y_kg_m": told.imbalance[:, 1],
         "imbalance_variance_xx_kg2_m2": told.imbalance_covariance[:, 0, 0],
@@ -307,7 +174,7 @@ def _rows(run: EccentricRun) -> Rows:
         for stage, amplitude in zip(run.stages, run.amplitude[at], strict=True)
     ]
     return Rows(
-        title=f"Run of {run.scene} ({run.source}), eccentric masses",
+        title=f"Run of {run.scene.name} ({run.scene.source}), eccentric masses",
         quantities=tuple(_quantities(run)),
         findings=(run.ended, *run.remedies, *run.warned),
         facts=(("amplitude (log)", amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))),),
@@ -339,3 +206,31 @@ def _quantities(run: EccentricRun) -> Iterator[Quantity]:
         low, high = (None, None) if value is None else around(value, half)
         origin = "given" if key == "limit" else "simulated"
         yield Quantity(key=key, name=name, unit=unit, value=value, lower=low, upper=high, origin=origin)
+
+
+_INSTANTS = 600
+
+
+def amplitude_band(runs: Sequence[TracedRun], *, end: float) -> dict[str, Any]:
+    """Least, middle and largest amplitude of runs at equally spaced times, each the largest since the last
+    one, so that no peak is lost.
+
+    Args: `end`: of the times, s. Returns: For JSON, SI; a run that ended before has its last value.
+    """
+    time = np.linspace(0.0, end, _INSTANTS)
+    peaks = np.array([_peaks(run.run, time) for run in runs])
+    low, middle, high = (row.tolist() for row in np.quantile(peaks, [0.0, 0.5, 1.0], axis=0))
+    return {
+        "time_s": time.tolist(),
+        "low_m": low,
+        "middle_m": middle,
+        "high_m": high,
+        "runs": len(runs),
+        "settled": sum(each.settling_time is not None for each in runs),
+    }
+
+
+def _peaks(run: Any, time: Any) -> Any:
+    edges = np.minimum(np.searchsorted(run.time, time), run.time.size - 1)
+    since = np.concatenate([edges[:1], edges[:-1]])
+    return [float(run.amplitude[a : max(b, a) + 1].max()) for a, b in zip(since, edges, strict=True)]

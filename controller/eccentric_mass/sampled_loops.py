@@ -11,15 +11,15 @@ import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import lqr_gain, track_model
+from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import ComplexArray
-from ringbalance.scene.paths import with_values_at
 
 GAIN_MARGIN: Final = 2.0
 """Factor by which the recommended gains could be higher before a pole leaves the unit circle."""
@@ -99,18 +99,13 @@ class RecommendedGains:
         )
 
 
-def advised(
-    scene: EccentricScene, gains: RecommendedGains | None = None
-) -> tuple[EccentricScene, dict[str, float]]:
-    """The scene with those gains lowered that are above the recommended ones, and its drives fast enough.
-
-    Returns: The scene, and the values that changed by key, SI.
-    """
-    advice = RecommendedGains.of(scene) if gains is None else gains
-    changes = {loop.key: loop.recommended for loop in advice.loops if loop.value > loop.recommended}
-    if advice.drive_speed > scene.friction_filter.drive_speed:
-        changes["friction_filter.drive_speed"] = advice.drive_speed
-    return with_values_at(scene, changes), changes
+def advised(scene: EccentricScene) -> dict[str, float]:
+    """By key, SI, the gains that are above the recommended ones, lowered, and drives fast enough."""
+    gains = RecommendedGains.of(scene)
+    changes = {loop.key: loop.recommended for loop in gains.loops if loop.value > loop.recommended}
+    if gains.drive_speed > scene.friction_filter.drive_speed:
+        changes["friction_filter.drive_speed"] = gains.drive_speed
+    return changes
 
 
 def _regulator(scene: EccentricScene) -> _SampledLoop:
@@ -251,3 +246,49 @@ def _largest(stable: Callable[[float], bool], start: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stable(middle) else (low, middle)
     return low
+
+
+def loops_status(gains: RecommendedGains) -> str:
+    """Whether every loop has its margin, and what to change."""
+    unstable = ", ".join(loop.name for loop in gains.loops if not loop.stable)
+    high = [loop for loop in gains.loops if loop.value > loop.recommended]
+    if not unstable and not high:
+        return "every loop of the drives is stable with a gain margin of two"
+    problem = f"unstable: {unstable}" if unstable else "a gain margin is below two"
+    changes = ", ".join(f"{loop.key} to {loop.recommended:.4g} {loop.unit}".rstrip() for loop in high)
+    cure = f"lower {changes}, or hold" if changes else "hold"
+    return f"{problem}: {cure} the voltage for at most {gains.step:.4g} s"
+
+
+def loops_document(gains: RecommendedGains) -> dict[str, Any]:
+    """For JSON, SI."""
+    return {
+        "loops_status": loops_status(gains),
+        "gain": {loop.key: loop.recommended for loop in gains.loops},
+        "loops": [
+            {
+                "name": loop.name,
+                "key": loop.key,
+                "value": loop.value,
+                "unit": loop.unit,
+                "poles": [[pole.real, pole.imag] for pole in loop.poles.tolist()],
+                "radius": loop.radius,
+                "stable": loop.stable,
+                "gain_margin": loop.gain_margin,
+                "recommended": loop.recommended,
+                "recommended_step_s": loop.recommended_step,
+            }
+            for loop in gains.loops
+        ],
+        "step_s": gains.step,
+        "drive_speed_rad_per_s": gains.drive_speed,
+    }
+
+
+def loops_quantities(gains: RecommendedGains) -> tuple[Quantity, ...]:
+    """Largest values that leave a margin of two."""
+    largest = (
+        Quantity(key=loop.key, name=f"{loop.key}, at most", value=loop.recommended, unit=loop.unit or "1")
+        for loop in gains.loops
+    )
+    return (*largest, Quantity(key="voltage_hold", name="voltage hold, at most", unit="s", value=gains.step))

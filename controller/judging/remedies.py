@@ -18,7 +18,7 @@ from ringbalance.results.proportion import Proportion
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.paths import value_at
+from ringbalance.scene.origins import value_at
 
 Search = Callable[[Balancer], Settings]
 """The best settings of a balancer."""

@@ -24,8 +24,7 @@ from ringbalance.controller.judging.tuning_rows import LONGER, tuning_document, 
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Presentation
 from ringbalance.scene.draws import BLOCK
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import value_at, with_values_at
+from ringbalance.scene.origins import SceneFile, value_at, with_values_at
 
 
 def tuned(

@@ -15,8 +15,7 @@ from ringbalance.results.result import Facts, PresentedResult
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.narrowing import AnyScene
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 
 
 @dataclass(frozen=True, kw_only=True)

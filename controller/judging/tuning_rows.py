@@ -17,7 +17,7 @@ from ringbalance.results.result import Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import in_usual_unit, usual_unit
-from ringbalance.scene.paths import raw_value_at
+from ringbalance.scene.origins import raw_value_at
 
 LONGER: Final = 300.0
 """s, for which devices under the recommended settings are watched once more."""

@@ -26,22 +26,20 @@ from ringbalance.controller.balancer import (
     outcomes_of,
     settles_within,
 )
-from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
-from ringbalance.controller.drawn_input import DrawnInput
 from ringbalance.controller.judging.judge import MOST_DRAWS
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
-from ringbalance.controller.liquid_ring.information import loop_information
+from ringbalance.controller.liquid_ring.loop_factor import loop_information
 from ringbalance.controller.liquid_ring.remedies import drawn_input, remedies_of, valves_of
 from ringbalance.controller.liquid_ring.trials import trials
 from ringbalance.controller.loop import simulate
-from ringbalance.controller.rotor import Sensor, wrapped
+from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
-from ringbalance.controller.trials import Trials
+from ringbalance.controller.trials import DrawnInput, Trials
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import gives_forces
@@ -56,8 +54,7 @@ from ringbalance.scene.draws import BLOCK, run_noise
 from ringbalance.scene.loop_models import RequirementSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES, half_widths
 
 _GAIN: Final = 30.0

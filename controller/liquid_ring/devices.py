@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.common_rotor import CommonRotor, Rotors
 from ringbalance.controller.loop_records import MomentTable
+from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, CalibratedMoment, nominal_laws
 from ringbalance.reduced_model.law.flow_law import BalancerModel

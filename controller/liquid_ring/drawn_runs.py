@@ -15,11 +15,11 @@ import numpy as np
 from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.balancer import FURTHER, Draws, Outcomes, Settings
-from ringbalance.controller.common_rotor import Rotors
 from ringbalance.controller.liquid_ring.devices import Device, Spread, devices
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_plan import LoopPlan, Records
 from ringbalance.controller.loop_records import AT_REST, IDLE, NOTICEABLE, RISING
+from ringbalance.controller.rotor import Rotors
 from ringbalance.controller.simulation import Outcome
 from ringbalance.controller.terms import check_settings, dynamics_of, run_models, terms_modelled
 from ringbalance.physics.gas import compression_work
@@ -32,7 +32,7 @@ from ringbalance.scene.designs import Designs, alike
 from ringbalance.scene.draws import run_noise
 from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import with_values_at
 
 RELATIVE_ERROR: Final = 1e-4
 """Allowed to one step of a run's states: an injection then ends within 1e-6 in fill of a single run's, and

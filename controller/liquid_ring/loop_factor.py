@@ -7,25 +7,34 @@ e (1 - h exp(j d)) with h = Kc b and d the error of the assumed lag angle.  It s
 turns round from h = 1 / cos d on.  b differs from pair to pair, and with the chamber of a pair that is
 driven.  A residual that turns round is driven by both in turn, and (1 - h1)(1 - h2) <= (1 - (h1 + h2)/2)^2,
 so the mean of both counts; of all pairs the largest.
+
+`loop_information` is all that is known of the loop under its settings without a run.
 """
 
 from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import TargetVector
+from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, split_change
+from ringbalance.controller.judging.tuning import Information
 from ringbalance.controller.loop_records import RUN, MomentTable
 from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.terms import run_models
+from ringbalance.reduced_model.gas_line import line_answers, line_document, line_text
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.reduced_model.terms import neglected_in_injections
+from ringbalance.results.rows import Quantity
+from ringbalance.scene.arrays import FloatArray, finite
 from ringbalance.scene.models import Scene
 
 _FILL_STEP: Final = 1e-4
@@ -51,11 +60,6 @@ class LoopFactor:
     def unstable(self) -> bool:
         """Whether a small residual grows."""
         return self.fixed and self.value is not None and self.value >= self.limit
-
-    @property
-    def lag_margin(self) -> float | None:
-        """Error of the assumed lag angle at which the residual no longer falls, acos(h/2), rad."""
-        return None if self.value is None else math.acos(min(self.value / 2.0, 1.0))
 
 
 def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any]) -> LoopFactor:
@@ -98,7 +102,7 @@ def _noise_at_limit(scene: Scene) -> float:
     return math.hypot(sensor.amplitude_noise, scene.controller.limit * sensor.phase_noise)
 
 
-def usable_fill(scene: Scene, model: BalancerModel) -> float:
+def _usable_fill(scene: Scene, model: BalancerModel) -> float:
     """Smallest fill ratio to which a chamber is driven: its residual one, or that at which the gas stalls."""
     start, law = scene.disc.initial_fill, model.flow
     stalled = stalled_fill_ratio(law=law, total=2 * start, gas_pressure=scene.gas.pressure)
@@ -109,7 +113,7 @@ def balanced_fills(scene: Scene, model: BalancerModel) -> FloatArray:
     """Fills of the positive chambers with which the disc cancels the unbalance, or comes nearest to it."""
     total = 2.0 * scene.disc.initial_fill
     least, most = _range(scene, model)
-    lowest = max(least, usable_fill(scene, model))
+    lowest = max(least, _usable_fill(scene, model))
     highest = min(most, total - lowest)
     ends = np.array([scene.disc.initial_fill, lowest, highest])
     now, low, high = model.moment.pair_moment(fill_ratio=ends, opposite_fill_ratio=total - ends)
@@ -242,3 +246,73 @@ def loop_margins(
         disk_gain_factor=math.inf if disk >= 2.0 else (2.0 + disk) / (2.0 - disk),
         disk_phase=2.0 * math.atan(disk / 2.0),
     )
+
+
+def loop_information(scene: Scene, model: BalancerModel) -> Information:
+    """Loop factor and margins of the linear loop about the balanced state, and what the gas line does."""
+    loop, settings = loop_factor(scene, model, controller_of(scene, model)), scene.controller
+    used, lines, margins = (
+        run_models(scene=scene, model=model),
+        line_answers(scene, model),
+        _margins(scene, loop),
+    )
+    neglected = neglected_in_injections(used)
+    document: dict[str, Any] = {
+        "law": model.name,
+        "controller": settings.kind,
+        "gain": settings.proportional if settings.kind == "target_vector" else None,
+        "loop_factor": loop.value,
+        "loop_factor_limit": loop.limit,
+        "vibration_rate_m_per_s": loop.rate,
+        "stationary_deviation_m": finite(loop.deviation),
+        "margins": None
+        if margins is None
+        else {name: finite(value) for name, value in asdict(margins).items()},
+        "gas_time_offset_s": list(settings.offsets(scene.disc.chambers)),
+        "limit_m": settings.limit,
+        "gas_line": line_document(lines),
+        "left_out": [],
+        "neglected": asdict(neglected),
+        "models_used": [asdict(each) for each in used],
+    }
+    return Information(
+        quantities=tuple(_quantities(loop, margins)),
+        facts=[
+            ("flow law", model.name),
+            ("algorithm", settings.kind.replace("_", " ")),
+            ("gas line", line_text(lines)),
+            ("neglected", neglected.text),
+        ],
+        document=document,
+    )
+
+
+def _margins(scene: Scene, loop: LoopFactor) -> Margins | None:
+    """Of a loop that liquid flows in; the law-based algorithm comes to a loop factor of one."""
+    settings = scene.controller
+    if loop.rate == 0.0 or settings.kind == "trial":
+        return None
+    fixed = settings.kind == "target_vector"
+    return loop_margins(
+        loop_factor=loop.value if fixed and loop.value else 1.0,
+        integral=settings.period / (settings.integral_time or math.inf) if fixed else 0.0,
+        derivative=settings.derivative_time / settings.period if fixed else 0.0,
+    )
+
+
+def _quantities(loop: LoopFactor, margins: Margins | None) -> Iterator[Quantity]:
+    rows: list[tuple[str, str, str, float | None]] = [
+        ("loop_factor", "loop factor", "1", loop.value),
+        ("loop_factor_limit", "loop factor from which a residual grows", "1", loop.limit),
+        ("stationary_deviation", "standard deviation that noise leaves", "m", finite(loop.deviation)),
+    ]
+    if margins is not None:
+        rows += [
+            ("gain_margin", "gain margin, factor", "1", finite(margins.gain_factor)),
+            ("phase_margin", "phase margin", "rad", margins.phase),
+            ("disk_gain_margin", "disk margin, factor", "1", finite(margins.disk_gain_factor)),
+            ("disk_phase_margin", "disk margin, phase", "rad", margins.disk_phase),
+        ]
+    for key, name, unit, value in rows:
+        if value is not None:
+            yield Quantity(key=key, name=name, unit=unit, value=value, digits=3)

@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 
 from ringbalance.controller.balancer import Remedy
-from ringbalance.controller.drawn_input import MEASURE_INPUT, DrawnInput
 from ringbalance.controller.liquid_ring.devices import AMPLITUDE, CAVITY, FITTED, LOSS, MOMENT, PHASE
 from ringbalance.controller.liquid_ring.loop_factor import vibration_rates
+from ringbalance.controller.trials import MEASURE_INPUT, DrawnInput
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import Holding, residual_fill_ratio, stalled_fill_ratio
 from ringbalance.scene.keys.derivations import shortest_path

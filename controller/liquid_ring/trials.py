@@ -9,12 +9,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.liquid_ring.dead_time import dead_time
 from ringbalance.controller.liquid_ring.loop_factor import vibration_rates
+from ringbalance.controller.terms import dead_time
 from ringbalance.controller.trials import Axis, Point, Trials, rounded
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.scene.models import Scene
-from ringbalance.scene.paths import raw_value_at
+from ringbalance.scene.origins import raw_value_at
 
 PRESSURE: Final = "gas.pressure"
 _GAIN: Final = Axis(

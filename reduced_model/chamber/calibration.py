@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
@@ -19,7 +19,12 @@ from ringbalance.reduced_model.chamber.contributions import (
 )
 from ringbalance.reduced_model.chamber.element_check import ElementCheck
 from ringbalance.reduced_model.chamber.values import RingValues, chamber_pressure, measured_closed_forms
-from ringbalance.reduced_model.tables import HermiteTable, level_table, table_from_samples
+from ringbalance.reduced_model.tables import (
+    HermiteTable,
+    level_table,
+    table_from_samples,
+    tables_from_samples,
+)
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
 from ringbalance.scene.models import Disc, Scene
@@ -323,6 +328,16 @@ def pressure_table(scene: Scene, nodes: FloatArray, value: FloatArray) -> tuple[
     fine = np.linspace(0.0, float(nodes[-1]), squares.size)
     table = table_from_samples(start=0.0, stop=float(nodes[-1]), value=scale * squares + change(fine))
     return table, scale * error + missed
+
+
+def pressure_tables(
+    scenes: Sequence[Scene], nodes: FloatArray, values: Sequence[FloatArray]
+) -> Sequence[HermiteTable]:
+    """The tables of `pressure_table` for scenes that differ in numbers alone."""
+    if scenes[0].disc.geometry is not None:
+        pairs = zip(scenes, values, strict=True)
+        return [pressure_table(scene, nodes, value)[0] for scene, value in pairs]
+    return tables_from_samples(start=float(nodes[0]), stop=float(nodes[-1]), value=np.stack(values, axis=1))
 
 
 @lru_cache(maxsize=16)

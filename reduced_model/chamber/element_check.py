@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ringbalance.mesh.chamber_table import TOLERANCE, chamber_table
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.physics.pressure.imported import solved_ring
+from ringbalance.physics.pressure.loads import solved_ring
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.results import Estimate, Statistics, Status, StatusCode
 from ringbalance.reduced_model.chamber.values import RingValues, chamber_closed_forms, chamber_pressure

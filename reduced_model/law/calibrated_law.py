@@ -16,11 +16,11 @@ import numpy.typing as npt
 
 from ringbalance.mesh.geometry import chamber_volume, moment_across, surface_radius
 from ringbalance.physics.gas import pressure_factor
-from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_table
+from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, fill_nodes, pressure_tables
 from ringbalance.reduced_model.chamber.contributions import gravity_shares
 from ringbalance.reduced_model.chamber.values import RingValues, share_across
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, Conditions, Flow, Regime, law_text, save_record
-from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples
+from ringbalance.reduced_model.tables import HermiteTable, flat_table, table_from_samples, tables_from_samples
 from ringbalance.reduced_model.tube.directed_flow import DirectedFlow, Drive, DriveUncertainty, siphon_margin
 from ringbalance.reduced_model.tube.flow import tube_path
 from ringbalance.reduced_model.tube.heads import TubeHeads, velocity_of
@@ -344,18 +344,21 @@ def _nominal(scenes: Sequence[Scene], *, gravity: bool) -> Iterator[CalibratedLa
     ends = {"start": 0.0, "stop": float(fills[-1])}
     heads = TubeHeads.nominal(Designs.stacked(scenes))
     rings = [RingValues.of(scene, fill_ratio=fills, gravity=gravity) for scene in scenes]
+    moments = [
+        scene.disc.moment_factor * ring.moment.value for scene, ring in zip(scenes, rings, strict=True)
+    ]
+    levels = pressure_tables(scenes, fills, [ring.hydrostatic_pressure.value for ring in rings])
+    curves = tables_from_samples(value=np.stack(moments, axis=1), **ends)
     exact = flat_table(**ends)
-    for scene, head, ring in zip(scenes, heads, rings, strict=True):
+    for scene, head, level, moment in zip(scenes, heads, levels, curves, strict=True):
         yield _put_together(
             scene,
             heads=head,
-            hydrostatic_pressure=pressure_table(scene, fills, ring.hydrostatic_pressure.value)[0],
+            hydrostatic_pressure=level,
             hydrostatic_pressure_uncertainty=exact,
             inputs=DriveUncertainty(),
             moment=CalibratedMoment(
-                chamber_moment=table_from_samples(value=scene.disc.moment_factor * ring.moment.value, **ends),
-                half_width=exact,
-                across=_across_table(scene, fills),
+                chamber_moment=moment, half_width=exact, across=_across_table(scene, fills)
             ),
         )
 

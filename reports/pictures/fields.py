@@ -12,7 +12,7 @@ import numpy as np
 from ringbalance.mesh.chamber import chamber_mesh, default_cells
 from ringbalance.mesh.export import write_vtu
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.mesh.liquid_body import Level, liquid_body
+from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.physics.pressure.solve import (
     LinearSolution,
@@ -187,7 +187,7 @@ def _imported_field(scene: Scene, geometry: ChamberGeometry, *, fill_ratio: floa
     Source: Eqs. 9 to 11 of the liquid-ring paper as a boundary-value problem.
     """
     radius = float(surface_radius(disc=scene.disc, fill_ratio=fill_ratio))
-    mesh = scikit_fem_mesh(liquid_body(tetrahedra(geometry), Level(constant=radius**2 / 2)))
+    mesh = scikit_fem_mesh(liquid_body(tetrahedra(geometry), radius))
     liquid = RotatingLiquid(density=scene.liquid.density, angular_velocity=scene.rotor.speed)
     solution = solve_on(quadratic_basis(mesh), liquid.problem())
     return ImportedField(fill_ratio=fill_ratio, surface_radius=radius, mesh=mesh, solution=solution)

@@ -12,12 +12,12 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.controller.balancer import Balancer, balancer_of, takes
-from ringbalance.controller.common_rotor import CommonRotor, rotors_of
 from ringbalance.controller.compare import Comparison, compare
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.rotor import CommonRotor, rotors_of
 from ringbalance.results.paired import Paired
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.origins import SceneFile

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from ringbalance.controller.liquid_ring.conventions import conventions, lasting_speed
+from ringbalance.controller.document import conventions, lasting_speed
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import Holding

@@ -23,7 +23,7 @@ from ringbalance.controller.judging.judge import judged, judged_all
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.results.requirements import MET, MISSED
 from ringbalance.scene.models import Scene
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import with_values_at
 
 ASKED: Final = 0.9
 SEED: Final = 29

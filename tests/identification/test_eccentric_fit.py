@@ -27,7 +27,7 @@ from ringbalance.identification.parameters import FitError
 from ringbalance.identification.reading import KINDS
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.paths import value_at, with_values_at
+from ringbalance.scene.origins import value_at, with_values_at
 
 NOISE = 20e-6
 SPEEDS = np.linspace(8.0, 24.0, 24)

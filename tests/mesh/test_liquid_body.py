@@ -8,7 +8,7 @@ from block_discs import sector_chamber
 
 from ringbalance.mesh.chamber import FREE_SURFACE
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.mesh.liquid_body import Level, jacobians, liquid_body
+from ringbalance.mesh.liquid_body import jacobians, liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import (
     Tetrahedra,
     face_nodes,
@@ -39,7 +39,7 @@ def _surface(body: Tetrahedra) -> np.ndarray:
 @pytest.mark.parametrize("radius", [0.51, 0.6, 0.731, 0.75, 0.874, 0.96])
 @pytest.mark.parametrize("kind", ["hexahedron27", "hexahedron20", "tetra10"])
 def test_it_holds_the_volume_outside_the_surface(kind: CellKind, radius: float) -> None:
-    body = liquid_body(_sector(6, kind), Level(constant=radius**2 / 2))
+    body = liquid_body(_sector(6, kind), radius)
     exact = _ANGLE / 2 * _WIDTH * (1 - radius**2)
     mesh = scikit_fem_mesh(body)
     # Quadratic edges leave their arcs by R (angle / 2)^4 / 32: 2e-7 R here, over a depth of at least 0.04 R.
@@ -55,7 +55,7 @@ def test_it_holds_the_volume_outside_the_surface(kind: CellKind, radius: float) 
 
 @pytest.mark.parametrize("kind", ["hexahedron27", "hexahedron", "tetra", "tetra10"])
 def test_every_face_is_shared_or_named_and_the_normals_close(kind: CellKind) -> None:
-    body = liquid_body(_sector(5, kind), Level(constant=0.3, tilt=(0.05, -0.03, 0.04)))
+    body = liquid_body(_sector(5, kind), 0.77)
     assert np.array_equal(lonely(body.cells, len(body.nodes)), body.faces >= 0)
     mesh = scikit_fem_mesh(body)
     sides = [side(mesh, name) for name in mesh.boundaries]
@@ -70,18 +70,12 @@ def test_a_chamber_with_fillets_and_a_gas_tube_holds_what_exact_integrals_say(fi
     disc = liquid_ring_scene(load_scene(bundled_scene("imported_chamber"))).disc
     assert disc.geometry is not None
     radius = float(surface_radius(disc=disc, fill_ratio=fill))
-    body = liquid_body(tetrahedra(disc.geometry), Level(constant=radius**2 / 2))
+    body = liquid_body(tetrahedra(disc.geometry), radius)
     exact = fill * chamber_volume(disc=disc)
     # Where a fillet leaves no room in a flat cell, the surface stays nearly straight over up to 7 mm: 0.16 mm
     # off on average, of 4.6 mm, over a tenth of it.
     assert quadratic_basis(scikit_fem_mesh(body)).dx.sum() == pytest.approx(exact, rel=3e-3)
     assert jacobians(body).min() > 0
-
-
-def test_a_tilted_surface_is_followed() -> None:
-    level = Level(constant=0.3, tilt=(0.05, -0.03, 0.04))
-    body = liquid_body(_sector(5), level)
-    assert np.abs(level.value(_surface(body))).max() < 1e-9
 
 
 def test_a_rib_on_the_wall_and_nameless_walls_stay() -> None:
@@ -94,7 +88,7 @@ def test_a_rib_on_the_wall_and_nameless_walls_stay() -> None:
     geometry = block_chamber((4, 16, 3), ribbed)
     named = {name: geometry.boundaries[name] for name in ("outer_wall", "end_back")}
     object.__setattr__(geometry, "boundaries", named)
-    body = liquid_body(tetrahedra(geometry), Level(constant=0.95**2 / 2))
+    body = liquid_body(tetrahedra(geometry), 0.95)
     # The rib comes out of the liquid: the surface has two parts, and the walls keep their nodes.
     assert set(np.unique(body.faces)) == {-1, 0, 1, 2, 3}
     assert body.names == ("outer_wall", "end_back", "other_walls", FREE_SURFACE)

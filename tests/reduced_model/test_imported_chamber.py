@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from block_discs import imported, turned
 
-from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
+from ringbalance.physics.pressure.loads import ImportedRing, solved_ring
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.chamber import element_check
 from ringbalance.reduced_model.chamber.calibration import calibrate_chamber

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
-from ringbalance.mesh.liquid_body import Level as SurfaceLevel
 from ringbalance.mesh.liquid_body import liquid_body
 from ringbalance.mesh.quadratic_tetrahedra import scikit_fem_mesh, tetrahedra
 from ringbalance.mesh.wall_integrals import (
@@ -22,7 +21,7 @@ from ringbalance.mesh.wall_integrals import (
 )
 from ringbalance.physics.convergence import gci
 from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
-from ringbalance.physics.pressure.imported import ImportedRing, solved_ring
+from ringbalance.physics.pressure.loads import ImportedRing, solved_ring
 from ringbalance.physics.pressure.solve import quadratic_basis, side, solve_on
 from ringbalance.reduced_model.chamber.values import chamber_closed_forms
 from ringbalance.scene.arrays import FloatArray
@@ -144,11 +143,11 @@ def _ring(scene: Scene, size: int, kind: CellKind, a: float) -> ImportedRing:
 def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> tuple[OrderStudy, OrderStudy]:
     """Of the manufactured field, root mean square, and of its force on the outer wall."""
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
-    surface = SurfaceLevel(constant=float(surface_radius(disc=disc, fill_ratio=_FILL)) ** 2 / 2)
+    radius = float(surface_radius(disc=disc, fill_ratio=_FILL))
     errors = []
     for size in sizes:
         chamber = tetrahedra(disc_chamber(disc, (size, 2 * size, size)))
-        basis = quadratic_basis(scikit_fem_mesh(liquid_body(chamber, surface)))
+        basis = quadratic_basis(scikit_fem_mesh(liquid_body(chamber, radius)))
         values = solve_on(basis, exact.problem(defect)).values
         true = exact.pressure(np.asarray(basis.global_coordinates()))
         difference = np.asarray(basis.interpolate(values)) - true

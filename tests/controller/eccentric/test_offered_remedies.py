@@ -9,7 +9,7 @@ from typing import Any
 from eccentric_runs import bundled
 
 from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.eccentric_mass.remedies import advised_remedies
+from ringbalance.controller.eccentric_mass.balancer import advised_remedies
 from ringbalance.results.rows import Finding
 
 

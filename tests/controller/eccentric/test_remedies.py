@@ -301,7 +301,7 @@ def test_no_remedy_asks_for_a_run_that_would_be_refused() -> None:
     assert cured(short, remedy).run.time_limit == pytest.approx(longest, rel=0.02)
     # No longer run is allowed: then none is advised.
     least = changed(short, "run", time_limit=0.99 * longest)
-    facts: Any = SimpleNamespace(scene=least, stage=Stage.IMBALANCE, time=least.run.time_limit)
+    facts: Any = SimpleNamespace(scene=least, stage=Stage.IMBALANCE, end=least.run.time_limit)
     assert _of_time(facts) == []
 
 

@@ -13,7 +13,8 @@ from ringbalance.controller.eccentric_mass.plan import EccentricMeasurement
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.resolution import expected_deviation
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
-from ringbalance.controller.eccentric_mass.run_record import EccentricOutcome, EccentricRun
+from ringbalance.controller.eccentric_mass.run_facts import EccentricOutcome
+from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import strategy_start, strategy_step

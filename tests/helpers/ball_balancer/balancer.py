@@ -29,17 +29,15 @@ from ringbalance.controller.balancer import (
     outcomes_of,
     settles_within,
 )
-from ringbalance.controller.common_rotor import CommonRotor, Rotors, rotor_fault
-from ringbalance.controller.drawn_input import DrawnInput, drawn_key
 from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Tuning
-from ringbalance.controller.trials import Trials, scaled
+from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
+from ringbalance.controller.trials import DrawnInput, Trials, drawn_key, scaled
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.narrowing import scene_as
-from ringbalance.scene.origins import SceneFile
-from ringbalance.scene.paths import with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
 
 INSTANTS = 2001

@@ -1,0 +1,333 @@
+"""What a run with two eccentric masses leaves: every sample, and the facts that follow from them."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
+from ringbalance.controller.eccentric_mass.plant import PlantParameters
+from ringbalance.controller.eccentric_mass.resolution import rotor_covariance
+from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.eccentric_mass.supervisor import STALLED_SHARE
+from ringbalance.controller.eccentric_mass.targets import Targets, target_angles
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+
+_NOTHING: Final = 1e-6
+"""Share of the limit below which a vibration is round-off."""
+_FINAL_TIME: Final = 1.0
+"""Over which the final amplitude is averaged, s."""
+
+
+class Record(NamedTuple):
+    """What one run leaves, a row for each sample."""
+
+    state: FloatArray
+    """Of the plant, shape (n, 8)."""
+    voltage: FloatArray
+    """V, from this sample on, shape (n, 2)."""
+    energy: FloatArray
+    """Electrical, taken since the start, J, shape (n,)."""
+    stage: IntArray
+    """Shape (n,)."""
+    cause: IntArray
+    """Shape (n,)."""
+    hold: IntArray
+    """Shape (n,)."""
+    goal: FloatArray
+    """rad, shape (n, 2)."""
+    imbalance: FloatArray
+    """Estimate along the rotor's axes, kg m, shape (n, 2)."""
+    imbalance_covariance: FloatArray
+    """kg^2 m^2, shape (n, 2, 2)."""
+    friction_arm: FloatArray
+    """Estimates, m, shape (n, 2)."""
+    friction_variance: FloatArray
+    """m^2, shape (n, 2)."""
+
+
+class EccentricOutcome(StrEnum):
+    """How a run ended."""
+
+    SETTLED = "settled"
+    RISES_AGAIN = "rises_again"
+    SATURATED = "saturated"
+    RESIDUAL = "residual"
+    TUNING_TIME = "tuning_time"
+    SPEED_CHANGED = "speed_changed"
+    TOO_SLOW = "too_slow"
+    SPEED_NOT_CONSTANT = "speed_not_constant"
+    MASSES_MOVE = "masses_move"
+    IMBALANCE_UNCERTAIN = "imbalance_uncertain"
+    FRICTION_UNCERTAIN = "friction_uncertain"
+    STALLED = "stalled"
+    NOT_ARRIVED = "not_arrived"
+    TIME_LIMIT = "time_limit"
+    DIVERGED = "diverged"
+    LOCKED = "locked"
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageSpan:
+    """One stage of the strategy."""
+
+    name: str
+    start: float
+    """s."""
+    end: float
+    """s."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class RunFacts:
+    """One run of the whole strategy on the plant, as far as it is known without its sentences."""
+
+    scene: EccentricScene
+    estimates: Record
+    """Those of the filters are constant outside their stages; their covariances are of the noise alone."""
+    findings: Findings
+    innovation: float | None
+    """Mean square of the imbalance filter's normalised innovations: 1 for a true model; None without any."""
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """s, shape (n,)."""
+        return np.arange(len(self.estimates.state), dtype=np.float64) * self.scene.sensor.step
+
+    @cached_property
+    def speed(self) -> FloatArray:
+        """W, rad/s, shape (n,)."""
+        return np.asarray(np.interp(self.time, *self.scene.rotor.profile))
+
+    @cached_property
+    def whirl(self) -> ComplexArray:
+        """True displacement of the rotor along its own axes, m, shape (n,)."""
+        return np.asarray(self.estimates.state[:, 0] + 1j * self.estimates.state[:, 1])
+
+    @cached_property
+    def amplitude(self) -> FloatArray:
+        """True vibration, m zero-to-peak, shape (n,)."""
+        return np.asarray(np.abs(self.whirl), dtype=np.float64)
+
+    @property
+    def phase(self) -> FloatArray:
+        """Of the true vibration in the rotor's frame, rad within (-pi, pi], shape (n,)."""
+        return np.asarray(np.angle(self.whirl), dtype=np.float64)
+
+    @property
+    def mass_angle(self) -> FloatArray:
+        """True angles of the masses, rad, not wrapped, shape (2, n)."""
+        return self.estimates.state[:, 4:6].T
+
+    @property
+    def mass_rate(self) -> FloatArray:
+        """rad/s, shape (2, n)."""
+        return self.estimates.state[:, 6:8].T
+
+    @property
+    def goal(self) -> FloatArray:
+        """Where the masses should be, rad, shape (2, n)."""
+        return self.estimates.goal.T
+
+    @property
+    def voltage(self) -> FloatArray:
+        """V, shape (2, n)."""
+        return self.estimates.voltage.T
+
+    @property
+    def drive_off(self) -> BoolArray:
+        """Whether both drives are off, shape (n,)."""
+        return np.asarray(self.estimates.hold == RELEASED)
+
+    @property
+    def limit(self) -> float:
+        """m."""
+        return self.scene.supervisor.limit
+
+    @property
+    def cause(self) -> Cause:
+        """Why the strategy does what it does at the end."""
+        return Cause(int(self.estimates.cause[-1]))
+
+    @property
+    def stage(self) -> Stage:
+        """At the end of the run."""
+        return Stage(int(self.estimates.stage[-1]))
+
+    @property
+    def hold(self) -> int:
+        """Of the drives at the end."""
+        return int(self.estimates.hold[-1])
+
+    @property
+    def end(self) -> float:
+        """s."""
+        return float(self.time[-1])
+
+    @property
+    def diverged(self) -> bool:
+        """Whether it ended early, at the last sample that means anything."""
+        return self.time.size < self.scene.samples
+
+    @cached_property
+    def left(self) -> int | None:
+        """Sample of the largest vibration above the limit after the rotor was balanced to within it; None for
+        none.
+        """
+        content = np.isin(self.estimates.cause, (int(Cause.BALANCED), int(Cause.SPEED_CHANGED)))
+        within = np.flatnonzero(content & (self.amplitude <= self.limit))
+        if within.size == 0:
+            return None
+        worst = int(within[0]) + int(np.argmax(self.amplitude[within[0] :]))
+        return worst if self.amplitude[worst] > self.limit else None
+
+    @cached_property
+    def within_since(self) -> float | None:
+        """Recorded instant from which on the amplitude is not above the limit to the end, s; None: it ends
+        above.
+        """
+        above = np.flatnonzero(self.amplitude > self.limit)
+        first = int(above[-1]) + 1 if above.size else 0
+        return None if first == self.time.size else float(self.time[first])
+
+    @cached_property
+    def outcome(self) -> EccentricOutcome:
+        """SETTLED only when the strategy was content and the true amplitude stays within the limit after."""
+        if self.diverged:
+            return EccentricOutcome.DIVERGED
+        kept = self.within_since is not None and self.left is None
+        if self.cause is Cause.BALANCED:
+            return EccentricOutcome.SETTLED if kept else EccentricOutcome.RISES_AGAIN
+        if kept and (self.cause is Cause.SPEED_CHANGED or self._corrects_within_limit):
+            return EccentricOutcome.SETTLED
+        cause = self._shown_cause
+        return EccentricOutcome.TIME_LIMIT if cause is Cause.NONE else EccentricOutcome(cause.name.lower())
+
+    @property
+    def _corrects_within_limit(self) -> bool:
+        """Whether the run ended while what was measured to be within the limit was made better still."""
+        return self.stage in {Stage.CHECK, Stage.CORRECTION} and self.findings.objective <= self.limit
+
+    @property
+    def _shown_cause(self) -> Cause:
+        """Of the end; a run that ends within a stage may show already why the stage would have failed."""
+        speed, findings = self.speed, self.findings
+        if self.stage is Stage.IMBALANCE:
+            if abs(speed[-1]) < self.scene.supervisor.lowest_speed:
+                return Cause.TOO_SLOW
+            steady = speed.size < 2 or speed[-1] == speed[-2]
+            return self.cause if steady else Cause.SPEED_NOT_CONSTANT
+        stalled = self.stage is Stage.FRICTION and findings.stalled > STALLED_SHARE * findings.driven
+        return Cause.STALLED if stalled else self.cause
+
+    @property
+    def settling_time(self) -> float | None:
+        """s, from which on the amplitude stays at or below the limit; None when not settled."""
+        ended_well = self.outcome in {EccentricOutcome.SETTLED, EccentricOutcome.LOCKED}
+        return self.within_since if ended_well else None
+
+    @property
+    def settled(self) -> bool:
+        """Whether the amplitude ends at or below the limit and stays there."""
+        return self.settling_time is not None
+
+    @cached_property
+    def estimated_at(self) -> IntArray:
+        """Samples at which the imbalance was estimated."""
+        return np.flatnonzero(self.estimates.stage == int(Stage.IMBALANCE))
+
+    @property
+    def friction_known(self) -> bool:
+        """Whether the friction stage came to its end: then its drives have done what they are there for."""
+        return bool(np.any(self.estimates.stage == int(Stage.POSITIONING)))
+
+    @property
+    def imbalance(self) -> complex:
+        """As estimated at the end, kg m."""
+        return complex(*self.estimates.imbalance[-1])
+
+    @cached_property
+    def rotor_covariance(self) -> FloatArray:
+        """Of the estimated imbalance, from what is stated of rotor and masses, kg^2 m^2, shape (2, 2)."""
+        estimating, step = self.estimated_at, self.scene.sensor.step
+        if estimating.size == 0:
+            return np.zeros((2, 2))
+        return rotor_covariance(
+            self.scene,
+            imbalance=self.imbalance,
+            speed=float(self.speed[estimating[-1]]),
+            begin=float(estimating[0]) * step,
+            duration=estimating.size * step,
+        )
+
+    @property
+    def imbalance_covariance(self) -> FloatArray:
+        """Of the imbalance as estimated at the end, from noise and rotor, kg^2 m^2, shape (2, 2)."""
+        return np.asarray(self.estimates.imbalance_covariance[-1] + self.rotor_covariance)
+
+    @property
+    def stages(self) -> tuple[StageSpan, ...]:
+        """Those that the strategy went through, one after the other."""
+        stage, time = self.estimates.stage, self.time
+        edges = [0, *(np.flatnonzero(np.diff(stage)) + 1), len(stage) - 1]
+        return tuple(
+            StageSpan(name=STAGE_NAMES[stage[a]], start=float(time[a]), end=float(time[b]))
+            for a, b in itertools.pairwise(edges)
+        )
+
+    @property
+    def targets(self) -> Targets | None:
+        """For the imbalance as it was estimated; None when it never came to that."""
+        if not self.friction_known:
+            return None
+        x, y = self.estimates.imbalance[-1]
+        masses = self.scene.masses
+        gap, moment = masses.arc_length / masses.guide_radius, PlantParameters.of(self.scene).moment
+        return target_angles(float(np.hypot(x, y)), float(np.arctan2(y, x)), moment, gap)
+
+    @property
+    def unbalanced_amplitude(self) -> float:
+        """Steady amplitude that the masses' first places would give at the last speed, m."""
+        speed = float(self.speed[-1])
+        if speed == 0:
+            return 0.0
+        return abs(PlantParameters.of(self.scene).steady_whirl(speed, self.scene.masses.initial_angle))
+
+    @property
+    def final_amplitude(self) -> float:
+        """Mean over the last second, m."""
+        return float(np.mean(self.amplitude[self.time >= self.time[-1] - _FINAL_TIME]))
+
+    @property
+    def residual_ratio(self) -> float | None:
+        """Final amplitude over that of the first places at this speed; None where nothing would vibrate."""
+        unbalanced = self.unbalanced_amplitude
+        return None if unbalanced < _NOTHING * self.limit else self.final_amplitude / unbalanced
+
+    @property
+    def electrical_energy(self) -> float:
+        """Taken by both motors from the supply in the whole run, J."""
+        return float(self.estimates.energy[-1])
+
+    @property
+    def worst_amplitude(self) -> float:
+        """Largest true vibration on the way, m."""
+        return float(np.max(self.amplitude))
+
+    @property
+    def saturation(self) -> float:
+        """Seconds for which a voltage was at its limit."""
+        most = PlantParameters.of(self.scene).maximum_voltage
+        at_limit = np.any(np.abs(self.estimates.voltage) >= most, axis=1)
+        return float(np.count_nonzero(at_limit)) * self.scene.sensor.step
+
+    @property
+    def least_gap(self) -> float:
+        """Smallest angle between the masses on the way, rad."""
+        first, second = self.mass_angle
+        return float(np.min(np.abs(np.pi - np.mod(np.pi - (second - first), 2 * np.pi))))

@@ -33,7 +33,7 @@ from scipy.stats import chi2
 
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.likelihood import Block, Problem, basis_of
+from ringbalance.identification.likelihood import Block, basis_of
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.identification.other_laws import by_other_machines, by_other_tubes
 from ringbalance.identification.readings import ComparedColumn, Reading, compared_columns, other_readings
@@ -57,13 +57,9 @@ class LinearFit:
     derivatives: FloatArray
     """Of the predictions by the parameters, over sigma, shape (n, p)."""
     block: StringArray
-    """What a row is of, such as "injection amplitude_after", shape (n,); rows of one block share a noise."""
-    data: BoolArray
-    """Whether a row is a measurement; else it is a prior."""
+    """What a row is of, such as "run.csv", shape (n,), empty for a prior; in the order of measurement."""
     known_noise: BoolArray
     """Whether its sigma was given; else it was estimated from the residuals of its block."""
-    order: FloatArray
-    """In which the rows of a file were measured; of priors it does not matter."""
 
     @cached_property
     def _basis(self) -> FloatArray:
@@ -132,8 +128,8 @@ class Criticism:
 
 
 def _blocks(fit: LinearFit) -> Iterator[tuple[str, BoolArray]]:
-    for name in dict.fromkeys(map(str, fit.block[fit.data])):
-        rows = fit.data & (fit.block == name)
+    for name in filter(None, dict.fromkeys(map(str, fit.block))):
+        rows = fit.block == name
         if np.count_nonzero(rows) >= FEWEST and fit.freedom(rows) > 1:
             yield name, rows
 
@@ -149,7 +145,7 @@ def _sizes(fit: LinearFit) -> Iterator[_ResidualTest]:
 
 def _runs(fit: LinearFit) -> Iterator[_ResidualTest]:
     for block, rows in _blocks(fit):
-        signs = fit.residuals[rows][np.argsort(fit.order[rows], kind="stable")] > 0
+        signs = fit.residuals[rows] > 0
         plus = int(np.count_nonzero(signs))
         if min(plus, signs.size - plus) > 1:
             runs = 1 + int(np.count_nonzero(signs[1:] != signs[:-1]))
@@ -378,19 +374,16 @@ def _at_solution(result: FitResult) -> _AtSolution:
     turn = _rotation(result)
     more = np.zeros((parts.size - residuals.base.shape[0], residuals.base.shape[1]))
     whole = np.hstack([-best.slopes, np.concatenate([residuals.base, more])])
-    data = np.arange(parts.size) < count
     known = np.zeros(parts.size, dtype=np.bool_)
     known[:count] = problem.group < 0
     blocks = np.concatenate([_titles(b.observations, b.measured.size) for b in problem.blocks])
-    rest = np.full(parts.size - count, "beforehand")
+    rest = np.full(parts.size - count, "")
     return _AtSolution(
         fit=LinearFit(
             residuals=np.concatenate([turn @ parts[:count], parts[count:]]),
             derivatives=np.concatenate([turn @ whole[:count], whole[count:]]),
             block=np.concatenate([blocks, rest]),
-            data=data,
             known_noise=known,
-            order=_order(problem, parts.size),
         ),
         turn=turn,
     )
@@ -417,11 +410,3 @@ def _rotation(result: FitResult) -> FloatArray:
             turn[i, i] = turn[i + rows, i + rows] = np.cos(angle)
             turn[i, i + rows], turn[i + rows, i] = np.sin(angle), -np.sin(angle)
     return turn
-
-
-def _order(problem: Problem, size: int) -> FloatArray:
-    """Row of its file that each residual is of; the two parts of a vibration have one."""
-    order = np.zeros(size)
-    for block, mine in problem.rows:
-        order[mine] = np.resize(np.arange(float(len(block.observations))), block.measured.size)
-    return order

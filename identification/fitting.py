@@ -25,14 +25,8 @@ from ringbalance.identification.optimisation import Optimum, optimum
 from ringbalance.identification.parameters import (
     FitError,
     Parameter,
-    both_sides,
-    changed,
-    held_for,
-    informed,
-    models_for,
-    parameters_for,
+    inputs_of,
     path_of,
-    values_of,
 )
 from ringbalance.identification.reading import KINDS, kinds_of
 from ringbalance.results.rows import Finding, text_of
@@ -203,10 +197,11 @@ def fit(
     """
     problem = problem_of(scene, data, parameters)
     names = [p.name for p in problem.parameters]
-    held = held_for(scene, names)
+    inputs = inputs_of(scene)
+    held = inputs.held(names)
     nothing = np.zeros((problem.measured.size, 0))
     first = optimum(problem, nothing, loss=loss, starts=starts)
-    effects = problem.held_effects(first.t, [both_sides(scene, name, sd) for name, sd in held.items()])
+    effects = problem.held_effects(first.t, [inputs.both_sides(*each) for each in held.items()])
     counts = np.linalg.norm(first.residuals.scale[:, None] * effects, axis=0) > _NO_EFFECT
     best = optimum(problem, effects[:, counts], loss=loss, starts=starts, before=first)
     kept = {name: sd for (name, sd), one in zip(held.items(), counts, strict=True) if one}
@@ -224,11 +219,12 @@ def problem_of(
             raise FitError(f"{each.file}: data of kind {each.kind} do not belong to this balancer")
         if reason := KINDS[each.kind].obstacle(scene, each):
             raise FitError(f"{each.file}: {reason}")
-    names = informed(scene, data) if parameters is None else list(parameters)
+    inputs = inputs_of(scene)
+    names = inputs.informed(data) if parameters is None else list(parameters)
     return Problem(
         scene=scene,
-        models=models_for(scene),
-        parameters=parameters_for(scene, names),
+        models=inputs.models,
+        parameters=inputs.parameters(names),
         blocks=tuple(Block(observations=each) for each in data),
     )
 
@@ -236,10 +232,11 @@ def problem_of(
 def exact_inputs(result: FitResult) -> list[str]:
     """Quantities that the predictions depend on, and that are neither fitted nor stated as uncertain."""
     problem, t = result.optimum.residuals.problem, result.optimum.t
-    known = {*held_for(problem.scene, ()), *(parameter.name for parameter in result.parameters)}
+    inputs = inputs_of(problem.scene)
+    known = {*inputs.held(()), *(parameter.name for parameter in result.parameters)}
     found = []
-    for name, value in values_of(problem.scene).items():
-        nearby = changed(problem.scene, name, -_LITTLE * abs(value) if value else _LITTLE)
+    for name, each in inputs.inputs.items():
+        nearby = inputs.changed(name, -_LITTLE * abs(each.value) if each.value else _LITTLE)
         if name not in known and np.any(replace(problem, scene=nearby).at(t) != problem.at(t)):
             found.append(name)
     return found

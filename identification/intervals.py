@@ -32,7 +32,7 @@ from scipy.special import stdtrit
 
 from ringbalance.identification.likelihood import Problem
 from ringbalance.identification.optimisation import Optimum, optimum, searched
-from ringbalance.identification.parameters import MODEL_ERRORS, both_sides, changed, models_for
+from ringbalance.identification.parameters import MODEL_ERRORS, inputs_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.fitted import LARGEST_ERROR
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
@@ -215,7 +215,7 @@ def about_pulls(best: Optimum, held: Mapping[str, float], *, scene: AnyScene, lo
         linear = problem.at(t) + residuals.held @ (pulls - residuals.pulled)
         if np.max(residuals.scale * np.abs(there.at(t) - linear), initial=0.0) < _LINEAR:
             break
-        effects = there.held_effects(t, [both_sides(there.scene, name, sd) for name, sd in held.items()])
+        effects = there.held_effects(t, [inputs_of(there.scene).both_sides(*each) for each in held.items()])
         moved = replace(residuals, problem=there, held=effects, pulled=pulls)
         best = optimum(there, effects, loss=loss, starts=best.starts, before=replace(best, residuals=moved))
     return best
@@ -232,9 +232,9 @@ def _pulled(
 ) -> Problem:
     """The problem of the scene with its held inputs pulled."""
     for name, pull in pulls.items():
-        scene = changed(scene, name, pull * held[name])
+        scene = inputs_of(scene).changed(name, pull * held[name])
     there = replace(problem, scene=scene)
-    models = models_for(there.scene_at(t))
+    models = inputs_of(there.scene_at(t)).models
     before = problem.models
     if models is None or before is None:
         return there
@@ -281,7 +281,7 @@ def scene_as_fitted(best: Optimum, held: Mapping[str, float]) -> AnyScene:
     residuals, scene = best.residuals, best.residuals.problem.scene
     steps = _allowed(held, residuals.held_values(best.t)) - residuals.pulled
     for (name, sd), step in zip(held.items(), steps.tolist(), strict=True):
-        scene = changed(scene, name, step * sd)
+        scene = inputs_of(scene).changed(name, step * sd)
     as_fitted: AnyScene = replace(residuals.problem, scene=scene).scene_at(best.t)
     models = residuals.problem.models
     return as_fitted if models is None else models.with_gauge_correction(liquid_ring_scene(as_fitted))

@@ -17,7 +17,7 @@ from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.likelihood import Block, Problem
-from ringbalance.identification.parameters import both_sides
+from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS, kinds_of
 from ringbalance.results.rows import Value, text_of
 from ringbalance.scene.arrays import FloatArray
@@ -88,7 +88,7 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
         for kind in kinds_of(scene.balancer)
     ]
     asked = replace(problem, blocks=tuple(Block(observations=each) for each in offered if len(each)))
-    changed = [(problem.scene, both_sides(problem.scene, n, sd)[1]) for n, sd in result.held.items()]
+    changed = [(problem.scene, inputs_of(problem.scene).changed(n, sd)) for n, sd in result.held.items()]
     by_parameters, by_held = asked.quick_slopes(t), asked.held_effects(t, changed)
     for block, mine in asked.rows:
         count = len(block.observations)

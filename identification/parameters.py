@@ -250,7 +250,7 @@ expanded uncertainty (95 %).
 """
 
 
-class _Side:
+class SceneInputs:
     """What a fit asks of a scene, through its `Balancer`: quantities go by their paths, such as
     "rotor.damping" and "masses.friction_arm[0]"."""
 
@@ -295,7 +295,36 @@ class _Side:
             change=lambda scene, value: with_values_at(scene, {name: value}),
         )
 
-    def moved(self, name: str, change: float) -> SceneFile:
+    def parameters(self, names: Sequence[str]) -> tuple[Parameter, ...]:
+        """Parameters by name. Raises: FitError: a name that cannot be fitted, or twice the same, or none."""
+        if not names or len(set(names)) < len(names):
+            raise FitError("name at least one parameter, and each once")
+        return tuple(self.parameter(name) for name in names)
+
+    def informed(self, data: Sequence[Observations]) -> list[str]:
+        """Parameters that data inform."""
+        names = (name for each in data for name in KINDS[each.kind].informs(each))
+        return list(dict.fromkeys(own for name in names for own in self.named(name)))
+
+    def held(self, fitted: Sequence[str]) -> dict[str, float]:
+        """Standard deviation, SI, of every uncertain quantity that is not fitted, and of what models may be
+        off by."""
+        widths = {n: each.half_width / NORMAL_95 for n, each in self.inputs.items() if n not in fitted}
+        return {name: sd for name, sd in widths.items() if sd} | dict.fromkeys(self.errors, 1.0)
+
+    def changed(self, name: str, change: float) -> SceneFile:
+        """The scene with one uncertain quantity changed, SI, or a model's error, in deviations."""
+        if name in MODEL_ERRORS:
+            return with_model_error(liquid_ring_scene(self.scene), name, change)
+        return self._moved(name, change)
+
+    def both_sides(self, name: str, change: float) -> tuple[SceneFile, SceneFile]:
+        """The scene with one of these lower and higher by a change, as far as a device can have it."""
+        # Errors of models are nearly linear, and there are many of them.
+        low = self.scene if name in MODEL_ERRORS else self.changed(name, -change)
+        return low, self.changed(name, change)
+
+    def _moved(self, name: str, change: float) -> SceneFile:
         """The scene with one uncertain quantity changed, SI, as far as a device can have it."""
         given = self.inputs[name]
         lowest = -math.inf if given.unit == _ANGLE else 0.1 * given.value
@@ -303,7 +332,7 @@ class _Side:
         return moved
 
 
-class _LiquidRing(_Side):
+class _LiquidRing(SceneInputs):
     """Quantities go by their keys, such as "bore"."""
 
     scene: Scene
@@ -331,63 +360,17 @@ class _LiquidRing(_Side):
     def parameter(self, name: str) -> Parameter:
         return Parameter.of(self.scene, name)
 
-    def moved(self, name: str, change: float) -> SceneFile:
+    def _moved(self, name: str, change: float) -> SceneFile:
         return shifted(scene=self.scene, quantity=name, change=change)
 
 
-_SIDES: Final[Mapping[str, type[_Side]]] = {Scene.balancer: _LiquidRing}
+_INPUTS: Final[Mapping[str, type[SceneInputs]]] = {Scene.balancer: _LiquidRing}
 """By the name of the balancer; the others have nothing but their `Balancer`."""
 
 
-def _side(scene: SceneFile) -> _Side:
-    return _SIDES.get(scene.balancer, _Side)(scene)
-
-
-def models_for(scene: SceneFile) -> Models | None:
-    """Models that predictions take; None where there is but one."""
-    return _side(scene).models
-
-
-def parameters_for(scene: SceneFile, names: Sequence[str]) -> tuple[Parameter, ...]:
-    """Parameters by name. Raises: FitError: a name that cannot be fitted, or twice the same, or none."""
-    if not names or len(set(names)) < len(names):
-        raise FitError("name at least one parameter, and each once")
-    side = _side(scene)
-    return tuple(side.parameter(name) for name in names)
-
-
-def informed(scene: SceneFile, data: Sequence[Observations]) -> list[str]:
-    """Parameters that data inform."""
-    side = _side(scene)
-    names = (name for each in data for name in KINDS[each.kind].informs(each))
-    return list(dict.fromkeys(own for name in names for own in side.named(name)))
-
-
-def held_for(scene: SceneFile, fitted: Sequence[str]) -> dict[str, float]:
-    """Standard deviation, SI, of every uncertain quantity of the scene that is not fitted, and of what its
-    models may be off by."""
-    side = _side(scene)
-    widths = {name: each.half_width / NORMAL_95 for name, each in side.inputs.items() if name not in fitted}
-    return {name: sd for name, sd in widths.items() if sd} | dict.fromkeys(side.errors, 1.0)
-
-
-def values_of(scene: SceneFile) -> dict[str, float]:
-    """Every quantity that may be uncertain and that the scene has, SI, by name."""
-    return {name: each.value for name, each in _side(scene).inputs.items()}
-
-
-def both_sides(scene: SceneFile, name: str, change: float) -> tuple[SceneFile, SceneFile]:
-    """The scene with one of these lower and higher by a change, SI, as far as a device can have it."""
-    # Errors of models are nearly linear, and there are many of them.
-    low = scene if name in MODEL_ERRORS else changed(scene, name, -change)
-    return low, changed(scene, name, change)
-
-
-def changed(scene: SceneFile, name: str, change: float) -> SceneFile:
-    """The scene with one uncertain quantity changed, SI, or an error of a model, in standard deviations."""
-    if name in MODEL_ERRORS:
-        return with_model_error(liquid_ring_scene(scene), name, change)
-    return _side(scene).moved(name, change)
+def inputs_of(scene: SceneFile) -> SceneInputs:
+    """What a fit asks of a scene."""
+    return _INPUTS.get(scene.balancer, SceneInputs)(scene)
 
 
 def path_of(name: str) -> str:

@@ -20,7 +20,7 @@ import numpy as np
 from ringbalance.identification.fitting import FitResult, FittedParameter
 from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.parameters import START, path_of, values_of
+from ringbalance.identification.parameters import START, inputs_of, path_of
 from ringbalance.results.rows import text_of
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.faults import SceneError
@@ -244,10 +244,10 @@ def _put_joint(
     if scene is None or not joint:
         return
     values = [(_place_of(each.path, document), each) for each in pulled if each.held and not each.is_model]
-    known = values_of(scene)
+    known = inputs_of(scene).inputs
     for place, each in values:
-        _put_value(document, place, known[each.name])
-        _put_width(document, place, each.standard_deviation, known[each.name])
+        _put_value(document, place, known[each.name].value)
+        _put_width(document, place, each.standard_deviation, known[each.name].value)
     if any(each.is_model for each in joint):
         _put_errors(document, liquid_ring_scene(scene))
     if any(each.name == "pressure" for each in (*pulled, *joint) if each in pulled or not each.held):

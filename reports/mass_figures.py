@@ -122,7 +122,10 @@ def run_up(run: Record, locked: Record, rotor: Record, drawn: Record | None = No
         text = f"critical speed {number(critical, digits=3)} rpm"
         text += f", amplification factor {number(factor, digits=2)}" if factor else ""
         side = "right" if critical > sum(ends) / 2 else "left"
-        note(text, (critical, 0.0), (-4 if side == "right" else 4, 4), xycoords=_ACROSS, ha=side)(top)
+        # Where the lag is not: it passes 90 degrees at the critical speed.
+        shift, at = ((-4, -4), 1.0) if side == "right" else ((4, 4), 0.0)
+        up = "top" if side == "right" else "bottom"
+        note(text, (critical, at), shift, xycoords=_ACROSS, ha=side, va=up)(below)
         for look in (_LOCKED, _BALANCED, _LIMIT):
             axes.plot([], [], **look)
         if drawn is not None:

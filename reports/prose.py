@@ -62,6 +62,19 @@ _OWNERS: Final = {"lqr": "regulator", "masses": "eccentric masses"}
 _ALONE: Final = ("accuracy", "environment", "run", "gas.ambient_pressure")
 """Tables, and a key, whose keys need no owner."""
 _MESH: Final = "disc.mesh"
+_KEYS: Final = {
+    "proportional": "gain",
+    "initial_phase": "phase of the initial vibration",
+    "gas_time_offset": "offset of the valve-open time",
+    "minimum_gas_time": "shortest valve-open time",
+    "maximum_gas_time": "longest valve-open time",
+    "conductance": "sonic conductance",
+    "draw_down_factor": "factor on the draw-down depth",
+}
+"""Words for keys that are none by themselves."""
+_PATH: Final = re.compile(
+    r"\b(?:controller|disc|gas|liquid|masses|requirement|rotor|run|sensor|tube)\.[a-z_]+"
+)
 
 
 def typeset(text: str) -> str:
@@ -83,7 +96,13 @@ def key_words(path: str) -> str:
     """The key of a path in the scene file as a reader knows it, such as "siphon crest radius"."""
     if path == FITTED:
         return "fitted inputs"
-    return path.rpartition(".")[2].replace("_", " ").replace("hump", "siphon crest")
+    key = path.rpartition(".")[2]
+    return _KEYS.get(key, key.replace("_", " ").replace("hump", "siphon crest"))
+
+
+def paths_named(text: str) -> str:
+    """A sentence of the program, in which the scene file's keys have the names of what they stand for."""
+    return _PATH.sub(lambda match: input_name(match[0]), text)
 
 
 def _index(match: re.Match[str]) -> str:

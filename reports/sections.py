@@ -30,7 +30,7 @@ from ringbalance.reports.pages import (
     tube,
     tube_flow,
 )
-from ringbalance.reports.pages.standing import CONDITIONS, CREDIBILITY, DOCUMENT
+from ringbalance.reports.pages.standing import CASES, CONDITIONS, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Place, Record, Section, Work
 from ringbalance.scene import Scene
 from ringbalance.scene.platform.processes import Workers
@@ -58,7 +58,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     loop.INJECTIONS,
     paper_figures.SECTION,
     consequences.SECTION,
-    Section(name="cases", title="Claims: evidence and doubts"),
+    CASES,
     eccentric.SECOND_BALANCER,
     Section(name="numerics", title="Numerical verification"),
     studies.EXTREMES,

@@ -36,6 +36,7 @@ BY_NAME: Final = {
     *(f"quantities.{MODELS}.{each}" for each in ("models", "work", "fixed_work")),
     f"times.{MODELS}",
     *("findings.values", "findings.change"),
+    *("verdicts", "best.changes"),
     *("ended", "own.ended", "clipped", "along.levels.settings", "tried.settings"),
     *(f"{each}.{key}" for each in ("remedies", "valves") for key in ("changes", "settings")),
     *("numbers", "tables.columns", "tables.units", "endings", "loop_endings", "violations.point"),
@@ -153,7 +154,9 @@ def few_devices() -> Iterator[None]:
         patch.setattr(tune_module, "BLOCK", 8)
         patch.setattr(remedies_module, "judged", partial(judged, most=8))
         patch.setattr(remedies_module, "_FIRST", 4)
+        patch.setattr(tune_module, "searched", lambda *_, **__: {"controller.gas_time_offset": (1e-3,)})
         patch.setattr(search_module, "_HEATS", ((0, 4),))
+        patch.setattr(search_module, "_ROUNDS", 1)
         patch.setattr(search_module, "DEVICES", 4)
         patch.setattr(search_module, "CURVE", Draws.block(64, 4))
         yield
@@ -179,6 +182,11 @@ def test_keys_of_compare(folder: Path, printed: Any) -> None:
 
 def test_keys_of_trade(printed: Any) -> None:
     compare("`trade --json`", [printed("trade", PAPER, "--level", "light")])
+
+
+def test_keys_of_sweep(printed: Any, tmp_path: Path) -> None:
+    words = ("sweep", PAPER, "--vary", "tube.bore=1mm:2mm:2", "--out", tmp_path, "--check", 1, "--no-figures")
+    compare("`sweep --json`", [printed(*words)])
 
 
 def test_keys_of_verify(printed: Any) -> None:
@@ -214,7 +222,11 @@ def test_to_dict_is_what_the_command_prints(name: str, folder: Path, printed: An
     run = printed("simulate", path)
     assert as_json(rb.simulate(scene)) == run
     assert run["scene"] == {"name": scene.name, "source": path.name, "sha256": scene.sha256}
-    assert as_json(rb.tune(scene, remedies=None)) == printed("tune", path)
+
+
+def test_to_dict_of_a_tuning_is_what_the_command_prints(folder: Path, printed: Any) -> None:
+    path = folder / "line.toml"
+    assert as_json(rb.tune(rb.load_scene(path), remedies=None)) == printed("tune", path)
 
 
 def test_to_dict_of_studies_is_what_the_command_prints(folder: Path, printed: Any) -> None:

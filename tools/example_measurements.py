@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.parameters import models_for
+from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS
 from ringbalance.scene import AnyScene, bundled_scene, load_scene, write_whole
 from ringbalance.scene.arrays import ComplexArray, FloatArray
@@ -93,7 +93,7 @@ def _observations(kind: str, columns: Mapping[str, npt.ArrayLike], chamber: Sequ
 def _measured(kind: str, plan: Observations, random: np.random.Generator) -> Observations:
     """The plan with what the truth predicts, and noise."""
     scene = truth(kind)
-    found = KINDS[kind].predict(scene, plan, models_for(scene))
+    found = KINDS[kind].predict(scene, plan, inputs_of(scene).models)
     columns = dict(plan.columns)
     if kind == "trial_amplitude":
         size = _VIBRATION_NOISE["liquid_ring"]

@@ -103,8 +103,12 @@ def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatA
     # More points than the solve has, or its errors at these would be taken for all.
     basis = Basis(chamber.mesh, chamber.mesh.elem(), intorder=8)
     true = exact(chamber.length_scale * np.asarray(basis.global_coordinates()))
-    difference = np.asarray(basis.interpolate(solution.pressure)) - true
-    return float(np.sqrt(np.sum(basis.dx * difference**2) / np.sum(basis.dx * true**2)))
+    return relative_rms(np.asarray(basis.interpolate(solution.pressure)), true, basis.dx)
+
+
+def relative_rms(found: FloatArray, true: FloatArray, weights: FloatArray) -> float:
+    """Root mean square of an error over that of the truth, weighted."""
+    return float(np.sqrt(np.sum(weights * (found - true) ** 2) / np.sum(weights * true**2)))
 
 
 def order_figure(studies: Mapping[str, OrderStudy]) -> Series:

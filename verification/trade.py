@@ -40,6 +40,7 @@ from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 from ringbalance.scene.uncertain import without_fitted
 from ringbalance.verification.evidence import Level
+from ringbalance.verification.typed_record import plain
 
 Record = dict[str, Any]
 Solve = Callable[[], tuple[FloatArray, ...]]
@@ -135,32 +136,26 @@ class TradeStudy(Result):
                 for term, estimate in estimates
             ],
             "models_used": [asdict(used) for used in models_used(scene)],
-            "quantities": [
-                {
-                    "quantity": quantity.name,
-                    "title": quantity.title,
-                    "points": list(quantity.points),
-                    "uncertainty": quantity.uncertainty,
-                    "status": {"code": str(quantity.status.code), "text": quantity.status.text},
-                    "models": [
-                        {"model": model.name, "values": list(model.values), "error": model.error}
-                        for model in quantity.models
-                    ],
-                }
-                for quantity in self.quantities
-            ],
+            "quantities": [_quantity(quantity) for quantity in self.quantities],
             "times": {
                 quantity.name: [
-                    {
-                        "model": model.name,
-                        "seconds": model.seconds,
-                        "designs_per_second": model.designs_per_second,
-                    }
-                    for model in quantity.models
+                    _chosen(model, "model", "seconds designs_per_second") for model in quantity.models
                 ]
                 for quantity in self.quantities
             },
         }
+
+
+def _quantity(quantity: MeasuredQuantity) -> Record:
+    return _chosen(quantity, "quantity", "title points uncertainty") | {
+        "status": {"code": str(quantity.status.code), "text": quantity.status.text},
+        "models": [_chosen(model, "model", "values error") for model in quantity.models],
+    }
+
+
+def _chosen(record: MeasuredQuantity | _MeasuredModel, what: str, names: str) -> Record:
+    """Its name under another key, and some of its values under their own."""
+    return {what: record.name, **{name: plain(getattr(record, name)) for name in names.split()}}
 
 
 def models_table(quantity: Record, times: Mapping[str, Sequence[Record]]) -> Table:

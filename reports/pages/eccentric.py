@@ -27,7 +27,7 @@ from ringbalance.reports.mass_figures import (
 from ringbalance.reports.pages import measured
 from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.plain import decision_view
-from ringbalance.reports.pages.standing import CREDIBILITY, DOCUMENT
+from ringbalance.reports.pages.standing import CASES, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
 
@@ -146,7 +146,7 @@ SECTIONS: Final = (
     CREDIBILITY,
     Section(name="parameters", title="Parameters and their origin", place="report"),
     DOCUMENT,
-    Section(name="cases", title="Claims: evidence and doubts"),
+    CASES,
     measured.SECTION,
     Section(name="scene", title="Scene file"),
 )

@@ -8,7 +8,6 @@ from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged
 from ringbalance.controller.judging.tuning_rows import setting_text
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
-from ringbalance.controller.liquid_ring.devices import ASSUMED_INFLUENCE
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reports import summary
@@ -24,10 +23,9 @@ from ringbalance.reports.pages.pressure_figure import pressure_figure
 from ringbalance.reports.prose import key_words, named_with_origin, resting
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.traced import read, states_uncertainty, traced
-from ringbalance.results.numbers import THIN_SPACE, given, percent
+from ringbalance.results.numbers import given, percent
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.draws import BLOCK
-from ringbalance.scene.uncertain import half_widths
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.runner import paper_scene
 
@@ -74,15 +72,8 @@ _RUN: Final = (
 )
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _DOMINANT: Final = 3
-_MAIN: Final = {
-    "velocity": "flow velocity",
-    "usable_moment": "usable moment",
-    "lambda": "lever arm λ",
-    "wall_pressure": "wall pressure",
-    "needed_moment": "unbalance",
-}
-"""Results whose causes of uncertainty are compared; k and the margin follow from the velocity's."""
-_NEEDED: Final = "needed_moment"
+_SHARES: Final = {True: "{}: {}, merely not known", False: "{}: {}, varies between devices"}
+"""An input and its share, by whether all devices have it in common."""
 
 
 def _collect(work: Work) -> Record:
@@ -99,7 +90,6 @@ def _collect(work: Work) -> Record:
         "recommended_pressure_Pa": chosen.gas.pressure,
         "run": _run_record(chosen, work.calibration.model) if tuning.recommended.settings else None,
         "needed_moment_kg_m": scene.rotor.initial_amplitude / scene.rotor.influence_coefficient,
-        "needed_uncertainty_kg_m": _needed_uncertainty(scene),
         "requirement": requirement_record(scene),
         "bore_m": scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in scene.uncertainty),
@@ -111,13 +101,6 @@ def _run_record(scene: Scene, model: BalancerModel) -> Record:
     """One run with the recommended settings, as the table of runs has it."""
     run = simulate(scene, model).to_dict()
     return {**{key: run[key] for key in _RUN if key in run}, "injections": len(run["injections"])}
-
-
-def _needed_uncertainty(scene: Scene) -> float:
-    """Of the initial unbalance, kg m at 95 %, by that of the influence coefficient: stated, else assumed."""
-    assumed = ASSUMED_INFLUENCE * scene.rotor.influence_coefficient
-    width = half_widths(scene).get("influence_coefficient", assumed)
-    return scene.rotor.initial_amplitude * width / scene.rotor.influence_coefficient**2
 
 
 def requirement_record(scene: Scene) -> Record:
@@ -160,7 +143,7 @@ def _view(found: Record, evidence: Record) -> Record:
         "remedies": [_remedy(each) for each in found.get("remedies", ())],
         "measures": [each["text"] for each in found.get("measures", ())],
         "alerts": [*_dry(evidence), *_chamber(evidence)],
-        "dominant": _dominant(evidence),
+        "dominant": _dominant(found, evidence),
         "rests": [*_bore(found, evidence), *_exact(evidence), *_borrowed(evidence)],
     }
 
@@ -214,26 +197,21 @@ def _chamber(evidence: Record) -> list[str]:
     return [] if status["code"] == "ok" else [_sentence(status["text"])]
 
 
-def _dominant(evidence: Record) -> list[str]:
-    """The three effects of one cause on one main result that are largest, relative to it."""
-    budgets = evidence["calibration"].get("budgets") or {}
-    effects = []
-    for name, budget in budgets.items():
-        if name not in _MAIN or not budget["value"]:
-            continue
-        causes = {**budget["inputs"], "the model itself": budget["model"]}
-        effects += [(width / abs(budget["value"]), cause, name) for cause, width in causes.items()]
-    own = evidence.get("summary") or {}
-    if own.get("needed_moment_kg_m") and own.get("needed_uncertainty_kg_m"):
-        share = own["needed_uncertainty_kg_m"] / own["needed_moment_kg_m"]
-        effects.append((share, "rotor.influence_coefficient", _NEEDED))
-    largest = sorted(effects, reverse=True)[:_DOMINANT]
-    return [_cause(evidence, cause, effect, name) for effect, cause, name in largest]
+def _dominant(found: Record, evidence: Record) -> list[str]:
+    """The inputs that decide most of what the drawn devices differ in."""
+    return [
+        _SHARES[each["common"]].format(
+            _input(evidence, each), traced(percent(each["index"]), f"summary.ranking.{place}.index")
+        )
+        for place, each in enumerate(found.get("ranking", ())[:_DOMINANT])
+        if each["index"] > each["noise"]
+    ]
 
 
-def _cause(evidence: Record, cause: str, effect: float, name: str) -> str:
-    label = named_with_origin(evidence, cause)
-    return f"{label[0].upper()}{label[1:]}: ±{THIN_SPACE}{percent(effect)} of the {_MAIN[name]}"
+def _input(evidence: Record, ranked: Record) -> str:
+    path = ranked["path"]
+    label: str = named_with_origin(evidence, path) if path else ranked["name"].removeprefix("model: ")
+    return f"{label[0].upper()}{label[1:]}"
 
 
 def _exact(evidence: Record) -> list[str]:

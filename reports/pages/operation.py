@@ -44,6 +44,8 @@ _FILLS: Final = 101
 _PRESSURES: Final = 121
 _HIGHEST: Final = 1.5
 """Top of the map over the scene's gas pressure, or over the priming pressure where that is higher."""
+_STEP: Final = math.radians(3)
+"""Between the points of an arc."""
 _PLACES: Final = 7
 """Of an outline, m."""
 _SPILLING: Final = "spilling"
@@ -259,7 +261,7 @@ def _disc_section(found: Record) -> Drawing:
 
 
 def _arc(radius: float, start: float, end: float) -> FloatArray:
-    angle = np.linspace(start, end, 61)
+    angle = np.linspace(start, end, 2 + round(abs(end - start) / _STEP))
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 

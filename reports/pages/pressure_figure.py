@@ -16,7 +16,7 @@ from ringbalance.scene.arrays import FloatArray
 _SHADES: Final = {MET: 0.28, OPEN: 0.1}
 """Opacity of the ground by what is known of the fraction there."""
 _LEFT, _WIDTH = 0.17, 0.8
-_BOXES: Final = ((0.62, 0.29), (0.355, 0.22), (0.09, 0.22))
+_BOXES: Final = ((0.60, 0.28), (0.35, 0.20), (0.11, 0.20))
 """Bottom and height of the panels."""
 _MEGA, _TO_G_MM = 1e-6, 1e6
 
@@ -50,7 +50,7 @@ def pressure_figure(
         handles, labels = share.get_legend_handles_labels()
         figure_of(axes).legend(handles, labels, loc="upper left", ncols=2, borderaxespad=0.0, borderpad=0.1)
 
-    return draw("pressure-choice", paint, columns=0, height=4.4)
+    return draw("pressure-choice", paint, columns=0, height=3.5)
 
 
 def _shares(panel: Axes, pressure: FloatArray, shares: Sequence[Record], asked: float) -> None:
@@ -78,6 +78,9 @@ def _times(panel: Axes, pressure: FloatArray, levels: Sequence[Record]) -> None:
         times = np.array([each[key][0] if each[key] else np.nan for each in levels])
         panel.plot(pressure, times, markersize=3, **look)
     panel.set(ylim=(0, None), ylabel="time in s")
+    if not any(each["half_s"] for each in levels):
+        panel.set_yticks([])
+        panel.text(0.5, 0.5, "half of the devices nowhere settle", ha="center", transform=panel.transAxes)
 
 
 def _grounds(panel: Axes, pressure: FloatArray, verdicts: Sequence[str]) -> None:

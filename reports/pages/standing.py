@@ -25,7 +25,7 @@ from ringbalance.reports.figure import (
     panels,
     plain_number,
 )
-from ringbalance.reports.prose import input_name, key_words
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record, Section
 from ringbalance.results.result import Table
 from ringbalance.verification.standing import HEADS, budget_standing, standing_rows
@@ -91,13 +91,16 @@ CONDITIONS: Final = Section(
 _NOBODYS: Final = {"assumed": "are assumed", "default": "are defaults of the program"}
 
 
+_MAIN_HEADS: Final = tuple(head for place, head in enumerate(HEADS) if place not in (2, 3))
+"""What the report shows of the table that the annex has whole."""
+
+
 def _credibility(_own: Record, evidence: Record) -> Record:
     checks, scene = summary.checks(evidence), evidence["scene"]
     origins: dict[str, str] = scene.get("origins") or {}
     counts = Counter(row["origin"] for row in scene.get("table") or [])
     return {
-        "standing": _standing(evidence, checks),
-        **{origin: _inputs(origins, origin) for origin in ("assumed", "inferred")},
+        "standing": _standing(evidence, _MAIN_HEADS),
         "documented": bool({"given", "measured"} & set(origins.values())),
         "checks": _outcome(checks),
         "failed": any(case["verdict"] == "failed" for case in checks),
@@ -108,17 +111,15 @@ def _credibility(_own: Record, evidence: Record) -> Record:
     }
 
 
-def _standing(evidence: Record, checks: list[Record]) -> Table:
+def _standing(evidence: Record, heads: Sequence[str] = HEADS) -> Table:
+    rows = standing_rows(summary.checks(evidence), balancer=evidence.get("balancer", "liquid_ring"))
     return Table(
         caption="What stands behind each predicted quantity. Measurements are those of others on parts like "
         "the device’s; “within” is the share of the judged points that lie within both 95 % intervals, bias "
         "and scatter are those of predicted over measured values. Points that taught a coefficient are left "
         "out and not counted as predicted.",
-        heads=HEADS,
-        rows=[
-            tuple(cell.replace(" -", " −") for cell in row)
-            for row in standing_rows(checks, balancer=evidence.get("balancer", "liquid_ring"))
-        ],
+        heads=heads,
+        rows=[tuple(row[HEADS.index(head)].replace(" -", " −") for head in heads) for row in rows],
         style="dense",
     )
 
@@ -129,14 +130,15 @@ def _outcome(cases: Sequence[Record]) -> str:
     return ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
 
 
-def _inputs(origins: dict[str, str], origin: str) -> list[str]:
-    """Names of the inputs of one origin, but of stated uncertainties."""
-    paths = (path for path, of in origins.items() if of == origin and not path.startswith("uncertainty."))
-    return sorted(map(input_name, paths))
-
-
 CREDIBILITY: Final = Section(
     name="credibility", title="What is validated, verified and assumed", place="report", show=_credibility
+)
+
+
+CASES: Final = Section(
+    name="cases",
+    title="Claims: evidence and doubts",
+    show=lambda _own, evidence: {"standing": _standing(evidence)},
 )
 
 

@@ -157,12 +157,16 @@ def test_a_nominal_run_is_that_of_an_own_plant(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("pressure", "verdict"),
-    [("0.56 MPa", MET), pytest.param("0.42 MPa", MISSED, marks=pytest.mark.heavy)],
+    [
+        ("0.56 MPa", MET),
+        pytest.param("0.42 MPa", MISSED, marks=pytest.mark.heavy),
+        pytest.param("0.70 MPa", MISSED, marks=pytest.mark.heavy),
+    ],
 )
 def test_the_seed_moves_no_verdict(pressure: str, verdict: str) -> None:
-    for seed in (0, 1):
+    for seed in (0, 1, 2):
         scene = bundled(PAPER, {"gas.pressure": pressure, "run.seed": seed})
-        assert judged(balancer_of(scene), OFFSET, most=64).verdict == verdict
+        assert judged(balancer_of(scene), OFFSET).verdict == verdict
 
 
 @pytest.mark.heavy

@@ -329,13 +329,10 @@ def test_the_work_of_a_fit_is_bounded(paper_scene: Scene) -> None:
 
 
 def test_few_rigs_are_covered() -> None:
-    """Of 20 intervals of 95 % more than three miss once in sixty such tests; these are always the same.
-
-    Two rigs of each set of data: intervals a fifth too short would miss five times.
-    """
-    found = [holds for number in (1, 2, 4, 5, 7, 8) for holds in covered(rig(number)).values()]
-    assert len(found) == 20
-    assert sum(found) >= 17
+    """Of 10 intervals of 95 % more than two miss once in ninety such tests: one rig of each set of data."""
+    found = [holds for number in (1, 4, 7) for holds in covered(rig(number)).values()]
+    assert len(found) == 10
+    assert sum(found) >= 8
 
 
 @pytest.mark.heavy

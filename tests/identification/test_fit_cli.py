@@ -15,7 +15,7 @@ import pytest
 
 from ringbalance.cli import main
 from ringbalance.identification.criticism import Criticism, LawComparison, Review
-from ringbalance.identification.parameters import informed
+from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS, observations_of, read_observations, template
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene
@@ -108,8 +108,8 @@ def test_a_prescribed_loss_is_fitted_in_place_of_the_extra_one() -> None:
     scene = liquid_ring_scene(load_scene(PAPER))
     prescribed = with_value(scene=scene, quantity="drag_coefficient", value=50.0)
     data = read_observations([Path(EXAMPLES[kind]) for kind in ("injection", "transfer")], scene=scene)
-    assert informed(scene, data) == ["lambda_factor", "bore", "extra_loss"]
-    assert informed(prescribed, data) == ["lambda_factor", "bore", "drag_coefficient"]
+    assert inputs_of(scene).informed(data) == ["lambda_factor", "bore", "extra_loss"]
+    assert inputs_of(prescribed).informed(data) == ["lambda_factor", "bore", "drag_coefficient"]
 
 
 def test_another_law_that_the_data_prefer_is_a_failure(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ from ringbalance.controller.liquid_ring.devices import Spread, devices
 from ringbalance.identification.device import Device, Models
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.parameters import changed
+from ringbalance.identification.parameters import inputs_of
 from ringbalance.identification.reading import KINDS
 from ringbalance.identification.saving import save_result
 from ringbalance.mesh.geometry import chamber_volume
@@ -127,7 +127,7 @@ def test_drawn_devices_spread_as_the_posterior(result: FitResult, scene: Scene) 
         return float(np.log(moved.rotor.influence_coefficient * moment * flow))
 
     def moved_by(i: int, step: float) -> Scene:
-        return liquid_ring_scene(changed(device, names[i], step))
+        return liquid_ring_scene(inputs_of(device).changed(names[i], step))
 
     steps = 0.2 * result.joint.deviations
     slopes = [(log_rate(moved_by(i, h)) - log_rate(moved_by(i, -h))) / (2 * h) for i, h in enumerate(steps)]

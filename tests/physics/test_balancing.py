@@ -34,7 +34,8 @@ def test_amplification_factor_is_the_half_power_one() -> None:
     critical = balancing.critical_speed(mass=mass, stiffness=stiffness)
     speeds = [critical * (0.7 + 1e-5 * step) for step in range(60_000)]
     response = [w**2 / abs(complex(stiffness - mass * w**2, damping * w)) for w in speeds]
-    wide = [w for w, each in zip(speeds, response, strict=True) if each >= max(response) / math.sqrt(2)]
+    half_power = max(response) / math.sqrt(2)
+    wide = [w for w, each in zip(speeds, response, strict=True) if each >= half_power]
     factor = balancing.amplification_factor(mass=mass, stiffness=stiffness, damping=damping)
     assert factor == pytest.approx(critical / (wide[-1] - wide[0]), rel=0.03)
     assert balancing.amplification_factor(mass=mass, stiffness=stiffness, damping=0.0) is None

@@ -28,7 +28,7 @@ from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Evidence, Found, Level, Reference, as_found, from_half_width
-from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found
+from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found, relative_rms
 from ringbalance.verification.reference.chambers import block_chamber, disc_chamber, exact_totals
 from ringbalance.verification.reference.pressure import Manufactured
 
@@ -150,8 +150,7 @@ def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> tuple[Or
         basis = quadratic_basis(scikit_fem_mesh(liquid_body(chamber, radius)))
         values = solve_on(basis, exact.problem(defect)).values
         true = exact.pressure(np.asarray(basis.global_coordinates()))
-        difference = np.asarray(basis.interpolate(values)) - true
-        field = np.sqrt(np.sum(basis.dx * difference**2) / np.sum(basis.dx * true**2))
+        field = relative_rms(np.asarray(basis.interpolate(values)), true, basis.dx)
         wall = side(basis.mesh, "outer_wall")
         force = np.sum(wall.weights * exact.pressure(wall.points))
         errors.append((field, abs(np.sum(wall.weights * wall.at_points(values)) / force - 1)))

@@ -46,7 +46,7 @@ from ringbalance.verification.evidence import (
     as_found,
     figure,
 )
-from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found
+from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found, relative_rms
 from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
 from ringbalance.verification.navier_stokes.newton import Factors, FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.tube import (
@@ -252,18 +252,14 @@ def _component(component: int, places: FloatArray) -> FloatArray:
 
 
 def _velocity_error(space: FlowSpace, solution: FlowSolution) -> float:
-    return _rms(space, space.at_points(solution.velocity)[0], velocity(space.points))
+    return relative_rms(space.at_points(solution.velocity)[0], velocity(space.points), space.weights)
 
 
 def _pressure_error(space: FlowSpace, solution: FlowSolution) -> float:
     found = solution.pressure[space.pressure.element_dofs.T] @ space.pressure_shape
     fields = (found, pressure(space.points))
     found, true = (field - np.sum(space.weights * field) / space.weights.sum() for field in fields)
-    return _rms(space, found, true)
-
-
-def _rms(space: FlowSpace, found: FloatArray, true: FloatArray) -> float:
-    return float(np.sqrt(np.sum(space.weights * (found - true) ** 2) / np.sum(space.weights * true**2)))
+    return relative_rms(found, true, space.weights)
 
 
 def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -121,20 +121,15 @@ class EndFlow:
         return _end_flow("entrance", _entrance_system(cells), reynolds, 3.0)
 
 
-def _quarter_cells(*, space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
-    """Nodes of four straight quadrilaterals per nine-node cell, counter-clockwise, shape (m, 4)."""
+def _triangles(space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
+    """Eight straight triangles per nine-node cell, counter-clockwise, shape (m, 3)."""
     v0, v1, v2, v3, s, e, n, w, c = space.velocity.element_dofs[:, cells]
     quads = [(v0, s, c, w), (s, v1, e, c), (c, e, v2, n), (w, c, n, v3)]
     nodes = np.concatenate([np.stack(quad, axis=1) for quad in quads]).astype(np.int64)
     x, y = space.node_coordinates()[:, nodes]
     area = (x[:, 2] - x[:, 0]) * (y[:, 3] - y[:, 1]) - (x[:, 3] - x[:, 1]) * (y[:, 2] - y[:, 0])
-    return np.where((area > 0)[:, None], nodes, nodes[:, ::-1])
-
-
-def _triangles(space: FlowSpace, cells: IntArray | slice = slice(None)) -> IntArray:
-    """Eight straight triangles per nine-node cell, counter-clockwise, shape (m, 3)."""
-    quads = _quarter_cells(space=space, cells=cells)
-    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    straight = np.where((area > 0)[:, None], nodes, nodes[:, ::-1])
+    return np.concatenate([straight[:, [0, 1, 2]], straight[:, [0, 2, 3]]])
 
 
 def _squared_slope(u: Any, v: Any, w: Any) -> Any:

@@ -112,7 +112,6 @@ class _Iteration:
     contracting: bool = True
     """Whether the last step was well below the one before, so that old factors may serve once more."""
     iterations: int = 0
-    factorizations: int = 0
     progress: Callable[[str], None] | None = None
 
 
@@ -134,7 +133,6 @@ def _factorize(system: FlowSystem, c: Coefficients, linear: Any, state: _Iterati
     if c.inertia != 0.0:
         jacobian = linear + c.inertia * system.convection_matrix(state.vector)
     factors = Factors.of(system.free_part(jacobian))
-    state.factorizations += 1
     if system.flow_component is not None:
         state.bordering = factors.solve(system.flow_load[system.free])
     return factors
@@ -198,9 +196,7 @@ def _centred(system: FlowSystem, vector: FloatArray) -> FloatArray:
     return shifted
 
 
-def _solution(
-    system: FlowSystem, c: Coefficients, settings: NewtonSettings, state: _Iteration, problem: str
-) -> FlowSolution:
+def _solution(system: FlowSystem, c: Coefficients, state: _Iteration, problem: str) -> FlowSolution:
     finite = np.all(np.isfinite(state.vector))
     vector = np.where(np.isfinite(state.vector), state.vector, 0.0)
     state.vector = _centred(system, vector) if system.enclosed else vector
@@ -209,7 +205,6 @@ def _solution(
     reaction[system.free] = 0.0
     scale = float(np.abs(reaction).max()) or 1.0
     velocity, pressure = system.space.split(state.vector)
-    update = state.update if np.isfinite(state.update) else float(settings.max_iterations)
     return FlowSolution(
         vector=state.vector,
         velocity=velocity,
@@ -221,11 +216,6 @@ def _solution(
             unknowns=int(system.free.size),
             iterations=state.iterations,
             relative_residual=float(np.abs(residual[system.free]).max()) / scale,
-            extra={
-                "factorizations": float(state.factorizations),
-                "pivoted": float(state.factors is not None and state.factors.pivoted),
-                "relative_update": update,
-            },
         ),
     )
 
@@ -256,7 +246,7 @@ def solve_flow(
         still = Coefficients(inertia=0.0, viscosity=coefficients.viscosity, rotation=coefficients.rotation)
         problem = _iterate(system, still, flow_rate, settings, state)
         if problem or coefficients.inertia == 0.0:
-            return _solution(system, still, settings, state, problem)
+            return _solution(system, still, state, problem)
         state.factors, state.update = None, np.inf
     else:
         vector = np.where(
@@ -264,7 +254,7 @@ def solve_flow(
         )
         state = _Iteration(vector=vector, gradient=start.driving_gradient, progress=progress)
     problem = _iterate(system, coefficients, flow_rate, settings, state)
-    return _solution(system, coefficients, settings, state, problem)
+    return _solution(system, coefficients, state, problem)
 
 
 Solve = Callable[[float, FlowSolution], FlowSolution]

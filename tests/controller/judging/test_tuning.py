@@ -51,6 +51,8 @@ def test_the_papers_disc_works_at_a_lower_pressure(paper: Tuning) -> None:
     assert paper.longer.verdict == MET
     by_level = {each.level: each for each in paper.along}
     assert by_level[min(by_level)].judgement.fraction.count == 0
+    # Too much pressure leaves too little moment.
+    assert by_level[max(by_level)].judgement.fraction.value < paper.recommended.fraction.low
     moments = [each.usable_moment[1] for each in paper.along if each.level > 0.55e6]
     assert moments == sorted(moments, reverse=True)
 
@@ -68,18 +70,6 @@ def test_too_little_pressure_is_told_from_capacity() -> None:
     outcomes = judged(balancer_of(bundled("liquid_ring_paper", gas__pressure="0.42 MPa")), {})
     assert outcomes.verdict == MISSED
     assert set(outcomes.outcomes.ended) == {"stalled"}
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_the_seed_moves_no_verdict(seed: int) -> None:
-    balancer = balancer_of(bundled("liquid_ring_paper", run__seed=seed))
-    assert judged(balancer, {}).verdict == MISSED
-    chosen = {
-        "gas.pressure": 0.57e6,
-        "controller.proportional": 0.06e6,
-        "controller.gas_time_offset": (1e-3,),
-    }
-    assert judged(balancer, chosen).verdict == MET
 
 
 def test_six_chambers_work_with_settings_of_their_own() -> None:

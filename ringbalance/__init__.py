@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ringbalance.controller.judging.tuning import Tuning as Tuning
     from ringbalance.controller.rotor import Sensor as Sensor
     from ringbalance.controller.simulation import Simulation as Simulation
+    from ringbalance.design.sweep import Sweep as Sweep
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from ringbalance.studies import fit as fit
     from ringbalance.studies import plot as plot
     from ringbalance.studies import run_cases as run_cases
+    from ringbalance.studies import sweep as sweep
     from ringbalance.studies import trade as trade
     from ringbalance.studies import write_report as write_report
     from ringbalance.verification.extremes.study import Extremes as Extremes
@@ -62,6 +64,11 @@ register(
     balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
 )
 register_function("with_values", place="ringbalance.scene.changes:with_values")
+register_function("sobol", place="ringbalance.design.sobol:sobol")
+register_function("sweep_figures", place="ringbalance.reports.sweep_figures:sweep_figures")
+register_function("pandas_frame", place="pandas:DataFrame")
+register_function("xarray_array", place="xarray:DataArray")
+register_function("xarray_dataset", place="xarray:Dataset")
 register_function("scene_lines", place="ringbalance.scene.describe:scene_lines")
 
 _NAMES = {
@@ -81,6 +88,7 @@ _NAMES = {
     "controller.rotor": ("Sensor",),
     "controller.simulation": ("Simulation",),
     "controller.judging.tuning": ("Tuning",),
+    "design.sweep": ("Sweep",),
     "face": (
         "compare",
         "simulate",
@@ -107,6 +115,7 @@ _NAMES = {
         "fit",
         "plot",
         "run_cases",
+        "sweep",
         "trade",
         "write_report",
     ),

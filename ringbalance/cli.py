@@ -43,6 +43,10 @@ COMMANDS = {
         "ringbalance.controller.cli:tune",
         "Recommended gain, its margins, and the settling times under it.",
     ),
+    "sweep": (
+        "ringbalance.design.cli:sweep",
+        "Many designs: a row of answers for every point of a grid or a sample.",
+    ),
     "fit": (
         "ringbalance.reports.fit_cli:fit",
         "Parameters of a built disc from measurements, with intervals and what the data identify.",

@@ -13,6 +13,7 @@ from typing import Any, Final
 _LONGEST_VALUE, _LONGEST_LIST, _DEEPEST = 60, 10, 4
 MOST_PARTS: Final = 50
 """Of a dotted key. Time and memory of `tomllib` grow with the square: 3.5 GB for one key of 30,000 parts."""
+_JSON: Final = json.JSONEncoder(ensure_ascii=False)
 _QUOTED: Final = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'')
 _LONG_KEY: Final = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}")
 
@@ -55,7 +56,7 @@ def _value_text(value: Any, *, indent: str = "") -> str:
             return "[\n" + "".join(f"{indent}{item},\n" for item in items) + "]"
         return "[" + ", ".join(items) + "]"
     # JSON's escapes are TOML's, but TOML asks for one more.
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return _JSON.encode(value).replace("\x7f", "\\u007f")
 
 
 def toml_text(value: object) -> str:

@@ -93,7 +93,7 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
             found[stated.quantity] = stated.absolute(value)
     fitted = zip(scene.fitted.quantities, scene.fitted.deviations.tolist(), strict=True)
     found |= {each.key: NORMAL_95 * size for each, size in fitted if each.key in UNCERTAIN_QUANTITIES}
-    return {name: width for name, width in found.items() if width > 0}
+    return {name: width for name, width in found.items() if np.any(np.greater(width, 0))}
 
 
 def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:
@@ -104,18 +104,20 @@ def shifted(*, scene: Scene, quantity: str, change: float) -> Scene:
     value = nominal_value(scene=scene, quantity=quantity)
     if value is None:
         raise ValueError(f"the scene has no {quantity}")
-    low, high = 0.0 if quantity in _MAY_VANISH else 0.1 * value, math.inf
+    low: Any = 0.0 if quantity in _MAY_VANISH else 0.1 * value
+    high: Any = math.inf
     if quantity == "length":
-        low = max(low, sum(b.angle * b.radius for b in scene.tube.bends))
+        low = np.maximum(low, sum(b.angle * b.radius for b in scene.tube.bends))
     if quantity == "hump_position":
         low, high = 0.0, 1.0
     if quantity == "hump_radius":
         high = scene.tube.port_radius
-    if quantity == "port_radius":
-        low = scene.tube.hump_radius or low
-    if value <= 0:
-        low = min(value, 0.0)
-    return with_value(scene=scene, quantity=quantity, value=min(max(value + change, low), high))
+    if quantity == "port_radius" and scene.tube.hump_radius is not None:
+        low = scene.tube.hump_radius
+    low = np.where(np.less_equal(value, 0), np.minimum(value, 0.0), low)
+    moved = np.minimum(np.maximum(value + change, low), high)
+    # Arrays where the scene is many designs.
+    return with_value(scene=scene, quantity=quantity, value=moved if moved.ndim else float(moved))
 
 
 def _table_of(quantity: str) -> str:

@@ -12,6 +12,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from importlib import resources
 from types import MappingProxyType
 
@@ -133,6 +134,10 @@ def parse_quantity(text: object, dimension: str) -> float:
     Raises: FieldError: not such a quantity; the error says what is wrong and which units exist.
     Range: magnitudes up to `Dimension.largest`; a temperature above absolute zero.
     """
+    return _parsed_text(text, dimension) if isinstance(text, str) else _parsed(text, dimension)
+
+
+def _parsed(text: object, dimension: str) -> float:
     kind = DIMENSIONS[dimension]
     number, unit_text = _split(text, kind)
     unit = kind.units.get(_canonical(unit_text))
@@ -142,6 +147,12 @@ def parse_quantity(text: object, dimension: str) -> float:
     if kind is DIMENSIONS["temperature"] and value <= 0:
         raise FieldError("it lies at or below absolute zero", "a temperature above 0 K (-273.15 degC)")
     return value
+
+
+@lru_cache(4096)
+def _parsed_text(text: str, dimension: str) -> float:
+    """Scenes of a sweep have most of their texts in common."""
+    return _parsed(text, dimension)
 
 
 def parse_number(text: str) -> float:

@@ -33,6 +33,7 @@ _FIRST: Final = (
     "reports/test_eccentric_report.py",
     "controller",
     "identification",
+    "design",
     "reports",
     "verification",
 )

@@ -78,9 +78,9 @@ def test_the_page_on_python_runs() -> None:
     """Each block in turn, in a process of its own, because the pool starts others."""
     blocks = [body for language, body in FENCE.findall(text("docs/python.md")) if language == "python"]
     checks = (
-        "assert [flow.velocity.shape, len(designs), len(again)] == [(2,), 3, 3]\n"
+        "assert [flow.velocity.shape, len(velocities), len(again)] == [(2,), 12, 2]\n"
         "assert reasons and 0.05 < lever_arm < 0.1\n"
-        "assert velocities == [design.operating_point.velocity for design in again]\n"
+        "assert abs(velocities[table.best][0] / again[1].operating_point.velocity - 1) < 1e-6\n"
         "assert 'OneChamber' in repr(own) and own.injections\n"
         "assert slower.law == 'Throttled' and 'tube inertia' in slower.status\n"
     )

@@ -36,6 +36,7 @@ BY_NAME: Final = {
     *(f"quantities.{MODELS}.{each}" for each in ("models", "work", "fixed_work")),
     f"times.{MODELS}",
     *("findings.values", "findings.change"),
+    *("verdicts", "best.changes"),
     *("ended", "own.ended", "clipped", "along.levels.settings", "tried.settings"),
     *(f"{each}.{key}" for each in ("remedies", "valves") for key in ("changes", "settings")),
     *("numbers", "tables.columns", "tables.units", "endings", "loop_endings", "violations.point"),
@@ -181,6 +182,11 @@ def test_keys_of_compare(folder: Path, printed: Any) -> None:
 
 def test_keys_of_trade(printed: Any) -> None:
     compare("`trade --json`", [printed("trade", PAPER, "--level", "light")])
+
+
+def test_keys_of_sweep(printed: Any, tmp_path: Path) -> None:
+    words = ("sweep", PAPER, "--vary", "tube.bore=1mm:2mm:2", "--out", tmp_path, "--check", 1, "--no-figures")
+    compare("`sweep --json`", [printed(*words)])
 
 
 def test_keys_of_verify(printed: Any) -> None:

@@ -17,6 +17,7 @@ ROOM_ORDER = (
     "reduced_model",
     "controller",
     "identification",
+    "design",
     "verification",
     "reports",
 )

@@ -1,0 +1,334 @@
+"""What varies in a sweep: keys of a scene over a range or a list, several together, or whole tables of a CSV.
+
+An axis is written KEY=VALUES, where VALUES is a range `LOW:HIGH:COUNT`, even steps, or `LOW:HIGH:COUNT:log`;
+a list `A,B,C`; or, for the name of a table, a CSV file whose columns are keys of it and whose rows are things
+to choose from.  Keys that move together stand in one axis: `tube.bore=1mm,2mm,tube.length=0.3m,0.4m`.
+A sample needs no COUNT.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.draws import quantiles
+from ringbalance.scene.faults import Fault, SceneError, did_you_mean
+from ringbalance.scene.keys.fields import Reader
+from ringbalance.scene.keys.schema import ORIGIN, Schema
+from ringbalance.scene.kinds import scene_kind
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.registry import registered
+from ringbalance.scene.toml import read_toml
+from ringbalance.scene.units import DIMENSIONS, FieldError
+
+Point = Mapping[str, Any]
+"""Changed values by path, as `SceneFile.with_values` takes them: SI, or text."""
+
+MOST_POINTS: Final = 1_000_000
+NAME: Final = "name"
+"""Column of a CSV file that names a row, where the table has no such key."""
+_SAMPLES: Final = ("sobol", "latin")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Range:
+    """A key between two values, SI."""
+
+    low: float
+    high: float
+    count: int | None = None
+    """Of even steps; None: for a sample alone."""
+    log: bool = False
+    """Whether the steps are even in the logarithm."""
+
+    def at(self, share: FloatArray) -> FloatArray:
+        """Values at fractions of the way from one end to the other; the ends exactly."""
+        low, high = (math.log(end) if self.log else end for end in (self.low, self.high))
+        value = low + share * (high - low)
+        inner = np.exp(value) if self.log else value
+        return np.where(share == 0, self.low, np.where(share == 1, self.high, inner))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """Keys that move together."""
+
+    ranges: Mapping[str, Range]
+    """By path; empty for a list."""
+    choices: tuple[Point, ...] = ()
+    """Of a list, one after the other."""
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Of the keys."""
+        return tuple(self.ranges or dict.fromkeys(path for each in self.choices for path in each))
+
+    def grid(self) -> tuple[Point, ...]:
+        """Every value of the axis. Raises: SceneError: a range without the number of its steps."""
+        if not self.ranges:
+            return self.choices
+        counts = {each.count for each in self.ranges.values()}
+        (count,) = counts if len(counts) == 1 else (None,)
+        if count is None:
+            raise _fault(self.paths[0], "a grid needs as many steps of each key", "LOW:HIGH:COUNT")
+        return self.at(np.linspace(0.0, 1.0, count) if count > 1 else np.zeros(1))
+
+    def at(self, shares: FloatArray) -> tuple[Point, ...]:
+        """Values at fractions of the axis, in [0, 1]."""
+        if not self.ranges:
+            places = np.minimum(shares * len(self.choices), len(self.choices) - 1).astype(int)
+            return tuple(self.choices[place] for place in places.tolist())
+        columns = {path: each.at(shares).tolist() for path, each in self.ranges.items()}
+        return tuple(dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Axes, and how points are taken from them."""
+
+    axes: tuple[Axis, ...]
+    sample: str = ""
+    """ "sobol:1024" or "latin:1024"; empty: every combination."""
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Of all keys that vary."""
+        return tuple(path for axis in self.axes for path in axis.paths)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the axes of a grid; of a sample its number of points alone."""
+        return (len(self.points()),) if self.sample else tuple(len(axis.grid()) for axis in self.axes)
+
+    def points(self) -> tuple[Point, ...]:
+        """All points; those of a grid with the last axis fastest.
+
+        Raises: SceneError: no axis or too many points, or a sample that is none.
+        """
+        if not self.axes:
+            raise _fault("", "nothing varies", 'at least one axis, such as "tube.bore=0.5mm:2mm:30"')
+        if len(set(self.paths)) < len(self.paths):
+            twice = next(path for path in self.paths if self.paths.count(path) > 1)
+            raise _fault(twice, "it varies twice", "each key in one axis")
+        if self.sample:
+            shares = _shares(self.sample, len(self.axes))
+            parts = [axis.at(column) for axis, column in zip(self.axes, shares.T, strict=True)]
+            return tuple(_merged(row) for row in zip(*parts, strict=True))
+        grids = [axis.grid() for axis in self.axes]
+        if (count := math.prod(map(len, grids))) > MOST_POINTS:
+            raise _fault("", f"{count} points", f"at most {MOST_POINTS}; a sample takes as many as it says")
+        return tuple(map(_merged, product(*grids)))
+
+
+def _merged(parts: Sequence[Point]) -> Point:
+    return {path: value for part in parts for path, value in part.items()}
+
+
+def _shares(sample: str, axes: int) -> FloatArray:
+    """Points of a sample in the unit cube, shape (n, axes)."""
+    kind, _, text = sample.partition(":")
+    if kind not in _SAMPLES or not text.isdecimal() or not 1 <= int(text) <= MOST_POINTS:
+        allowed = f"one of {', '.join(f'{each}:N' for each in _SAMPLES)} with at most {MOST_POINTS} points"
+        problem = "this is no sample"
+        raise SceneError.of_option(option="--sample", value=sample, problem=problem, allowed=allowed)
+    count = int(text)
+    if kind == "latin":
+        columns = [quantiles(f"axis {place}", range(count), seed=0) for place in range(axes)]
+        return np.stack(columns, axis=-1)
+    found: FloatArray = registered("function", "sobol")(axes, count)
+    return found
+
+
+def plan_of(scene: SceneFile, vary: Mapping[Any, Any], *, sample: str = "") -> Plan:
+    """A plan from values in Python.
+
+    Args: `vary`: by path, an array, SI, a list of values as a scene file has them, or the text of an axis
+        behind its "="; by a tuple of paths, one such list for each; by the name of a table, a list of
+        mappings from its keys, or a CSV file.
+    Raises: SceneError: everything that is wrong with it.
+    """
+    axes: list[Axis] = []
+    faults: list[Fault] = []
+    for name, values in vary.items():
+        try:
+            axes.append(_axis_of(scene, name, values))
+        except SceneError as error:
+            faults += error.faults
+    if faults:
+        raise SceneError(faults)
+    return Plan(axes=tuple(axes), sample=sample)
+
+
+def plan_of_texts(scene: SceneFile, texts: Sequence[str], *, sample: str = "") -> Plan:
+    """A plan from axes as the command line has them, each KEY=VALUES; see `plan_of`."""
+    axes: list[Axis] = []
+    faults: list[Fault] = []
+    for text in texts:
+        try:
+            axes.append(_axis_of_text(scene, text, folder=Path()))
+        except SceneError as error:
+            faults += error.faults
+    if faults:
+        raise SceneError(faults)
+    return Plan(axes=tuple(axes), sample=sample)
+
+
+def plan_of_file(scene: SceneFile, file: Path) -> Plan:
+    """A plan from a TOML file with `vary`, a list of axes as the command line has them, and `sample`.
+
+    Raises: SceneError: it cannot be read, or anything in it is wrong.
+    """
+    try:
+        content = read_toml(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise SceneError.of_file(str(file), f"the plan cannot be read: {error}") from error
+    texts, sample = content.pop("vary", None), content.pop("sample", "")
+    if content or not isinstance(texts, list) or not isinstance(sample, str):
+        problem = f"unknown key {next(iter(content))}" if content else "it is no plan"
+        raise SceneError.of_file(str(file), problem, 'vary = ["tube.bore=0.5mm:2mm:30"], sample = "sobol:64"')
+    axes = tuple(_axis_of_text(scene, str(text), folder=file.parent) for text in texts)
+    return Plan(axes=axes, sample=sample)
+
+
+def _axis_of_text(scene: SceneFile, text: str, *, folder: Path) -> Axis:
+    """Of KEY=VALUES, or of several with commas between."""
+    keys: list[tuple[str, list[str]]] = []
+    for part in text.split(","):
+        path, equals, value = part.partition("=")
+        if equals:
+            keys.append((path.strip(), [value.strip()]))
+        elif keys:
+            keys[-1][1].append(part.strip())
+        else:
+            raise _fault(text, "no key stands before a sign =", "KEY=VALUES, such as tube.bore=0.5mm:2mm:30")
+    if len(keys) == 1 and keys[0][0] in scene_kind(scene.balancer).schema.tables:
+        return _table_axis(scene, keys[0][0], folder / keys[0][1][0])
+    return _linked([_values(scene, path, values) for path, values in keys], keys[0][0])
+
+
+def _axis_of(scene: SceneFile, name: Any, values: Any) -> Axis:
+    if isinstance(name, tuple):
+        return _linked([_values(scene, path, each) for path, each in zip(name, values, strict=True)], name[0])
+    if name in scene_kind(scene.balancer).schema.tables:
+        if isinstance(values, str | Path):
+            return _table_axis(scene, name, Path(values))
+        rows = tuple({f"{name}.{key}": value for key, value in row.items()} for row in values)
+        return Axis(ranges={}, choices=rows)
+    return _linked([_values(scene, name, values)], name)
+
+
+def _linked(parts: Sequence[tuple[str, Range | list[Any]]], path: str) -> Axis:
+    """Keys that move together: all over ranges, or all over lists of one length."""
+    ranges = {path: each for path, each in parts if isinstance(each, Range)}
+    lists = {path: each for path, each in parts if isinstance(each, list)}
+    if not lists:
+        return Axis(ranges=ranges)
+    if ranges or len({len(each) for each in lists.values()}) != 1 or not next(iter(lists.values())):
+        raise _fault(path, "keys of one axis differ in kind or number of values", "as many values of each")
+    rows = zip(*lists.values(), strict=True)
+    return Axis(ranges={}, choices=tuple(dict(zip(lists, row, strict=True)) for row in rows))
+
+
+def _values(scene: SceneFile, path: str, given: Any) -> tuple[str, Range | list[Any]]:
+    """A key's range or list, read by the key's own reader."""
+    reader = _reader(scene, path)
+    if isinstance(given, str):
+        given = given.split(",")
+    given = given.tolist() if hasattr(given, "tolist") else list(given)
+    if len(given) == 1 and isinstance(given[0], str) and ":" in given[0]:
+        return path, _range(path, given[0], reader)
+    return path, [_checked(path, each, reader) for each in given]
+
+
+def _range(path: str, text: str, reader: Reader) -> Range:
+    low, high, *more = text.split(":")
+    log = bool(more) and more[-1] == "log"
+    counts = more[:-1] if log else more
+    if len(counts) > 1 or not all(each.isdecimal() and int(each) > 0 for each in counts):
+        raise _fault(f"{path}={text}", "this is no range", "LOW:HIGH:COUNT or LOW:HIGH:COUNT:log")
+    ends = [_read(path, end, reader) for end in (low, high)]
+    if not all(isinstance(end, float) for end in ends) or (log and min(ends) <= 0):
+        raise _fault(f"{path}={text}", "this key has no such range", "a list A,B,C")
+    return Range(low=ends[0], high=ends[1], count=int(counts[0]) if counts else None, log=log)
+
+
+def _read(path: str, text: str, reader: Reader) -> Any:
+    try:
+        return reader.read(_as_toml(text, reader))
+    except FieldError as error:
+        raise _fault(f"{path}={text}", error.problem, error.allowed) from error
+
+
+def _checked(path: str, value: Any, reader: Reader) -> Any:
+    """A value of a list as a scene takes it: numbers in SI."""
+    if not isinstance(value, str):
+        return value
+    read = _read(path, value, reader)
+    return read if isinstance(read, int | float) else value
+
+
+def _as_toml(text: str, reader: Reader) -> Any:
+    """Text as a scene file would have it, where a key without unit takes a number."""
+    if reader.dimension is None:
+        for number in (int, float):
+            try:
+                return number(text)
+            except ValueError:
+                continue
+    return text
+
+
+def _reader(scene: SceneFile, path: str) -> Reader:
+    """Raises: SceneError: the scene's kind has no such key, or one with a table in it."""
+    schema: Schema = scene_kind(scene.balancer).schema
+    table, _, key = str(path).partition(".")
+    declared = schema.tables[table].keys.get(key) if table in schema.tables else None
+    if declared is None or key == ORIGIN or not isinstance(declared.takes, Reader):
+        known = [f"{name}.{each}" for name, content in schema.tables.items() for each in content.keys]
+        problem = f"a scene of this kind has no such key{did_you_mean(str(path), known)}"
+        raise _fault(str(path), problem, "TABLE.KEY=VALUES, or TABLE=FILE.csv")
+    return declared.takes
+
+
+def _table_axis(scene: SceneFile, table: str, file: Path) -> Axis:
+    """Rows of a CSV file, each of which sets some keys of a table; an empty cell takes the key away."""
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as stream:
+            rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
+    except (OSError, ValueError, csv.Error) as error:
+        raise _fault(f"{table}={file}", f"the file cannot be read: {error}", "a CSV file") from error
+    keys = scene_kind(scene.balancer).schema.tables[table].keys
+    columns = [key for key in (rows[0] if rows else ()) if key != NAME or NAME in keys]
+    if not columns or any(None in row or None in row.values() for row in rows):
+        raise _fault(
+            f"{table}={file}", "it has no rows, or rows of other lengths", "a line of keys, then rows"
+        )
+    readers = {key: _reader(scene, f"{table}.{key}") for key in columns}
+    return Axis(
+        ranges={},
+        choices=tuple(
+            {
+                f"{table}.{key}": _checked(f"{table}.{key}", text, reader) if (text := row[key]) else None
+                for key, reader in readers.items()
+            }
+            for row in rows
+        ),
+    )
+
+
+def unit_of_path(scene: SceneFile, path: str) -> str:
+    """SI unit of a key; "1" for one without."""
+    dimension = _reader(scene, path).dimension
+    return next(iter(DIMENSIONS[dimension].units)) if dimension else "1"
+
+
+def _fault(value: str, problem: str, allowed: str) -> SceneError:
+    return SceneError.of_option(option="--vary", value=value, problem=problem, allowed=allowed)

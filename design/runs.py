@@ -1,0 +1,50 @@
+"""Closed-loop runs of one point over drawn devices, through the `Balancer` of its scene."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.judging.judge import judged_all
+from ringbalance.design.axes import Point
+from ringbalance.design.static import FAULTS, REFUSED, Record, point_scene, refusal
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.origins import SceneFile
+
+
+def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
+    """What the first `runs` drawn devices of a point come to under the settings of its scene, plain data.
+
+    Returns: `fraction` that meets all that the scene requires, `low` and `high` (Wilson, 95 %), `verdict`,
+        `settling_time` within which the fraction asked for has settled, s, and `settling_time_high`, its
+        upper bound (both None where too few settle), `ended` (devices by code), `finding`.
+    """
+    try:
+        balancer = balancer_of(point_scene(scene, point))
+        (judgement,) = judged_all(balancer, [{}], first=runs, most=runs)
+    except (SceneError, *FAULTS) as error:
+        return {**EMPTY, "verdict": REFUSED, "finding": refusal(error)}
+    time, high = judgement.settling_time(judgement.asked) or (None, None)
+    return {
+        "fraction": judgement.fraction.value,
+        "low": judgement.fraction.low,
+        "high": judgement.fraction.high,
+        "verdict": judgement.verdict,
+        "settling_time": time,
+        "settling_time_high": high,
+        "ended": dict(Counter(judgement.outcomes.ended)),
+        "finding": None,
+    }
+
+
+EMPTY: Record = {
+    "fraction": None,
+    "low": None,
+    "high": None,
+    "verdict": "",
+    "settling_time": None,
+    "settling_time_high": None,
+    "ended": {},
+    "finding": None,
+}
+"""Of a point without runs."""

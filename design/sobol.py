@@ -1,0 +1,13 @@
+"""Sobol's sequence, apart from `axes.py` because scipy.stats takes half a second to load."""
+
+from __future__ import annotations
+
+from scipy.stats.qmc import Sobol
+
+from ringbalance.scene.arrays import FloatArray
+
+
+def sobol(axes: int, count: int) -> FloatArray:
+    """The first points of the sequence in the unit cube, scrambled after Owen, shape (count, axes)."""
+    whole: FloatArray = Sobol(axes, rng=0).random(1 << max(count - 1, 0).bit_length())
+    return whole[:count]

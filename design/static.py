@@ -1,0 +1,184 @@
+"""Static answers of many designs: liquid rings through the array core, other balancers one by one.
+
+An interval is that by all uncertain inputs of the scene, 95 %: each input moved to both sides, the effects by
+the root of the sum of their squares.  The models' own uncertainty is what `calibrate` adds to it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.design.axes import Point
+from ringbalance.reduced_model.chamber.tilted_ring import check_ring
+from ringbalance.reduced_model.core import Answers
+from ringbalance.reduced_model.law.flow_law import Regime
+from ringbalance.results.rows import Finding, Quantity
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.changes import document_of
+from ringbalance.scene.designs import Designs, in_batches
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.uncertain import combined, input_sides
+
+Record = dict[str, Any]
+
+UNITS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "lambda": "m",
+        "chamber_volume": "m^3",
+        "wall_pressure": "Pa",
+        "moment": "kg m",
+        "velocity": "m/s",
+        "drag_coefficient": "1",
+        "stall_pressure": "Pa",
+        "residual_fill_ratio": "1",
+        "stalled_fill_ratio": "1",
+        "usable_moment": "kg m",
+        "reach": "kg m",
+        "loop_factor": "1",
+    }
+)
+"""SI unit of what is answered of a liquid ring, in the order of the table."""
+_FIELDS: Final = {"lambda": "moment_per_mass"}
+"""Names in `Answers` that differ."""
+BLOCKED: Final = "blocked"
+REFUSED: Final = "point_refused"
+"""Codes of findings of a point."""
+_NAMES: Final[Mapping[str, Any]] = MappingProxyType(
+    dict.fromkeys(("name", "file", "source", "sha256", "values_sha256"), "")
+    | dict.fromkeys(("origins", "defaulted"), ())
+    | {"checked": None}
+)
+"""Fields of scenes that differ in numbers alone, without their names: they go through the core together."""
+FAULTS: Final = (ValueError, ArithmeticError, RuntimeError)
+"""Besides `SceneError`, how a point may break down."""
+
+
+def point_scene(scene: SceneFile, point: Point) -> SceneFile:
+    """The scene of a point. Raises: SceneError: the changed values are refused."""
+    return scene.with_values(point)
+
+
+def refusal(error: Exception) -> Record:
+    """A failed point as a row: its finding."""
+    text = str(error.faults[0]) if isinstance(error, SceneError) else f"{type(error).__name__}: {error}"
+    return Finding(code=REFUSED, values={"text": text}).document()
+
+
+def static_rows(scene: SceneFile, points: Sequence[Point], *, intervals: bool = True) -> list[Record]:
+    """A row for each point, plain data.
+
+    Args: `intervals`: whether both sides of every uncertain input are answered too, 2 m + 1 designs a point.
+    Returns: By point `sha256` of its scene (empty where refused), `values` with pairs of value and
+        half-width (95 %, of the inputs; None: not known) by name, `units`, `status` and `finding`.
+    """
+    rows: list[Record] = []
+    scenes: list[Scene] = []
+    for point in points:
+        try:
+            made = point_scene(scene, point)
+            if isinstance(made, Scene):
+                check_ring(made)
+                scenes.append(replace(made, **_NAMES))
+                rows.append({"sha256": made.sha256})
+            else:
+                rows.append(_of_balancer(made))
+        except (SceneError, *FAULTS) as error:
+            rows.append(_failed(error))
+    answers = iter(_answered(scenes, intervals))
+    return [row if "status" in row else {**row, **next(answers)} for row in rows]
+
+
+def _failed(error: Exception) -> Record:
+    return {"sha256": "", "values": {}, "units": {}, "status": REFUSED, "finding": refusal(error)}
+
+
+def _answered(scenes: Sequence[Scene], intervals: bool) -> list[Record]:
+    """Of liquid rings; where the whole breaks down, one by one."""
+    if not scenes:
+        return []
+    try:
+        table = in_batches(scenes, partial(core_table, intervals=intervals))
+    except FAULTS as error:
+        if len(scenes) == 1:
+            return [_failed(error)]
+        return [row for each in scenes for row in _answered([each], intervals)]
+    return [_row(column) for column in table.T]
+
+
+def _row(column: FloatArray) -> Record:
+    values, widths = column[1 : 1 + len(UNITS)].tolist(), column[1 + len(UNITS) :].tolist()
+    pairs = {
+        name: [_plain(value), _plain(width)] for name, value, width in zip(UNITS, values, widths, strict=True)
+    }
+    blocked = int(column[0]) == Regime.BLOCKED
+    return {
+        "values": pairs,
+        "units": dict(UNITS),
+        "status": BLOCKED if blocked else "ok",
+        "finding": None,
+    }
+
+
+def _plain(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def core_table(designs: Designs, *, intervals: bool) -> FloatArray:
+    """Regimes, values and half-widths (95 %, of the inputs) of designs, (1 + 2 k, n); NaN: not known."""
+    answers = Answers.of(designs)
+    values = _values(answers)
+    widths = np.full(values.shape, np.nan)
+    if intervals:
+        moved = {
+            name: _moved(values, [_values(Answers.of(_like(designs, side))) for side in sides])
+            for name, sides in input_sides(designs.scene).items()
+        }
+        squares = [np.square(np.nan_to_num(each)) for each in combined(moved).values()]
+        widths = np.where(np.isnan(values), np.nan, np.sqrt(sum(squares, np.zeros(values.shape))))
+    return np.concatenate([answers.regime[np.newaxis].astype(np.float64), values, widths])
+
+
+def _values(answers: Answers) -> FloatArray:
+    return np.array([getattr(answers, _FIELDS.get(name, name)) for name in UNITS])
+
+
+def _like(designs: Designs, scene: Scene) -> Designs:
+    return Designs(scene=scene, size=designs.size)
+
+
+def _moved(values: FloatArray, sides: Sequence[FloatArray]) -> FloatArray:
+    """The larger change to either side."""
+    lower, higher = (np.abs(side - values) for side in sides)
+    return np.asarray(np.fmax(lower, higher))
+
+
+def _of_balancer(scene: SceneFile) -> Record:
+    """What a balancer without the array core knows of itself without a run."""
+    known = {each.key: each for each in balancer_of(scene).quantities() if each.value is not None}
+    return {
+        "sha256": scene.sha256,
+        "values": {name: [_plain(each.value or 0.0), _half_width(each)] for name, each in known.items()},
+        "units": {name: each.unit for name, each in known.items()},
+        "status": "ok",
+        "finding": None,
+    }
+
+
+def _half_width(quantity: Quantity) -> float | None:
+    ends = [end for end in (quantity.lower, quantity.upper) if end is not None and quantity.value is not None]
+    return max(abs(end - quantity.value) for end in ends) if len(ends) == 2 and quantity.value else None
+
+
+def content_of(scene: SceneFile) -> Record:
+    """All that decides a scene's answers, plain data: its document and the mesh that it names."""
+    return {"document": dict(document_of(scene)), "mesh": scene.mesh_digest}

@@ -1,0 +1,311 @@
+"""A sweep: a row of answers for every point of a plan, static and over drawn devices."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.design.axes import Plan, Point, unit_of_path
+from ringbalance.design.runs import EMPTY, run_row
+from ringbalance.design.static import Record, content_of, point_scene, static_rows
+from ringbalance.design.store import Store, key_of
+from ringbalance.design.trade import calibrated_row, chosen, errors
+from ringbalance.design.work import Done, Progress, Task, answers
+from ringbalance.results.numbers import given
+from ringbalance.results.requirements import MET
+from ringbalance.results.result import Result, Rows, Table, csv_text
+from ringbalance.results.rows import Finding, Quantity, around
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.registry import registered
+
+_TOGETHER: Final = 256
+"""Points that are answered in one batch: of one composition, since a batch's last bits may depend on it."""
+STORE: Final = "store"
+"""Folder of kept answers in that of a sweep."""
+_BEST: Final = "reach"
+"""What static rows are ranked by: the largest."""
+_OF_RUNS: Final = {
+    "fraction": ("fraction", "1"),
+    "low": ("fraction low", "1"),
+    "high": ("fraction high", "1"),
+    "settling_time": ("settling_time", "s"),
+    "settling_time_high": ("settling_time high", "s"),
+}
+"""Columns of runs: name and SI unit."""
+_EXTRA: Final = "this needs the package {0}: pip install {0}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Sweep(Result):
+    """A row for every point."""
+
+    scene: SceneFile
+    plan: Plan
+    points: tuple[Point, ...]
+    """Changed values, SI or text, by path."""
+    static: tuple[Record, ...]
+    """See `static_rows`."""
+    driven: tuple[Record, ...]
+    """See `run_row`."""
+    runs: int
+    """Drawn devices a point; 0: static alone."""
+    errors: tuple[Record, ...]
+    """By quantity, of what the array core leaves out, see `trade.errors`; empty where nothing was checked."""
+    designs_per_second: Mapping[str, float]
+    """Of what this run computed, "static" and "runs"; wall time."""
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """Of each point: what its runs say, else the status of its static row."""
+        pairs = zip(self.static, self.driven, strict=True)
+        return tuple(run["verdict"] if self.runs and row["sha256"] else row["status"] for row, run in pairs)
+
+    @property
+    def feasible(self) -> tuple[bool, ...]:
+        """Whether each point meets what the scene requires or, without runs, has a flow."""
+        return tuple(verdict == (MET if self.runs else "ok") for verdict in self.verdicts)
+
+    @property
+    def best(self) -> int | None:
+        """The feasible point that settles first or, without runs, reaches the largest unbalance."""
+        if self.runs:
+            ranked = [(each["settling_time"], i) for i, each in enumerate(self.driven)]
+        else:
+            ranked = [(row["values"].get(_BEST, (None,))[0], i) for i, row in enumerate(self.static)]
+            ranked = [(None if value is None else -value, i) for value, i in ranked]
+        return min(((v, i) for v, i in ranked if v is not None and self.feasible[i]), default=(0, None))[1]
+
+    def point_scene(self, row: int) -> SceneFile:
+        """The scene of a row. Raises: SceneError: the row was refused, or there is none."""
+        if not 0 <= row < len(self.points):
+            allowed = f"0 to {len(self.points) - 1}"
+            raise SceneError.of_option(option="--write", value=row, problem="no such row", allowed=allowed)
+        return point_scene(self.scene, self.points[row])
+
+    def columns(self) -> dict[str, list[Any]]:
+        """The table, by name with SI unit: changed keys, values, half-widths, verdicts, hash of the scene."""
+        return {f"{name} [{unit}]" if unit else name: values for name, unit, values in self.fields()}
+
+    def fields(self) -> list[tuple[str, str, list[Any]]]:
+        """Columns as name, SI unit (empty for texts and numbers of rows) and values."""
+        of_runs = _OF_RUNS if self.runs else {}
+        return [
+            ("row", "", list(range(len(self.points)))),
+            *(
+                (path, unit_of_path(self.scene, path), [point.get(path) for point in self.points])
+                for path in self.plan.paths
+            ),
+            *self._static_columns(),
+            *((name, unit, [run[key] for run in self.driven]) for key, (name, unit) in of_runs.items()),
+            ("status", "", [row["status"] for row in self.static]),
+            ("verdict", "", list(self.verdicts)),
+            ("finding", "", self.failures),
+            ("scene sha256", "", [row["sha256"] for row in self.static]),
+        ]
+
+    def _static_columns(self) -> Iterator[tuple[str, str, list[Any]]]:
+        units = {name: unit for row in self.static for name, unit in row["units"].items()}
+        for name, unit in units.items():
+            pairs = [row["values"].get(name, (None, None)) for row in self.static]
+            yield name, unit, [value for value, _ in pairs]
+            if any(width is not None for _, width in pairs):
+                yield f"{name} half-width", unit, [width for _, width in pairs]
+
+    @property
+    def failures(self) -> list[str]:
+        """Of each point: why it has no answer; empty where it has."""
+        pairs = zip(self.static, self.driven, strict=True)
+        return [
+            finding["values"]["text"] if (finding := row["finding"] or run["finding"]) else ""
+            for row, run in pairs
+        ]
+
+    def to_csv(self) -> str:
+        """`columns` as comma-separated values; an empty cell is not known."""
+        return csv_text(self.columns())
+
+    def to_pandas(self) -> Any:
+        """`columns` as a DataFrame. Raises: ModuleNotFoundError: without pandas."""
+        return _extra("pandas", "pandas_frame")(self.columns())
+
+    def to_xarray(self) -> Any:
+        """`columns` as a Dataset with units, over the axes of a grid or the rows of a sample.
+
+        Raises: ModuleNotFoundError: without xarray.
+        """
+        grids = self.grid()
+        names, shape = list(grids), tuple(map(len, grids.values()))
+        array, dataset = _extra("xarray", "xarray_array"), _extra("xarray", "xarray_dataset")
+        fields = {
+            name: array(_array(values).reshape(shape), dims=names, attrs={"units": unit})
+            for name, unit, values in self.fields()
+            if name not in names
+        }
+        return dataset(fields, coords=grids)
+
+    def grid(self) -> dict[str, list[Any]]:
+        """Values by path of a grid whose axes are one key each, the last fastest; else "row" with numbers."""
+        if self.plan.sample or any(len(axis.paths) != 1 for axis in self.plan.axes):
+            return {"row": list(range(len(self.points)))}
+        return {axis.paths[0]: [point[axis.paths[0]] for point in axis.grid()] for axis in self.plan.axes}
+
+    def plot(self, folder: str | PathLike[str]) -> tuple[Path, ...]:
+        """Draw the map or curves of the sweep into a folder: feasible points, their boundary, the best.
+
+        Returns: The files. Raises: OSError: they cannot be written.
+        """
+        files: tuple[Path, ...] = registered("function", "sweep_figures")(self, Path(folder))
+        return files
+
+    def to_dict(self) -> Record:
+        """What `ringbalance sweep --json` prints: the summary; the table is `columns`."""
+        scene, best = self.scene, self.best
+        return {
+            "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
+            "balancer": scene.balancer,
+            "keys": [{"path": path, "unit": unit_of_path(scene, path)} for path in self.plan.paths],
+            "sample": self.plan.sample,
+            "points": len(self.points),
+            "runs": self.runs,
+            "verdicts": dict(Counter(self.verdicts)),
+            "best": None if best is None else {"row": best, "changes": dict(self.points[best])},
+            "left_out": list(self.errors),
+            "times": dict(self.designs_per_second),
+            **self.rows().document(),
+        }
+
+    def rows(self) -> Rows:
+        """How many points meet what is required, the best of them, and what the core leaves out."""
+        quantities = [
+            Quantity(
+                key=f"{name}_designs_per_second",
+                name=f"designs, {name}",
+                value=rate,
+                unit="designs a second",
+                digits=3,
+            )
+            for name, rate in self.designs_per_second.items()
+        ]
+        return Rows(
+            title=f"Sweep of {self.scene.name} ({self.scene.source})",
+            quantities=tuple(quantities),
+            findings=tuple(self._findings()),
+            tables=(self._verdict_table(), self._best_table()),
+        )
+
+    def _findings(self) -> list[Finding]:
+        count, total, best = sum(self.feasible), len(self.points), self.best
+        numbers = {"count": count, "total": total, "runs": self.runs}
+        found = [Finding(code="sweep_met" if self.runs else "sweep_flows", values=numbers)]
+        if best is not None:
+            found.append(Finding(code="sweep_best", values={"row": best, "changes": self._change_text(best)}))
+        if failed := [text for text in self.failures if text]:
+            found.append(Finding(code="sweep_refused", values={"count": len(failed), "text": failed[0]}))
+        found += [Finding(code="sweep_left_out", values=each) for each in self.errors]
+        return found
+
+    def _change_text(self, row: int) -> str:
+        return ", ".join(
+            f"{path} = {given(value, unit_of_path(self.scene, path)) if isinstance(value, float) else value}"
+            for path, value in self.points[row].items()
+        )
+
+    def _verdict_table(self) -> Table:
+        counts = Counter(self.verdicts)
+        return Table(heads=("verdict", "points"), rows=[(name, str(n)) for name, n in counts.most_common()])
+
+    def _best_table(self) -> Table:
+        best = self.best
+        if best is None:
+            return Table(heads=("quantity", "value"), rows=[])
+        row = self.static[best]
+        known = [
+            (name, value, width or 0.0) for name, (value, width) in row["values"].items() if value is not None
+        ]
+        cells = []
+        for name, value, width in known:
+            low, high = around(value, width)
+            shown = Quantity(key=name, name=name, value=value, unit=row["units"][name], lower=low, upper=high)
+            cells.append((name, shown.text))
+        return Table(caption=f"Row {best}", heads=("quantity", "value"), rows=cells)
+
+
+def _array(values: Sequence[Any]) -> Any:
+    """Numbers with NaN for what is not known, or texts."""
+    if all(value is None or isinstance(value, int | float) for value in values):
+        return np.array([math.nan if value is None else value for value in values])
+    return np.array(values, dtype=object)
+
+
+def _extra(package: str, name: str) -> Any:
+    try:
+        return registered("function", name)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(_EXTRA.format(package)) from error
+
+
+def run_sweep(
+    scene: SceneFile,
+    plan: Plan,
+    *,
+    runs: int = 0,
+    intervals: bool = True,
+    check: int = 0,
+    store: Path | None = None,
+    executor: Executor | None = None,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Sweep:
+    """Answer every point of a plan; see `sweep`."""
+    points = plan.points()
+    rates: dict[str, float] = {}
+
+    def shown(done: Done) -> None:
+        if done.computed:
+            rates[done.what] = done.rate
+        if progress is not None:
+            progress(done)
+
+    deal = partial(answers, store=Store(folder=store) if store else None, progress=shown)
+    everywhere = partial(deal, executor=executor, workers=workers)
+    content = content_of(scene)
+    batches = [points[start : start + _TOGETHER] for start in range(0, len(points), _TOGETHER)]
+    tasks = [
+        _task(content, partial(static_rows, scene, each, intervals=intervals), each, intervals)
+        for each in batches
+    ]
+    static = [row for rows in everywhere("static", tasks) for row in rows]
+    driven = [EMPTY for _ in points]
+    places = [i for i, row in enumerate(static) if row["sha256"]] if runs else []
+    tasks = [_task(content, partial(run_row, scene, points[i], runs), [points[i]], runs) for i in places]
+    for i, row in zip(places, everywhere("runs", tasks) if places else [], strict=True):
+        driven[i] = row
+    places = chosen(static, check)
+    tasks = [_task(content, partial(calibrated_row, scene, points[i]), [points[i]]) for i in places]
+    finer = deal("calibrate", tasks, executor=None) if places else []
+    return Sweep(
+        scene=scene,
+        plan=plan,
+        points=points,
+        static=tuple(static),
+        driven=tuple(driven),
+        runs=runs,
+        errors=tuple(errors([static[i] for i in places], finer)),
+        designs_per_second=rates,
+    )
+
+
+def _task(content: Record, call: partial[Any], points: Sequence[Point], *options: float) -> Task:
+    """A task that is kept by all that its answer follows from."""
+    name = {"call": call.func.__name__, "scene": content, "points": [*points], "options": options}
+    return Task(key=key_of(name), call=call, weight=len(points))

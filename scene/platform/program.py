@@ -1,0 +1,42 @@
+"""Which program this is: what another version computed, or another version of a package, is not reused."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+_PACKAGES: Final = ("numpy", "scipy", "numba", "fluids", "scikit-fem")
+"""Whose versions may change a number."""
+_ROOMS: Final = (
+    *("scene", "results", "mesh", "physics", "reduced_model", "controller", "identification"),
+    *("design", "verification"),
+)
+_SUFFIXES: Final = frozenset({".py", ".toml", ".csv", ".json", ".xz"})
+
+
+@cache
+def program_digest() -> str:
+    """Digest of the files that decide an answer, the packages below them and the kind of processor."""
+    known = [
+        platform.python_version(),
+        platform.machine(),
+        *(f"{name} {_version(name)}" for name in _PACKAGES),
+    ]
+    found = hashlib.sha256("\n".join(known).encode())
+    for room in _ROOMS:
+        folder = Path(str(files(f"ringbalance.{room}")))
+        for path in sorted(path for path in folder.rglob("*") if path.suffix in _SUFFIXES):
+            found.update(f"\n{room} {path.relative_to(folder)}\n".encode() + path.read_bytes())
+    return found.hexdigest()
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""

@@ -1,0 +1,183 @@
+"""A sweep's rows: those of a calibration and of the balancers' runs, by whomever they are computed."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ringbalance as rb
+from ringbalance.controller.balancer import Draws, balancer_of
+from ringbalance.controller.judging.judge import FRESH
+from ringbalance.design.store import Store
+from ringbalance.design.work import bundle_size
+from ringbalance.scene.models import Scene
+
+VARY = {"tube.bore": "0.6mm:2mm:4:log", "gas.pressure": np.linspace(0.3e6, 0.9e6, 3)}
+
+
+def table(sweep: rb.Sweep) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(sweep.to_csv())))
+
+
+def test_static_rows_are_those_of_a_calibration(paper_scene: Scene) -> None:
+    """On drawn designs, gravity included where the shaft lies; intervals by the inputs too."""
+    scene = paper_scene.with_values({"environment.gravity": 0.0})
+    vary = {"tube.bore": "0.7mm:2.5mm", "rotor.speed": "5000rpm:7000rpm", "gas.pressure": "0.5MPa:1MPa"}
+    found = rb.sweep(scene, vary, sample="latin:6", check=6)
+    for row in range(6):
+        budgets = rb.calibrate(found.point_scene(row)).budgets
+        assert found.static[row]["sha256"] == found.point_scene(row).sha256
+        for name, (value, width) in found.static[row]["values"].items():
+            if name in budgets:
+                assert value == pytest.approx(budgets[name].value, rel=3e-6, abs=1e-9), name
+                assert width == pytest.approx(budgets[name].input, rel=1e-3, abs=1e-9), name
+    assert {each["quantity"] for each in found.errors} >= {"lambda", "velocity", "usable_moment"}
+    assert all(each["error"] < 1e-4 for each in found.errors)
+
+
+def test_runs_are_those_of_the_balancer(paper_scene: Scene) -> None:
+    found = rb.sweep(paper_scene, {"gas.pressure": ["0.42 MPa", "0.7 MPa"]}, runs=8, intervals=False)
+    for row, run in enumerate(found.driven):
+        balancer = balancer_of(found.point_scene(row))
+        outcomes = balancer.run({}, Draws.block(FRESH, 8))
+        met = np.all([each.met(outcomes) for each in balancer.demands()], axis=0)
+        assert run["fraction"] == np.mean(met)
+    assert found.driven[0]["fraction"] < found.driven[1]["fraction"]
+    assert found.verdicts[0] == "not met"
+
+
+def test_eccentric_masses_have_their_own_rows() -> None:
+    scene = rb.load_scene(rb.bundled_scene("driven_masses_small"))
+    found = rb.sweep(scene, {"masses.mass": np.array([1.0, 1.1]) * scene.masses.mass}, runs=1)  # type: ignore[attr-defined]
+    reach = [row["values"]["reach"][0] for row in found.static]
+    assert reach[1] == pytest.approx(1.1 * reach[0])
+    assert all(0 <= run["fraction"] <= 1 for run in found.driven)
+
+
+def test_a_point_that_is_refused_is_a_row(paper_scene: Scene) -> None:
+    found = rb.sweep(paper_scene, {"tube.hump_radius": ["30 mm", "500 mm"]}, runs=1)
+    assert [row["status"] for row in found.static] == ["ok", "point_refused"]
+    assert "hump_radius" in found.failures[1]
+    assert table(found)[1]["velocity [m/s]"] == ""
+    assert found.best in (0, None)
+
+
+def test_axes_of_every_kind_make_the_same_points(paper_scene: Scene, tmp_path: Path) -> None:
+    (tmp_path / "valves.csv").write_text(
+        "name,conductance,critical_ratio,valve_lag\nslow,0.5 l/(s*bar),0.3,5 ms\nfast,2 l/(s*bar),0.3,2 ms\n"
+    )
+    rows = [
+        {"conductance": f"{each} l/(s*bar)", "critical_ratio": 0.3, "valve_lag": lag}
+        for each, lag in (("0.5", "5 ms"), ("2", "2 ms"))
+    ]
+    by_file = rb.sweep(paper_scene, {"gas": tmp_path / "valves.csv"}, intervals=False)
+    by_rows = rb.sweep(paper_scene, {"gas": rows}, intervals=False)
+    assert [row["values"] for row in by_file.static] == [row["values"] for row in by_rows.static]
+    assert by_file.point_scene(1).gas.valve_lag == 2e-3  # type: ignore[attr-defined]
+    linked = rb.sweep(
+        paper_scene, {("tube.bore", "tube.length"): (["1 mm", "2 mm"], [0.3, 0.4])}, intervals=False
+    )
+    assert [dict(point) for point in linked.points] == [
+        {"tube.bore": 1e-3, "tube.length": 0.3},
+        {"tube.bore": 2e-3, "tube.length": 0.4},
+    ]
+    sobol = rb.sweep(
+        paper_scene,
+        {"tube.bore": "1mm:2mm", "gas.pressure": "0.4MPa:0.8MPa"},
+        sample="sobol:8",
+        intervals=False,
+    )
+    places = np.array([[p["tube.bore"] / 1e-3 - 1, p["gas.pressure"] / 0.4e6 - 1] for p in sobol.points])
+    assert all(sorted((8 * column).astype(int)) == list(range(8)) for column in places.T)
+
+
+@pytest.mark.parametrize(
+    ("vary", "sample", "problem"),
+    [
+        ({"tube.bor": "1mm:2mm:3"}, "", "did you mean"),
+        ({"tube.bore": "1mm:2kg:3"}, "", "unit of mass"),
+        ({"tube.bore": "1mm:2mm"}, "", "steps"),
+        ({"tube.bore": "1mm:2mm:x"}, "", "no range"),
+        ({"tube.bore": "1mm:2mm"}, "halton:8", "no sample"),
+        ({"gas": "nowhere.csv"}, "", "cannot be read"),
+        ({"tube.bore": "1mm:2mm:1000", "gas.pressure": "1MPa:2MPa:1001"}, "", "1001000 points"),
+        ({}, "", "nothing varies"),
+        ({("tube.bore", "tube.length"): (["1 mm"], ["1 m", "2 m"])}, "", "number of values"),
+    ],
+)
+def test_a_bad_axis_is_one_clear_error(
+    paper_scene: Scene, vary: dict[Any, Any], sample: str, problem: str
+) -> None:
+    with pytest.raises(rb.SceneError, match=problem):
+        rb.sweep(paper_scene, vary, sample=sample)
+
+
+class Lost(Executor):
+    """Workers that the system ends."""
+
+    def submit(self, _function: Any, /, *_: Any, **_named: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_exception(BrokenProcessPool("ended"))
+        return future
+
+
+def test_any_executor_gives_the_same_table(paper_scene: Scene) -> None:
+    pressures = {"gas.pressure": np.linspace(0.4e6, 0.8e6, 5)}
+    serial = rb.sweep(paper_scene, pressures, runs=2).to_csv()
+    with ThreadPoolExecutor(2) as threads:
+        assert rb.sweep(paper_scene, pressures, runs=2, executor=threads).to_csv() == serial
+    assert rb.sweep(paper_scene, pressures, runs=2, executor=Lost()).to_csv() == serial
+
+
+def test_kept_answers_are_found_by_content_and_damaged_ones_made_again(
+    paper_scene: Scene, tmp_path: Path
+) -> None:
+    done: list[int] = []
+
+    def sweep(**options: Any) -> str:
+        done.clear()
+        found = rb.sweep(
+            paper_scene, VARY, store=tmp_path, progress=lambda d: done.append(d.computed), **options
+        )
+        return found.to_csv()
+
+    first = sweep()
+    assert done[-1] == 12
+    assert sweep() == first
+    assert done[-1] == 0
+    (entry,) = (path for path in tmp_path.rglob("*") if path.is_file())
+    content = bytearray(entry.read_bytes())
+    content[len(content) // 2] ^= 4
+    entry.write_bytes(bytes(content))
+    assert Store(folder=tmp_path).get(entry.name) is None
+    assert sweep() == first
+    assert done[-1] == 12
+    sweep(intervals=False)
+    assert done[-1] == 12
+
+
+def test_bundles_hide_what_a_call_costs_and_leave_work_for_all() -> None:
+    """At 5 ms a call and 5 % of it: at least 100 ms of work, except where workers would be idle."""
+    for seconds in (1e-4, 1e-2, 0.3, 10.0):
+        size = bundle_size(seconds, count=100_000, workers=4)
+        assert size * seconds >= 0.1
+    assert bundle_size(1e-3, count=64, workers=4) == 2
+
+
+def test_a_map_is_drawn_with_its_boundary(paper_scene: Scene, tmp_path: Path) -> None:
+    found = rb.sweep(
+        paper_scene, {"tube.bore": "1mm:2mm:3", "gas.pressure": "0.2MPa:0.8MPa:4"}, intervals=False
+    )
+    names = [path.name for path in found.plot(tmp_path)]
+    assert names == ["sweep-reach.svg", "sweep-velocity.svg", "sweep-loop-factor.svg"]
+    assert found.best is not None
+    assert math.isfinite(found.static[found.best]["values"]["reach"][0])
+    assert "not feasible" in (tmp_path / names[0]).read_text()

@@ -1,7 +1,8 @@
 """Two balancers side by side on one rotor, each with settings chosen by runs: what fractions settle.
 
 Both are run as the devices of one number: with the same drawn rotor (speed, influence coefficient, unbalance
-in size and direction), each with its own inputs drawn, and with noise by that number.
+in size and direction), each with its own inputs drawn, and with noise by that number.  The rotor is as
+uncertain as that of the two scenes which states more, so that the order of the scenes does not matter to it.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.judging.tuning_rows import plain_settings, setting_text
-from ringbalance.controller.rotor import CommonRotor, Rotors, vibrating
+from ringbalance.controller.rotor import CommonRotor, Rotors, rotors_of, vibrating
 from ringbalance.reduced_model.terms import ModelUsed
+from ringbalance.results.paired import Paired
 from ringbalance.results.proportion import Proportion
 from ringbalance.results.result import Result, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
@@ -28,7 +30,9 @@ from ringbalance.scene.origins import SceneFile, with_values_at
 
 FEWEST: Final = 16
 MOST: Final = 64
-"""Devices, at first and at the most: doubled until the intervals of both fractions lie apart."""
+"""Devices, at first and at the most: doubled until a difference is shown."""
+_LEVEL: Final = 0.05 / 3
+"""Of the test for a difference, 0.05 in all: it is made after 16, 32 and 64 devices."""
 _TRACED: Final = 4
 """Devices whose runs are kept for the largest vibration on the way."""
 
@@ -146,12 +150,14 @@ class Comparison(Result):
     """In the order of the scenes."""
 
     @property
+    def paired(self) -> Paired:
+        """On how many devices which of the two settles."""
+        return _paired([side.outcomes for side in self.sides])
+
+    @property
     def better(self) -> int | None:
-        """Which side settles more devices; None: the intervals overlap."""
-        one, other = (side.fraction for side in self.sides)
-        if one.low > other.high:
-            return 0
-        return 1 if other.low > one.high else None
+        """Which side settles more of the devices; None: no difference is shown."""
+        return self.paired.better(_LEVEL)
 
     @property
     def verdicts(self) -> tuple[str, ...]:
@@ -171,6 +177,7 @@ class Comparison(Result):
             "asked": self.asked,
             "verdict": list(self.verdicts),
             "better": self.better,
+            "pairs": self.paired.document(),
             **{key: [side.middle(name) for side in sides] for key, name in _KEYS.items()},
             "spread": [{key: side.ends(name) for key, name in _KEYS.items()} for side in sides],
             "worst_amplitude_m": [side.worst_amplitude for side in sides],
@@ -219,10 +226,12 @@ class Comparison(Result):
 
     @property
     def _finding(self) -> Finding:
-        better = self.better
+        better, paired = self.better, self.paired
+        alone = sorted((paired.first_alone, paired.second_alone))
+        values: dict[str, Value] = {"of": self.sides[0].fraction.of, "fewer": alone[0], "more": alone[1]}
         if better is None:
-            return Finding(code="compared_alike", values={"of": self.sides[0].fraction.of})
-        return Finding(code="compared_better", values={"source": self.sides[better].scene.source})
+            return Finding(code="compared_alike", values=values)
+        return Finding(code="compared_better", values={**values, "source": self.sides[better].scene.source})
 
 
 def compare(
@@ -240,14 +249,15 @@ def compare(
     """
     told = progress or (lambda _: None)
     rotor = vibrating(first.scene, first.rotor())
+    rotors = rotors_of(first.rotor, second.rotor)
     try:
         # Whether the second can work there at all is known before anything is run.
-        placed = [each.on_rotor(rotor, first.rotor) for each in (first, second)]
+        placed = [each.on_rotor(rotor, rotors) for each in (first, second)]
         span = max(each.span() for each in placed)
         both = [each.lasting(span) for each in placed]
         settings = [searched(each, progress=told) for each in both]
         outcomes = _raced(both, settings, most=most, progress=told)
-        one, other = (_side(*each, first.rotor) for each in zip(both, settings, outcomes, strict=True))
+        one, other = (_side(*each, rotors) for each in zip(both, settings, outcomes, strict=True))
     except SceneError as error:
         raise SceneError(_placed(first.scene, fault) for fault in error.faults) from error
     return Comparison(rotor=rotor, span=span, asked=first.asked_fraction(), sides=(one, other))
@@ -262,7 +272,7 @@ def _placed(first: SceneFile, fault: Fault) -> Fault:
 def _raced(
     both: Sequence[Balancer], settings: Sequence[Settings], *, most: int, progress: Callable[[str], None]
 ) -> list[Outcomes]:
-    """Both over the same devices, twice as many each time until their fractions lie apart."""
+    """Both over the same devices, twice as many each time until a difference is shown."""
     whole: list[Outcomes] = []
     more = min(FEWEST, most)
     while more:
@@ -271,13 +281,13 @@ def _raced(
         draws = Draws.block(FRESH + count, more)
         ran = [each.run_all([asked], draws)[0] for each, asked in zip(both, settings, strict=True)]
         whole = [a.joined(b) for a, b in zip(whole, ran, strict=True)] if whole else ran
-        more = 0 if _apart(*whole) else min(count + more, most - count - more)
+        more = 0 if _paired(whole).better(_LEVEL) is not None else min(count + more, most - count - more)
     return whole
 
 
-def _apart(one: Outcomes, other: Outcomes) -> bool:
-    a, b = (Proportion(count=int(each.settled.sum()), of=each.settled.size) for each in (one, other))
-    return a.low > b.high or b.low > a.high
+def _paired(outcomes: Sequence[Outcomes]) -> Paired:
+    first, second = (each.settled for each in outcomes)
+    return Paired.of(first, second)
 
 
 def _side(balancer: Balancer, settings: Settings, outcomes: Outcomes, rotors: Rotors) -> Side:

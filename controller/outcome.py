@@ -200,7 +200,7 @@ def _causes(facts: Facts) -> Iterator[Finding]:
     if outcome is Outcome.HOVERING:
         yield from _noise(facts)
     if outcome in {Outcome.HOVERING, Outcome.UNSTABLE} or (
-        outcome in {Outcome.SETTLED, Outcome.TIME_LIMIT, Outcome.DIVERGING} and turned > _allowed(outcome)
+        outcome in {Outcome.TIME_LIMIT, Outcome.DIVERGING} and turned > _allowed(outcome)
     ):
         yield from _smaller_steps(facts)
     elif outcome is Outcome.TIME_LIMIT:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cache
 from string import ascii_uppercase
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -127,6 +128,59 @@ class CommonRotor:
 
 Rotors = Callable[[int], CommonRotor]
 """The rotor by number of the drawn device that it belongs to."""
+
+
+_COUNT: Final = 16
+"""Devices by which it is told which of two scenes draws a quantity more widely."""
+
+
+class _Drawn(Protocol):
+    """`Balancer.rotor`."""
+
+    def __call__(self, number: int | None = None) -> CommonRotor: ...
+
+
+def rotors_of(first: _Drawn, second: _Drawn) -> Rotors:
+    """The rotor that the first scene says, drawn as widely as either scene draws its own.
+
+    Each of speed, magnitude and angle of alpha, and size and direction of the unbalance deviates by what that
+    scene draws of which it is more uncertain: the order of the scenes does not matter to the deviations.
+    """
+    nominal = first()
+    scenes = [_deviations(nominal, first)]
+    with suppress(SceneError):
+        # A rotor that stands still or does not vibrate says nothing of this one.
+        if (own := second()).amplitude > 0.0:
+            scenes.append(_deviations(own, second))
+    spread = np.array([np.std([of(number) for number in range(_COUNT)], axis=0) for of in scenes])
+    wider = np.argmax(spread, axis=0)
+
+    def rotor(number: int) -> CommonRotor:
+        drawn = np.choose(wider, [of(number) for of in scenes])
+        speed, size, angle, unbalance, direction = drawn.tolist()
+        return replace(
+            nominal,
+            speed=nominal.speed * math.exp(speed),
+            influence=nominal.influence * cmath.rect(math.exp(size), angle),
+            unbalance=nominal.unbalance * cmath.rect(math.exp(unbalance), direction),
+        )
+
+    return cache(rotor)
+
+
+def _deviations(nominal: CommonRotor, drawn: _Drawn) -> Callable[[int], list[float]]:
+    """By number: logarithms of ratios to what the scene says, and angles."""
+
+    def of(number: int) -> list[float]:
+        rotor = drawn(number)
+        influence, unbalance = rotor.influence / nominal.influence, rotor.unbalance / nominal.unbalance
+        return [
+            math.log(rotor.speed / nominal.speed),
+            *(math.log(abs(influence)), cmath.phase(influence)),
+            *(math.log(abs(unbalance)), cmath.phase(unbalance)),
+        ]
+
+    return of
 
 
 def rotor_fault(scene: SceneFile, path: str, problem: str, allowed: str) -> SceneError:

@@ -39,8 +39,8 @@ def report(
         models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
-        Exit code: 0; 1 when a code-verification case failed, or the loop settled under neither law; the
-        report is written all the same.
+        Exit code: 0 the report is written, whatever it says of the scene; 1 a check of the program failed;
+        the report is written all the same.
 
     Raises:
         SceneError: a scene that cannot be used; nothing is written.

@@ -22,7 +22,7 @@ from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.toml import toml_text
-from ringbalance.scene.units import unit_factor
+from ringbalance.scene.units import shortest, shortest_quantity
 
 LONGER: Final = 300.0
 """s, for which runs are watched again, to show what longer watching changes."""
@@ -34,7 +34,6 @@ _POINTS: Final = 50
 """Most entries of a curve."""
 _BAND: Final = (0.025, 0.5, 0.975)
 """Quantiles between which 95 % of the devices lie, and their median."""
-_DIGITS: Final = 4
 
 
 def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Record:
@@ -176,14 +175,13 @@ def settings_rows(scene: SceneFile, paths: Iterable[str]) -> Iterator[Record]:
         table, _, key = path.partition(".")
         value = getattr(getattr(scene, table), key)
         if value not in (None, ()):
-            yield {"path": path, "text": toml_text(_written(value, usual_unit(path)))}
+            yield {"path": path, "text": toml_text(_written(value, path))}
 
 
-def _written(value: Any, unit: str) -> Any:
+def _written(value: Any, path: str) -> Any:
     if isinstance(value, tuple):
-        return [_written(each, unit) for each in value]
+        return [_written(each, path) for each in value]
     if isinstance(value, str | bool | int):
         return value
-    if unit in ("", "1"):
-        return float(f"{value:.{_DIGITS}g}")
-    return f"{value / unit_factor(unit):.{_DIGITS}g} {unit}"
+    unit = usual_unit(path)
+    return shortest_quantity(value, unit) if unit not in ("", "1") else float(shortest(value))

@@ -69,7 +69,7 @@ _KEYS: Final = {
     "minimum_gas_time": "shortest valve-open time",
     "maximum_gas_time": "longest valve-open time",
     "conductance": "sonic conductance",
-    "draw_down_factor": "factor on the draw-down depth",
+    "draw_down_factor": "draw-down factor",
 }
 """Words for keys that are none by themselves."""
 _PATH: Final = re.compile(

@@ -45,7 +45,7 @@ def simulate(
         models: "finest" takes the finest of all that is expensive, as at a tolerance of zero.
 
     Returns:
-        Exit code: 0 settled, 1 not settled; the result is printed either way.
+        Exit code: 0 settled, with all that the scene requires; 1 otherwise; the result is printed either way.
 
     Raises:
         SceneError: a scene, a law or an option that cannot be used.
@@ -57,7 +57,8 @@ def simulate(
     balancer = balancer_under(law, told)
     # The first run on a machine compiles for ten to twenty seconds; later ones take the code that is kept.
     with activity("simulate", "closed loop (the first run compiles) ...") as shown:
-        run = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown)).traced[0].run
+        outcomes = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown))
+        run, met = outcomes.traced[0].run, all(each.met(outcomes).all() for each in balancer.demands())
         document = run.to_dict() if json else {}
         drawing = None if plot is None else _sheet(told, run)
     if csv is not None:
@@ -68,7 +69,7 @@ def simulate(
         print(json_format.dumps(document, allow_nan=False))
     else:
         results_console().print(balancer.rows(run).view())
-    return SETTLED if run.settled else NOT_SETTLED
+    return SETTLED if run.settled and met else NOT_SETTLED
 
 
 def check_output(option: str, path: Path | None, ending: str) -> None:

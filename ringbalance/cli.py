@@ -92,9 +92,9 @@ def _build_app() -> App:
         name="ringbalance",
         help="Are the closed formulas of a liquid-ring rotor balancer to be trusted, for your disc?",
         help_epilogue=(
-            "Exit codes: 0 done; 1 a code-verification case failed or a run did not settle (the result is "
-            "still written); 2 bad input, or output that cannot be written; 130 interrupted; 141 the "
-            "reader of standard output went away."
+            "Exit codes: 0 done; 1 a check of the program failed or what the scene requires is not met (the "
+            "result is still written; report does not judge the scene by its code); 2 bad input, or output "
+            "that cannot be written; 130 interrupted; 141 the reader of standard output went away."
         ),
         version=ringbalance.__version__,
         default_parameter=Parameter(negative=(), converter=_converted),
@@ -179,8 +179,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: the words after the program's name; default those of the process.
 
     Returns:
-        Exit code: 0 done; 1 a code-verification case failed or a run did not settle; 2 bad input, or output
-        that cannot be written; 130 interrupted; 141 the reader of standard output went away.
+        Exit code: 0 done; 1 a check of the program failed, or what the scene requires is not met; 2 bad
+        input, or output that cannot be written; 130 interrupted; 141 the reader of standard output went away.
     """
     # Before numpy is imported, and whatever the user set: one thread gives the same sums on every machine.
     os.environ.update(dict.fromkeys(THREAD_COUNTS, "1"))

@@ -87,6 +87,10 @@ DIMENSIONS: Mapping[str, Dimension] = _dimensions()
 
 
 _LONGEST_TEXT = 60
+_READS_BACK = 1e-6
+"""Relative change of a value that is written and read again."""
+_SAVED = 4
+"""Characters that another unit than the usual one must save."""
 _NUMBER = re.compile(
     r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?![0-9.,])\s*(.*?)\s*", re.DOTALL
 )
@@ -186,6 +190,19 @@ def unit_factor(unit: str) -> float:
         return 1.0
     entry = next(units[unit] for units in (kind.units for kind in DIMENSIONS.values()) if unit in units)
     return float(entry.factor) * (math.pi if entry.pi else 1.0)
+
+
+def shortest(value: float) -> str:
+    """The fewest digits that give a value back to 1e-6 of it."""
+    texts = (f"{value:.{digits}g}" for digits in range(1, 17))
+    return next(text for text in texts if math.isclose(float(text), value, rel_tol=_READS_BACK))
+
+
+def shortest_quantity(value: float, usual: str) -> str:
+    """An SI value to 1e-6 in its usual unit, or in that of SI where this saves digits, such as "2.5 s"."""
+    si = next(next(iter(kind.units)) for kind in DIMENSIONS.values() if usual in kind.units)
+    plain, other = (f"{shortest(value / unit_factor(unit))} {unit}" for unit in (usual, si))
+    return other if len(other) + _SAVED <= len(plain) else plain
 
 
 def unit_of(text: str) -> str:

@@ -1,24 +1,27 @@
 """Settings by runs: levels of what a balancer offers to try, raced over few drawn devices.
 
 The fraction of devices that a setting serves is a plateau with steps of one device, so that nothing smooth is
-there to follow: coarse levels first, then the neighbours of the best until it is within them.  Settings far
-below the best are dropped after few devices.  What is chosen on these devices is judged on others.
+there to follow: coarse levels first, then the neighbours of the best until it is within them.  Settings that
+are surely worse than the best on the same devices are dropped after few.  Where the best serve too few, more
+devices choose between them.  What is chosen on these devices is judged on others.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Balancer, Draws, Settings
+from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.trials import Axis, Trials
+from ringbalance.results.paired import Paired
+from ringbalance.scene.arrays import BoolArray
 
 Progress = Callable[[str], None]
 
@@ -26,17 +29,24 @@ _HEATS: Final = ((0, 8), (8, 16), (16, 32))
 """Devices of the heats of a race, by first and last number."""
 DEVICES: Final = _HEATS[-1][1]
 """On which settings are chosen."""
-_BEHIND: Final = 0.15
-"""Fraction of the devices by which a setting may be behind the best and run in the next heat."""
-_MORE: Final = 2
-"""Devices by which another kind of controller must be better than the scene's."""
+_FINAL: Final = (DEVICES, 4 * DEVICES)
+"""Devices that choose between the last few settings, by first and last number."""
+_FINALISTS: Final = 8
+_BEHIND: Final = 0.2
+"""Level of the paired test by which a setting is worse than the best and does not run in the next heat."""
+_MORE: Final = 2 / DEVICES
+"""Fraction of the devices by which another kind of controller must be better than the scene's."""
+_ENOUGH: Final = 0.9
+"""Fraction of the devices from which on the best settings need not be looked for more widely."""
 _AS_FAST: Final = 1.3
 """Times the least settling time: as fast as the fastest."""
 _SETTLED: Final = 0.9
 """Of the devices that the best settings serve: by when these have settled decides between equals."""
 _ROUNDS: Final = 6
 """In which neighbours are tried."""
-CURVE: Final = Draws.block(64, 64, whole=False)
+_ALONG: Final = 3
+"""The same at a level of an axis, from the best of the level beside it."""
+CURVE: Final = Draws.block(256, 64, whole=False)
 """Devices of the answer along an axis: neither those of the choice nor those of the verdict."""
 
 
@@ -98,6 +108,16 @@ class Tried:
         """Of devices that meet every demand."""
         return self.judgement.fraction.count
 
+    @property
+    def fraction(self) -> float:
+        """Of devices that do."""
+        return self.judgement.fraction.value
+
+    def joined(self, outcomes: Outcomes) -> Tried:
+        """With the outcomes of further devices."""
+        whole = self.judgement.outcomes.joined(outcomes)
+        return replace(self, judgement=replace(self.judgement, outcomes=whole))
+
     def time(self, count: int) -> float:
         """By which so many devices have settled, s."""
         return float(np.sort(self.judgement.outcomes.settling_time)[max(count, 1) - 1])
@@ -112,7 +132,7 @@ def search(
     """
     found = [best for each in trials if (best := _best_of(balancer, each, along, progress)) is not None]
     own = found[:1] if found and found[0].candidate.trials is trials[0] else []
-    return tuple(sorted(found, key=lambda each: each.count + _MORE * (each in own), reverse=True))
+    return tuple(sorted(found, key=lambda each: each.fraction + _MORE * (each in own), reverse=True))
 
 
 def _best_of(balancer: Balancer, trials: Trials, along: float | None, progress: Progress) -> Tried | None:
@@ -120,19 +140,43 @@ def _best_of(balancer: Balancer, trials: Trials, along: float | None, progress: 
         Candidate(trials=trials, places=places, along=along)
         for places in product(*(axis.first for axis in trials.axes))
     ]
+    return _final(balancer, _climbed(balancer, coarse, rounds=_ROUNDS, progress=progress))
+
+
+def _climbed(balancer: Balancer, field: list[Candidate], *, rounds: int, progress: Progress) -> list[Tried]:
+    """All that ran on every device, of a field and of the neighbours of the best again and again."""
     tried: dict[object, Tried | None] = {}
-    field: list[Candidate] = coarse
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         fresh = [each for each in field if each.key not in tried]
         if not fresh:
             break
-        progress(f"{len(fresh)} settings, {trials.kind.replace('_', ' ')}")
-        leading = max((each.count for each in tried.values() if each), default=0)
-        ran = _raced(balancer, fresh, leading=leading)
+        progress(f"{len(fresh)} settings, {fresh[0].trials.kind.replace('_', ' ')}")
+        ran = _raced(balancer, fresh, leading=chosen(each for each in tried.values() if each))
         tried |= {each.key: None for each in fresh} | {each.candidate.key: each for each in ran}
-        best = chosen(each for each in tried.values() if each)
-        field = best.candidate.neighbours() if best else []
-    return chosen(each for each in tried.values() if each)
+        starts = _starts([each for each in tried.values() if each])
+        field = [near for each in starts for near in each.candidate.neighbours()]
+    return [each for each in tried.values() if each]
+
+
+def _starts(tried: Sequence[Tried]) -> list[Tried]:
+    """The best, and where it serves too few devices the best of those that are not beside it."""
+    if (best := chosen(tried)) is None:
+        return []
+    apart = [each for each in tried if not each.candidate.is_beside(best.candidate)]
+    second = chosen(apart) if best.fraction < _ENOUGH else None
+    return [best] if second is None else [best, second]
+
+
+def _final(balancer: Balancer, tried: Sequence[Tried]) -> Tried | None:
+    """The best; where few devices are served, of those that serve most on more devices."""
+    best = chosen(tried)
+    if best is None or best.count == 0 or best.fraction >= _ENOUGH:
+        return best
+    last = sorted(tried, key=lambda each: (-each.count, each is not best))[:_FINALISTS]
+    first, end = _FINAL
+    settings = [each.judgement.settings for each in last]
+    ran = balancer.run_all(settings, Draws.block(first, end - first, whole=False))
+    return chosen(each.joined(outcomes) for each, outcomes in zip(last, ran, strict=True))
 
 
 def chosen(tried: Iterable[Tried]) -> Tried | None:
@@ -153,8 +197,8 @@ def chosen(tried: Iterable[Tried]) -> Tried | None:
     return max(fast, key=lambda each: (amid(each), -each.time(at)))
 
 
-def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: int = 0) -> list[Tried]:
-    """Those that are not far behind the best after each heat. Args: `leading`: devices of the best before."""
+def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | None = None) -> list[Tried]:
+    """Those that are not surely worse than the best after each heat. Args: `leading`: the best before."""
     asked, demands = balancer.asked_fraction(), balancer.demands()
     running: dict[int, Tried | None] = {i: None for i, each in enumerate(field) if each.settings is not None}
     for first, last in _HEATS:
@@ -164,16 +208,21 @@ def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: int = 0) 
         ran = balancer.run_all(settings, Draws.block(first, last - first, whole=False))
         for i, outcomes in zip(running, ran, strict=True):
             before = running[i]
-            whole = before.judgement.outcomes.joined(outcomes) if before else outcomes
-            judged = Judgement(settings=field[i].settings or {}, asked=asked, demands=demands, outcomes=whole)
-            running[i] = Tried(candidate=field[i], judgement=judged)
-        most = max(max(each.count for each in running.values() if each), leading * last / DEVICES)
-        behind = max(_BEHIND * last, 2.0)
-        if most == 0:
+            judged = Judgement(
+                settings=field[i].settings or {}, asked=asked, demands=demands, outcomes=outcomes
+            )
+            running[i] = before.joined(outcomes) if before else Tried(candidate=field[i], judgement=judged)
+        ranked = [each.judgement.meets for each in (*running.values(), leading) if each]
+        best = max((meets[:last] for meets in ranked), key=np.count_nonzero)
+        if not best.any():
             # None settles: one of them goes on, to say why.
             running = dict(list(running.items())[:1])
-        running = {i: each for i, each in running.items() if each and each.count >= most - behind}
+        running = {i: each for i, each in running.items() if each and not _worse(each, best)}
     return [each for each in running.values() if each]
+
+
+def _worse(each: Tried, best: BoolArray) -> bool:
+    return Paired.of(best, each.judgement.meets).better(_BEHIND) == 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -196,30 +245,42 @@ def searched_along(balancer: Balancer, best: Tried, *, progress: Progress) -> tu
     axis = best.candidate.trials.along
     if axis is None:
         return ()
+    chosen_at: dict[int, Tried] = {}
     found: dict[int, Along] = {}
     places: Sequence[int] = axis.first
     while places:
         progress(f"{len(places)} levels of {axis.name}")
-        found |= _answered(balancer, best.candidate, axis, places)
+        for at in _outwards(axis, places, best.candidate.along):
+            chosen_at[at] = _beside(balancer, best, chosen_at, at=at, axis=axis)
+        found |= _answered(balancer, {at: chosen_at[at].candidate for at in places}, axis)
         top = _top(found)
         places = [at for at in (top - 1, top + 1) if at not in found and 0 <= at < len(axis.levels)]
     return tuple(found[at] for at in sorted(found))
 
 
-def _answered(balancer: Balancer, best: Candidate, axis: Axis, places: Sequence[int]) -> dict[int, Along]:
-    around = [best, *best.neighbours()]
-    levels = {at: axis.levels[at] for at in places}
-    ran = _raced(balancer, [each.at(level) for level in levels.values() for each in around])
-    by_level = {
-        at: chosen(each for each in ran if each.candidate.along == level) for at, level in levels.items()
-    }
-    kept = {at: each.candidate if each else best.at(levels[at]) for at, each in by_level.items()}
+def _outwards(axis: Axis, places: Sequence[int], along: float | None) -> list[int]:
+    """Places of levels from that of the best settings on; in the middle where it is the scene's."""
+    whole = range(len(axis.levels))
+    start = len(whole) // 2 if along is None else min(whole, key=lambda at: abs(axis.levels[at] - along))
+    return sorted(places, key=lambda at: abs(at - start))
+
+
+def _beside(balancer: Balancer, best: Tried, chosen_at: Mapping[int, Tried], *, at: int, axis: Axis) -> Tried:
+    """The best at a level, from the best at the nearest level that serves any device."""
+    serving = {place: each for place, each in chosen_at.items() if each.count}
+    near = serving[min(serving, key=lambda place: abs(place - at))] if serving else best
+    start = near.candidate.at(axis.levels[at])
+    ran = _climbed(balancer, [start, *start.neighbours()], rounds=_ALONG, progress=lambda _: None)
+    return chosen(ran) or replace(near, candidate=start)
+
+
+def _answered(balancer: Balancer, kept: Mapping[int, Candidate], axis: Axis) -> dict[int, Along]:
     settings = [each.settings or _bare(each, axis) for each in kept.values()]
     asked, demands = balancer.asked_fraction(), balancer.demands()
     outcomes = balancer.run_all(settings, CURVE)
     return {
         at: Along(
-            level=levels[at],
+            level=axis.levels[at],
             judgement=Judgement(settings=setting, asked=asked, demands=demands, outcomes=outcome),
         )
         for at, setting, outcome in zip(kept, settings, outcomes, strict=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 from ringbalance.controller.balancer import Balancer, Settings
@@ -23,7 +24,7 @@ from ringbalance.controller.judging.tuning_rows import LONGER, tuning_document, 
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Presentation
 from ringbalance.scene.draws import BLOCK
-from ringbalance.scene.origins import SceneFile, with_values_at
+from ringbalance.scene.origins import SceneFile, value_at, with_values_at
 
 
 def tuned(
@@ -53,6 +54,7 @@ def tuned(
     longer = None if balancer.watched_to_end else _longer(balancer, best.settings, progress=told)
     axis = trials[0].along if trials else None
     level = None if axis is None else best.settings.get(axis.name)
+    own_level = None if axis is None else value_at(balancer.scene, axis.name)
     settings = partial(searched, along=level)
     mends = remedies is not False and best.verdict != MET
     return Tuning(
@@ -62,7 +64,7 @@ def tuned(
         own=own,
         longer=longer,
         tried=tuple(BestOfKind(kind=each.candidate.trials.kind, judgement=each.judgement) for each in found),
-        along=curve,
+        along=tuple(_agreeing(each, best, own_level if level is None else level) for each in curve),
         along_name=axis.name if axis else "",
         along_unit=axis.unit if axis else "1",
         information=information(with_values_at(balancer.scene, best.settings)),
@@ -71,6 +73,11 @@ def tuned(
         choices=tried_choices(balancer, search=settings, told=told) if remedies else (),
         open_choice=bool(balancer.choices()),
     )
+
+
+def _agreeing(level: Along, best: Judgement, recommended: float | None) -> Along:
+    """A level of the curve; at that of the recommended settings with their own verdict."""
+    return replace(level, judgement=best) if level.level == recommended else level
 
 
 def _judged(
@@ -90,8 +97,8 @@ def _longer(balancer: Balancer, settings: Settings, *, progress: Progress) -> Ju
 
 def _to_judge(found: Sequence[Tried]) -> list[Settings]:
     """Of the kind that is first, and of others that serve more devices."""
-    most = found[0].count if found else 0
-    kept = [each for place, each in enumerate(found) if place == 0 or each.count > most]
+    most = found[0].fraction if found else 0.0
+    kept = [each for place, each in enumerate(found) if place == 0 or each.fraction > most]
     return [each.candidate.settings or {} for each in kept]
 
 

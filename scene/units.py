@@ -194,7 +194,7 @@ def unit_factor(unit: str) -> float:
 
 def shortest(value: float) -> str:
     """The fewest digits that give a value back to 1e-6 of it."""
-    texts = (f"{value:.{digits}g}" for digits in range(1, 17))
+    texts = (f"{float(f'{value:.{digits}g}'):.16g}" for digits in range(1, 17))
     return next(text for text in texts if math.isclose(float(text), value, rel_tol=_READS_BACK))
 
 

@@ -81,7 +81,7 @@ def _collect(work: Work) -> Record:
     tuning = balancer.recommend(pressure=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
     return {
-        "limit_m": scene.controller.limit,
+        "limit_m": balancer.limit,
         "valve_given": scene.gas.conductance is not None,
         **tuning_record(balancer, tuning),
         "choices": choice_records(balancer.on_scene(tuning.recommended_scene)),
@@ -90,7 +90,7 @@ def _collect(work: Work) -> Record:
         "recommended_pressure_Pa": chosen.gas.pressure,
         "run": _run_record(chosen, work.calibration.model) if tuning.recommended.settings else None,
         "needed_moment_kg_m": scene.rotor.initial_amplitude / scene.rotor.influence_coefficient,
-        "requirement": requirement_record(scene),
+        "requirement": requirement_record(scene, limit=balancer.limit),
         "bore_m": scene.tube.bore,
         "bore_uncertainty_stated": any(i.quantity == "bore" for i in scene.uncertainty),
         "other_reading": _other_reading(scene),
@@ -103,14 +103,16 @@ def _run_record(scene: Scene, model: BalancerModel) -> Record:
     return {**{key: run[key] for key in _RUN if key in run}, "injections": len(run["injections"])}
 
 
-def requirement_record(scene: Scene) -> Record:
-    """What is required of a scene's balancer, SI; None where nothing is stated."""
+def requirement_record(scene: Scene, *, limit: float) -> Record:
+    """What is required of a scene's balancer, SI; None where nothing is stated.
+
+    Args: `limit`: vibration amplitude that every device is asked to come below, m.
+    """
     wanted, rotor = scene.requirement, scene.rotor
-    residual = scene.controller.limit if wanted.residual is None else wanted.residual
-    left = residual / rotor.influence_coefficient
+    left = limit / rotor.influence_coefficient
     return {
         "settling_time_s": wanted.settling_time,
-        "residual_m": residual,
+        "residual_m": limit,
         "grade_m_s": wanted.grade,
         "correction_moment_kg_m": wanted.correction_moment,
         "rotor_mass_kg": rotor.mass,

@@ -85,7 +85,8 @@ def _settling(found: Record) -> Drawing | None:
                 alpha=0.2,
                 linewidth=0,
             )
-        axes.axhline(100 * found["own"]["asked"], color=MUTED, linewidth=1, linestyle=":", label="asked")
+        asked = (found["recommended"] or found["own"])["asked"]
+        axes.axhline(100 * asked, color=MUTED, linewidth=1, linestyle=":", label="asked")
 
     return draw(
         "settling",

@@ -265,11 +265,6 @@ def test_progress_runs_to_the_end(scene: Scene, model: BalancerModel) -> None:
     assert {limit for _, limit in seen} == {120.0}
 
 
-def test_an_algorithm_that_is_not_there_is_a_fault_of_the_scene(scene: Scene, model: BalancerModel) -> None:
-    with pytest.raises(SceneError, match=r"\.toml: \[controller\] kind"):
-        simulate(with_controller(scene, kind="guesswork"), model)
-
-
 def test_a_rotor_too_slow_for_a_ring_is_a_fault_of_the_scene(scene: Scene, model: BalancerModel) -> None:
     # sqrt(g/a) at a = 34.9 mm: 16.76 rad/s, 160 rpm.
     for speed, slow in ((16.7, True), (16.9, False)):

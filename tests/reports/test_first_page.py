@@ -106,9 +106,11 @@ def test_a_chamber_that_runs_dry_is_a_warning(evidence: Record, said: Said) -> N
 
 
 def test_the_residual_s_grade_follows_from_the_mass(paper_scene: Scene) -> None:
-    assert requirement_record(paper_scene)["grade_at_residual_m_s"] is None
+    assert (
+        requirement_record(paper_scene, limit=paper_scene.controller.limit)["grade_at_residual_m_s"] is None
+    )
     heavy = replace(paper_scene, rotor=replace(paper_scene.rotor, mass=10.0))
-    record = requirement_record(heavy)
+    record = requirement_record(heavy, limit=heavy.controller.limit)
     # U omega/m by hand: 0.05 um over 0.0108 um/(g mm) at 10 000 rpm on 10 kg.
     assert record["grade_at_residual_m_s"] == pytest.approx(0.05 / 0.0108 * 1e-6 * 1047.2 / 10, rel=1e-4)
 

@@ -51,3 +51,14 @@ def test_a_changed_number_changes_what_is_printed() -> None:
             holder[key] = 1.37 * value
     after = dict(traces(render(evidence).values()))
     assert sum(before[path] != after.get(path) for path in before) >= 25
+
+
+@pytest.mark.usefixtures("unwritten")
+@pytest.mark.parametrize("absent", ["own", "recommended"])
+def test_one_setting_alone_makes_whole_pages(absent: str) -> None:
+    """A scene that gives no gain has no setting of its own; one that is at its best gets no other."""
+    evidence = json.loads(json.dumps(evidence_of("ring")))
+    summary = evidence["summary"]
+    either = summary["own"] or summary["recommended"]
+    summary |= {"own": either, "recommended": either} | {absent: None}
+    assert untrue(render(evidence).values(), evidence) == []

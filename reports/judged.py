@@ -11,9 +11,12 @@ import numpy as np
 
 from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all
-from ringbalance.controller.judging.remedies import tried_choices
-from ringbalance.controller.judging.search import Along
+from ringbalance.controller.judging.ranking import ranked
+from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
+from ringbalance.controller.judging.search import Along, searched
 from ringbalance.controller.judging.tuning import Tuning
+from ringbalance.controller.judging.tuning_rows import setting_text
+from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
 from ringbalance.results.proportion import Proportion
 from ringbalance.results.requirements import MET
@@ -37,8 +40,16 @@ _BAND: Final = (0.025, 0.5, 0.975)
 
 
 def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Record:
-    """The scene's own settings over drawn devices."""
-    return judgement_record(judged_all(balancer, [{}], first=first, most=most)[0])
+    """The scene's own settings over drawn devices, and what mends it where some do not meet what is asked."""
+    (own,) = judged_all(balancer, [{}], first=first, most=most)
+    suffices = own.verdict == MET or bool(own.meets.all())
+    measures = () if suffices else tuple(ranked(balancer, own).findings())
+    remedies = () if suffices else tried_remedies(balancer, own, search=searched)
+    return {
+        "own": judgement_record(own),
+        "remedies": [each.document() for each in remedies],
+        "measures": [each.document() for each in measures],
+    }
 
 
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
@@ -68,7 +79,7 @@ def _advice(tuning: Tuning) -> Record:
     best, own = tuning.recommended, tuning.own
     if best.verdict == MET:
         enough = own is not None and own.verdict == MET
-        measures = () if enough else (Finding(code="nothing_to_measure"),)
+        measures = () if enough else (Finding(code="settings_suffice"),)
         return {"remedies": [], "measures": [each.document() for each in measures]}
     return {
         "remedies": [each.document() for each in tuning.remedies],
@@ -158,6 +169,21 @@ def _settled(outcomes: Outcomes) -> Record:
         "low": [each.low for each in by],
         "high": [each.high for each in by],
     }
+
+
+def advice_view(found: Record) -> Record:
+    """Remedies and measurements in words."""
+    return {
+        "remedies": [_remedy(each) for each in found.get("remedies", ())],
+        "measures": [each["text"] for each in found.get("measures", ())],
+    }
+
+
+def _remedy(row: Record) -> str:
+    """The change of the scene in words."""
+    changes = [f"{key_words(path)} {setting_text(path, value)}" for path, value in row["changes"].items()]
+    text = ", ".join(changes)
+    return f"{text[0].upper()}{text[1:]}"
 
 
 def settings_text(rows: Iterable[Record]) -> str:

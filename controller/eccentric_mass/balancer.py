@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -29,6 +28,7 @@ from ringbalance.controller.balancer import (
 )
 from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device, on_rotor
 from ringbalance.controller.eccentric_mass.plant import PlantParameters, speed_at
+from ringbalance.controller.eccentric_mass.remedies import remedies_of
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun, eccentric_history
 from ringbalance.controller.eccentric_mass.sampled_loops import (
@@ -54,7 +54,7 @@ from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.draws import run_noise
-from ringbalance.scene.origins import SceneFile, value_at, with_values_at
+from ringbalance.scene.origins import SceneFile, with_values_at
 
 _FINEST_SHARE: Final = 0.01
 """Noise that a filter assumes, at the least, as a share of the amplitude to come below."""
@@ -62,8 +62,10 @@ _SETTLED_WHIRL: Final = 12.0
 """Time constants of the free whirl after which a run with eccentric masses starts to balance."""
 _REACH: Final = 10.0
 """Factor up to which a gain is tried."""
-_ADVISING: Final = 4
+_ADVISING: Final = 8
 """Devices whose runs say what would mend them."""
+_SIZING: Final = 256
+"""Devices whose imbalance, without a run, sizes the masses."""
 
 
 class EccentricMassBalancer:
@@ -181,9 +183,10 @@ class EccentricMassBalancer:
         return (Trials(kind=kind, axes=(loops,), settings=lambda at: changes if at[loops.name] else {}),)
 
     def remedies(self) -> tuple[Remedy, ...]:
-        """What the scene's own run and those of some of its devices advise; see `Balancer`."""
-        ran = [self.run({}, draws, trace=True) for draws in (AS_GIVEN, Draws.first(_ADVISING))]
-        return advised_remedies(self.scene, [each.run for outcomes in ran for each in outcomes.traced])
+        """Parts of another size, and what runs of the scene and some devices advise; see `Balancer`."""
+        own, drawn = (self.run({}, draws, trace=True) for draws in (AS_GIVEN, Draws.first(_ADVISING)))
+        shares = [_needed_share(self._device(number, drawn=True).scene) for number in range(_SIZING)]
+        return remedies_of(self.scene, drawn, [each.run for each in (*own.traced, *drawn.traced)], shares)
 
     def choices(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""
@@ -312,6 +315,11 @@ def _traced(run: EccentricRun, scene: EccentricScene) -> TracedRun:
     )
 
 
+def _needed_share(scene: EccentricScene) -> float:
+    """Imbalance over what the masses cancel."""
+    return scene.imbalance.mass * scene.imbalance.radius / reach_of(scene)
+
+
 def _believed(scene: EccentricScene, found: EccentricRotor, rotor: CommonRotor, *, heavier: float) -> Any:
     """The imbalance filter's assumptions; `heavier`: mass of rotor and masses over that before."""
     before, believed = scene.rotor, scene.imbalance_filter
@@ -354,52 +362,3 @@ def _check_rotor(rotor: CommonRotor, scene: EccentricScene, found: EccentricRoto
         problem = f"no bearing of this kind gives a lag of {lag:.4g} deg with this influence coefficient"
         allowed = "a lag_angle above 0 deg and below 180 deg, the greater the lighter the rotor"
         raise rotor_fault(scene, "rotor.stiffness", problem, allowed)
-
-
-MOST: Final = 4
-"""Remedies that are tried."""
-_Kind = frozenset[tuple[str, str]]
-"""Paths that change, each with "up", "down" or the text that is set."""
-
-
-def advised_remedies(scene: EccentricScene, runs: Iterable[Any]) -> tuple[Remedy, ...]:
-    """Those that most runs advise first, each with its largest change.
-
-    None that moves a value the other way than one before it: the two would undo each other.
-    Args: `runs`: each an `EccentricRun`.
-    """
-    counted: Counter[_Kind] = Counter()
-    largest: dict[_Kind, Mapping[str, float | str]] = {}
-    for run in runs:
-        for finding in run.remedies:
-            kind = frozenset((path, _way(scene, path, value)) for path, value in finding.change.items())
-            counted[kind] += 1
-            if kind not in largest or _size(scene, finding.change) > _size(scene, largest[kind]):
-                largest[kind] = finding.change
-    found, ways = [], dict[str, str]()
-    for kind, _ in counted.most_common():
-        if all(ways.get(path, way) == way for path, way in kind):
-            ways |= dict(kind)
-            found.append(Remedy(code=_code(kind), changes=dict(largest[kind])))
-    return tuple(found[:MOST])
-
-
-def _way(scene: EccentricScene, path: str, value: float | str) -> str:
-    if isinstance(value, str):
-        return value
-    before = _before(scene, path)
-    return "up" if before is None or value > before else "down"
-
-
-def _before(scene: EccentricScene, path: str) -> float | None:
-    table, _, key = path.partition(".")
-    return None if getattr(getattr(scene, table), key) is None else value_at(scene, path)
-
-
-def _size(scene: EccentricScene, changes: Mapping[str, float | str]) -> float:
-    numbers = [(_before(scene, path), value) for path, value in changes.items() if not isinstance(value, str)]
-    return math.fsum(abs(math.log(value / before)) for before, value in numbers if before and value > 0)
-
-
-def _code(kind: _Kind) -> str:
-    return "_and_".join(sorted(path.partition(".")[2] for path, _ in kind))

@@ -6,13 +6,13 @@ from typing import Final
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged
-from ringbalance.controller.judging.tuning_rows import setting_text
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reports import summary
 from ringbalance.reports.figure import Drawing
 from ringbalance.reports.judged import (
+    advice_view,
     choice_records,
     judgement_record,
     settings_rows,
@@ -142,19 +142,11 @@ def _view(found: Record, evidence: Record) -> Record:
         "settings": settings_text(found.get("settings", ())),
         "rests_on": {code: resting(evidence, *paths) for code, paths in _RESTS.items()},
         "pressure": _pressure(found),
-        "remedies": [_remedy(each) for each in found.get("remedies", ())],
-        "measures": [each["text"] for each in found.get("measures", ())],
+        **advice_view(found),
         "alerts": [*_dry(evidence), *_chamber(evidence)],
         "dominant": _dominant(found, evidence),
         "rests": [*_bore(found, evidence), *_exact(evidence), *_borrowed(evidence)],
     }
-
-
-def _remedy(row: Record) -> str:
-    """The change of the scene in words."""
-    changes = [f"{key_words(path)} {setting_text(path, value)}" for path, value in row["changes"].items()]
-    text = ", ".join(changes)
-    return f"{text[0].upper()}{text[1:]}"
 
 
 def _pressure(found: Record) -> Drawing | None:

@@ -6,7 +6,7 @@ from collections import Counter
 from typing import Final
 
 from ringbalance.controller.balancer import Balancer
-from ringbalance.reports.judged import own_record, settings_rows, settings_text
+from ringbalance.reports.judged import advice_view, own_record, settings_rows, settings_text
 from ringbalance.reports.pages.standing import DOCUMENT
 from ringbalance.reports.run_figures import run_amplitude
 from ringbalance.reports.section import Record, Section
@@ -24,7 +24,7 @@ def decision(balancer: Balancer) -> Record:
     paths = (each.path for each in balancer.settings() if "[" not in each.path)
     return {
         "limit_m": _limit(balancer),
-        "own": own_record(balancer, first=_FEWEST, most=_MOST),
+        **own_record(balancer, first=_FEWEST, most=_MOST),
         "recommended": None,
         "settings": list(settings_rows(scene, paths)),
     }
@@ -41,6 +41,7 @@ def decision_view(found: Record, evidence: Record) -> Record:
     """What the first page of any balancer shows of it."""
     return {
         "settings": settings_text(found["settings"]),
+        **advice_view(found),
         "origins": Counter(row["origin"] for row in evidence["scene"]["table"]).most_common(),
     }
 

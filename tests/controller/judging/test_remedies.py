@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ringbalance.controller.balancer import Draws, Outcomes, Remedy, balancer_of, settles_within
-from ringbalance.controller.judging.judge import Judgement, judged
+from ringbalance.controller.judging.judge import Judgement, judged, judged_all
 from ringbalance.controller.judging.remedies import Remedied, amplitude_reached, tried_choices, tried_remedies
 from ringbalance.controller.liquid_ring.remedies import remedies_of
 from ringbalance.reduced_model.law.paper_law import paper_model
@@ -103,6 +103,14 @@ def test_the_best_two_go_together_where_neither_meets(paper_scene: Scene) -> Non
     document = rows[0].document()
     assert document["verdict"] == "met"
     assert document["half_settle_s"] == 1.0
+
+
+def test_a_remedy_that_meets_meets_on_other_devices(paper_scene: Scene) -> None:
+    first = tried(paper_scene, bore(0.7), bore(0.5), limit(1.2))[0]
+    machine: Any = Machine(paper_scene.with_values(first.changes), ())
+    (again,) = judged_all(machine, [first.judgement.settings], first=128, most=128, start=1 << 22)
+    assert again.verdict == "met"
+    assert again.fraction.value >= first.judgement.fraction.low
 
 
 def test_what_makes_it_worse_is_not_carried_on(paper_scene: Scene) -> None:

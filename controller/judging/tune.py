@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Final
 
 from ringbalance.controller.balancer import Balancer, Settings
 from ringbalance.controller.judging.judge import Judgement, judged_all
@@ -25,6 +26,9 @@ from ringbalance.results.requirements import MET
 from ringbalance.results.result import Presentation
 from ringbalance.scene.draws import BLOCK
 from ringbalance.scene.origins import SceneFile, value_at, with_values_at
+
+_MOST_LONGER: Final = 4 * BLOCK
+"""Devices that are watched longer where 64 do not decide."""
 
 
 def tuned(
@@ -92,7 +96,8 @@ def _judged(
 
 
 def _longer(balancer: Balancer, settings: Settings, *, progress: Progress) -> Judgement:
-    return judged_all(balancer, [settings], first=BLOCK, most=BLOCK, further=LONGER, progress=progress)[0]
+    most = max(BLOCK, min(_MOST_LONGER, balancer.verdict_draws[1]))
+    return judged_all(balancer, [settings], first=BLOCK, most=most, further=LONGER, progress=progress)[0]
 
 
 def _to_judge(found: Sequence[Tried]) -> list[Settings]:

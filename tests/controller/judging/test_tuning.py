@@ -48,7 +48,7 @@ def test_the_papers_disc_works_at_a_lower_pressure(paper: Tuning) -> None:
     assert paper.succeeded
     assert 0.52e6 <= paper.recommended.settings["gas.pressure"] <= 0.60e6
     assert paper.longer is not None
-    assert paper.longer.verdict != MISSED
+    assert paper.longer.verdict == MET
     by_level = {each.level: each for each in paper.along}
     assert by_level[min(by_level)].judgement.fraction.count == 0
     # Too much pressure leaves too little moment.

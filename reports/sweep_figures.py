@@ -84,6 +84,6 @@ def _coloured(panel: Axes, sweep: Sweep, keys: list[Any], shown: Any, label: str
     if inside.any() and not inside.all():
         panel.contour(x, y, inside.astype(float), levels=[0.5], colors=INK, linewidths=1.2)
     panel.text(
-        1, -0.1, f"{label}: {low:.3g} (light) to {high:.3g} (dark)", ha="right", transform=panel.transAxes
+        1, 1.02, f"{label}: {low:.3g} (light) to {high:.3g} (dark)", ha="right", transform=panel.transAxes
     )
     return {}

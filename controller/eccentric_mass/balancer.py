@@ -183,10 +183,10 @@ class EccentricMassBalancer:
         return (Trials(kind=kind, axes=(loops,), settings=lambda at: changes if at[loops.name] else {}),)
 
     def remedies(self) -> tuple[Remedy, ...]:
-        """Parts of another size, and what runs of the scene and some devices advise; see `Balancer`."""
-        own, drawn = (self.run({}, draws, trace=True) for draws in (AS_GIVEN, Draws.first(_ADVISING)))
+        """Parts of another size, and what helps runs that end as those of the scene and some devices."""
+        own, drawn = (self.run({}, draws) for draws in (AS_GIVEN, Draws.first(_ADVISING)))
         shares = [_needed_share(self._device(number, drawn=True).scene) for number in range(_SIZING)]
-        return remedies_of(self.scene, drawn, [each.run for each in (*own.traced, *drawn.traced)], shares)
+        return remedies_of(self.scene, drawn, own, shares)
 
     def choices(self) -> tuple[Remedy, ...]:
         """See `Balancer`."""

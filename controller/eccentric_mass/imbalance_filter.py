@@ -423,31 +423,3 @@ def _history(
             for k in range(6):
                 covariances[i, j, k] = estimate.covariance[j, k]
     return states, covariances
-
-
-def predicted_deviation(
-    start: ImbalanceEstimate,
-    *,
-    model: WhirlModel,
-    noise: ProcessNoise,
-    variance: FloatArray,
-    angular_velocity: float,
-    step: float,
-    duration: float,
-    laboratory: bool = False,
-    masses: MassInput | None = None,
-) -> FloatArray:
-    """How well the imbalance can be known, before anything is measured.
-
-    The covariance does not depend on the samples.  The steady whirl is W^2/|K_B - M W^2 + j C_B W| per
-    imbalance, so that at low speed the deviation grows as 1/W^2.
-    Args: `laboratory`: whether the sensor stands still.
-    Returns: Standard deviation of the imbalance after each step, kg m, shape (duration/step,).
-    Raises: ValueError: a rotor at rest.
-    """
-    matrices = filter_matrices(model, noise, angular_velocity, step, laboratory, False)
-    blank = np.zeros((max(round(duration / step), 1), 4))
-    _, covariances = imbalance_history(
-        start, matrices=matrices, samples=blank, variance=variance, masses=masses
-    )
-    return np.array([imbalance_deviation(covariance) for covariance in covariances])

@@ -336,12 +336,6 @@ def check_substeps(scene: EccentricScene) -> None:
         raise SceneError([_fault(scene, key, value, problem, f"{allowed}, or a shorter run.time_limit")])
 
 
-def longest_run(scene: EccentricScene) -> float:
-    """Longest run.time_limit that `check_substeps` allows, s, if the speed stays what it is on average."""
-    by_samples = scene.sensor.step * (MOST_SAMPLES - 1)
-    return min(by_samples, scene.run.time_limit * MOST_SUBSTEPS / _substeps(scene))
-
-
 def _substeps(scene: EccentricScene) -> float:
     parameters, step = PlantParameters.of(scene), scene.sensor.step
     times, speeds = scene.rotor.profile

@@ -1,25 +1,27 @@
 """Changes of a scene with eccentric masses to try where too few devices meet what is asked.
 
 Masses and their arm are sized by the imbalances of drawn devices, which needs no run; a higher limit by the
-vibration that runs come down to.  What else may help, runs advise.
+vibration that runs come down to; unstable gains by their loops' poles.  What else may help goes by how runs
+end, by factors: runs of the changed scene say which will do.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Outcomes, Remedy
+from ringbalance.controller.balancer import Outcomes, Remedy, Settings
 from ringbalance.controller.eccentric_mass.run_facts import EccentricOutcome
+from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains, advised
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.scene.origins import value_at
 
-MOST: Final = 4
-"""Remedies that runs advise and that are tried."""
+_MOST: Final = 4
+"""Kinds of change that are tried by how runs end."""
 _SPARE: Final = (1.05, 1.5)
 """Times the masses that cancel the imbalance of nearly every device."""
 _NEARLY: Final = 0.99
@@ -49,25 +51,91 @@ _SENSORS: Final[Mapping[str, tuple[str, ...]]] = {
     ),
 }
 """Noises by the part that has them; a filter assumes what its sensor has."""
-_Kind = frozenset[tuple[str, str]]
-"""Paths that change, each with "up", "down" or the text that is set."""
+_STRONGER: Final = ("friction_filter.speed_gain", "friction_filter.drive_speed", "motor.maximum_voltage")
+_WALKS: Final = ("friction_filter.rate_walk", "friction_filter.friction_walk")
+_BY_END: Final[Mapping[EccentricOutcome, tuple[tuple[Mapping[str, float | str], ...], ...]]] = {
+    EccentricOutcome.TIME_LIMIT: (tuple({"run.time_limit": factor} for factor in (2.0, 4.0, 16.0)),),
+    EccentricOutcome.TUNING_TIME: (({"supervisor.fine_tuning_time": 4.0, "run.time_limit": 2.0},),),
+    EccentricOutcome.MASSES_MOVE: (
+        ({"motor.maximum_voltage": 4.0},),
+        ({"lqr.friction_compensation": "break_away"},),
+    ),
+    EccentricOutcome.IMBALANCE_UNCERTAIN: (
+        tuple({"imbalance_filter.gate": factor} for factor in (2.0, 4.0)),
+    ),
+    EccentricOutcome.FRICTION_UNCERTAIN: (
+        tuple(dict.fromkeys(_WALKS, factor) for factor in (0.1, 0.01)),
+        ({"supervisor.friction_time": 4.0, "run.time_limit": 2.0},),
+        ({"friction_filter.gate": 2.0},),
+    ),
+    EccentricOutcome.STALLED: (
+        tuple(dict.fromkeys(_STRONGER, factor) for factor in (2.0, 4.0)),
+        *(({path: 4.0},) for path in _STRONGER),
+    ),
+    EccentricOutcome.NOT_ARRIVED: (
+        ({"lqr.friction_compensation": "break_away"},),
+        tuple({"lqr.state_weight": factor} for factor in (4.0, 30.0)),
+        ({"supervisor.arrival_angle": 4.0, "supervisor.arrival_rate": 10.0},),
+    ),
+    EccentricOutcome.DIVERGED: (({"lqr.state_weight": 1 / 30, "friction_filter.speed_gain": 0.25},),),
+}
+"""Kinds of change by how runs end, each with its sizes: times a value, or what is set."""
 
 
 def remedies_of(
-    scene: EccentricScene, drawn: Outcomes, runs: Sequence[Any], shares: Sequence[float]
+    scene: EccentricScene, drawn: Outcomes, own: Outcomes, shares: Sequence[float]
 ) -> tuple[Remedy, ...]:
-    """Every change by itself: parts that are too small, what runs advise, less noise, another limit.
+    """Every change by itself: parts that are too small, what helps such ends, less noise, another limit.
 
     Those of one kind follow each other with the smallest first.
 
-    Args: `drawn`: of some devices. `runs`: theirs and the scene's own, each an `EccentricRun`. `shares`: of
-        many devices, imbalance over what the masses cancel.
+    Args: `drawn`: of some devices. `own`: of the scene's. `shares`: of many devices, imbalance over what the
+        masses cancel.
     """
     first = tuple(_of_masses(scene, shares))
-    last = (*_of_sensors(scene, drawn), *_of_limit(scene, drawn))
-    codes = {each.code for each in (*first, *last)}
-    advised = (each for each in advised_remedies(scene, runs) if each.code not in codes)
-    return (*first, *advised, *last)
+    ended = Counter((*own.ended, *drawn.ended))
+    return (
+        *first,
+        *_of_loops(scene),
+        *_of_ends(scene, ended),
+        *_of_sensors(scene, drawn),
+        *_of_limit(scene, drawn),
+    )
+
+
+def _of_loops(scene: EccentricScene) -> Iterator[Remedy]:
+    """Gains that the drives bear, and the transition that bears every step."""
+    if not all(loop.stable for loop in RecommendedGains.of(scene).loops):
+        yield Remedy(code="gains", changes=advised(scene))
+    if scene.imbalance_filter.discretisation == "euler":
+        yield Remedy(code="discretisation", changes={"imbalance_filter.discretisation": "exact"})
+
+
+def _of_ends(scene: EccentricScene, ended: Counter[str]) -> Iterator[Remedy]:
+    """For the commonest end first; none that sets what the scene has, or that it leaves open."""
+    kinds: dict[str, list[Settings]] = {}
+    for end, _ in ended.most_common():
+        for sizes in _BY_END.get(EccentricOutcome(end), ()):
+            changed: list[Settings] = [new for size in sizes if (new := _changed(scene, size))]
+            kinds.setdefault(_code(sizes[0]), changed)
+    for code, changes in list(kinds.items())[:_MOST]:
+        yield from (Remedy(code=code, changes=each) for each in changes)
+
+
+def _changed(scene: EccentricScene, factors: Mapping[str, float | str]) -> dict[str, float | str]:
+    changes: dict[str, float | str] = {}
+    for path, factor in factors.items():
+        table, _, key = path.partition(".")
+        before = getattr(getattr(scene, table), key)
+        if isinstance(factor, str):
+            changes |= {path: factor} if before != factor else {}
+        elif before:
+            changes[path] = factor * before
+    return changes
+
+
+def _code(changes: Mapping[str, float | str]) -> str:
+    return "_and_".join(path.partition(".")[2] for path in changes)
 
 
 def _of_masses(scene: EccentricScene, shares: Sequence[float]) -> Iterator[Remedy]:
@@ -107,46 +175,3 @@ def _rounded_up(value: float) -> float:
     """To two digits."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return float(f"{math.ceil(value / unit * (1 - 1e-12)) * unit:.2g}")
-
-
-def advised_remedies(scene: EccentricScene, runs: Iterable[Any]) -> tuple[Remedy, ...]:
-    """Those that most runs advise first, each with its largest change.
-
-    None that moves a value the other way than one before it: the two would undo each other.
-    Args: `runs`: each an `EccentricRun`.
-    """
-    counted: Counter[_Kind] = Counter()
-    largest: dict[_Kind, Mapping[str, float | str]] = {}
-    for run in runs:
-        for finding in run.remedies:
-            kind = frozenset((path, _way(scene, path, value)) for path, value in finding.change.items())
-            counted[kind] += 1
-            if kind not in largest or _size(scene, finding.change) > _size(scene, largest[kind]):
-                largest[kind] = finding.change
-    found, ways = [], dict[str, str]()
-    for kind, _ in counted.most_common():
-        if all(ways.get(path, way) == way for path, way in kind):
-            ways |= dict(kind)
-            found.append(Remedy(code=_code(kind), changes=dict(largest[kind])))
-    return tuple(found[:MOST])
-
-
-def _way(scene: EccentricScene, path: str, value: float | str) -> str:
-    if isinstance(value, str):
-        return value
-    before = _before(scene, path)
-    return "up" if before is None or value > before else "down"
-
-
-def _before(scene: EccentricScene, path: str) -> float | None:
-    table, _, key = path.partition(".")
-    return None if getattr(getattr(scene, table), key) is None else value_at(scene, path)
-
-
-def _size(scene: EccentricScene, changes: Mapping[str, float | str]) -> float:
-    numbers = [(_before(scene, path), value) for path, value in changes.items() if not isinstance(value, str)]
-    return math.fsum(abs(math.log(value / before)) for before, value in numbers if before and value > 0)
-
-
-def _code(kind: _Kind) -> str:
-    return "_and_".join(sorted(path.partition(".")[2] for path, _ in kind))

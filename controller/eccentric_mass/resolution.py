@@ -1,4 +1,4 @@
-"""How well the filters can know imbalance and friction: by noise, and by what is not known of the rotor.
+"""How well the filter can know the imbalance by what is not known of the rotor.
 
 In a steady whirl the filter finds (D_b/D)(theta + p) - p_b, with D = K_B - M W^2 + j C_B W of the rotor, D_b
 as configured and p = b sum exp(j phi_i) of the masses.  An estimation takes in the start's transient as well,
@@ -9,7 +9,6 @@ a rotor that is one standard deviation off in one input, and what it then finds 
 from __future__ import annotations
 
 import cmath
-import math
 
 import numpy as np
 
@@ -20,20 +19,13 @@ from ringbalance.controller.eccentric_mass.imbalance_filter import (
     MassInput,
     ProcessNoise,
     WhirlModel,
-    encoder_covariance,
     filter_matrices,
     imbalance_history,
-    predicted_deviation,
     start_estimate,
     whirl_transition,
 )
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.settings import (
-    FRICTION_ERROR,
-    DriveLaw,
-    believed_whirl,
-    track_model,
-)
+from ringbalance.controller.eccentric_mass.settings import believed_whirl
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.origins import value_at, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
@@ -41,63 +33,6 @@ from ringbalance.scene.uncertain import NORMAL_95
 _LONGEST_STEPS = 2_000
 """Steps in which an estimation is repeated; with fewer than the filter takes, each carries less noise."""
 _INPUTS = ("rotor.mass", "rotor.stiffness", "rotor.damping", "masses.mass", "masses.guide_radius")
-
-
-def expected_deviation(scene: EccentricScene, *, speed: float, duration: float | None = None) -> float:
-    """Standard deviation of the imbalance that an estimation at constant speed comes to, kg m.
-
-    Divide by the imbalance, or by the balancing capacity 2 m_b r_b, to see whether it can be resolved at all.
-     At zero speed it is the earlier estimate, since a resting rotor shows nothing.
-    Args: `duration`: of the estimation, s; default the longest that the scene allows.
-    """
-    told, masses = scene.imbalance_filter, scene.masses
-    if speed == 0:
-        return told.initial_unbalance
-    longest = scene.supervisor.imbalance_time if duration is None else duration
-    step = max(told.step, longest / _LONGEST_STEPS)
-    fewer = told.step / step
-    moment = masses.mass * masses.guide_radius
-    encoders = encoder_covariance(moment, masses.initial_angle, scene.sensor.encoder_noise)
-    found = predicted_deviation(
-        _start(told),
-        model=believed_whirl(scene),
-        noise=_process_noise(told),
-        variance=_variance(told, fewer),
-        masses=MassInput(0.0j, 0.0j, encoders * fewer, 0.0),
-        angular_velocity=speed,
-        step=step,
-        duration=longest,
-        laboratory=scene.sensor.frame == "laboratory",
-    )
-    return float(found[-1])
-
-
-def friction_floor(scene: EccentricScene, *, speed: float) -> float:
-    """Standard deviation, m, that a friction arm's estimate keeps for ever.
-
-    P = s_mu sqrt(s_w^2 + 2 c s_mu r)/c with c = b W^2/(J + J_add), the walks of arm and rate and the density
-    r of the encoder's noise: Riccati's equation of both.
-    """
-    told = scene.friction_filter
-    if speed == 0:
-        return math.inf
-    c, r = friction_sight(scene, speed=speed)
-    return math.sqrt(
-        told.friction_walk * math.hypot(told.rate_walk, math.sqrt(2 * c * told.friction_walk * r)) / c
-    )
-
-
-def friction_sight(scene: EccentricScene, *, speed: float) -> tuple[float, float]:
-    """Rate of a mass per second and metre of friction arm, and density of the noise on it, rad/s^0.5."""
-    told, track = scene.friction_filter, track_model(scene)
-    return track.moment * speed**2 / track.inertia, told.rate_noise * math.sqrt(told.step)
-
-
-def friction_allowed(scene: EccentricScene, *, arm: float, speed: float) -> float:
-    """Standard deviation of a friction arm, m, that lets the strategy proceed."""
-    torque = FRICTION_ERROR * DriveLaw.of(scene).position_gain * scene.supervisor.arrival_angle
-    share = scene.friction_filter.gate * max(arm, 0.0)
-    return max(share, torque / (track_model(scene).moment * speed**2)) if speed != 0 else math.inf
 
 
 def _start(told: ImbalanceFilter) -> ImbalanceEstimate:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ringbalance.controller.balancer import TracedRun
 from ringbalance.controller.document import amplitude_line
-from ringbalance.controller.eccentric_mass.advice import ended, found_beforehand, remedies_of, warnings_of
+from ringbalance.controller.eccentric_mass.findings import ended, warnings_of
 from ringbalance.controller.eccentric_mass.run_facts import RunFacts
 from ringbalance.results.numbers import given
 from ringbalance.results.result import Result, Rows, Table
@@ -35,13 +35,7 @@ class EccentricRun(RunFacts, Result):
     @cached_property
     def warned(self) -> tuple[Finding, ...]:
         """What the user should know although the run continued."""
-        known = self.friction_known
-        return (*found_beforehand(self.scene, friction_known=known), *warnings_of(self))
-
-    @cached_property
-    def remedies(self) -> tuple[Finding, ...]:
-        """Each by itself, the likeliest first; empty for a settled run, and where no single value will do."""
-        return remedies_of(self)
+        return warnings_of(self)
 
     def to_dict(self) -> dict[str, Any]:
         """See `_document`."""
@@ -54,8 +48,7 @@ class EccentricRun(RunFacts, Result):
     @property
     def status(self) -> str:
         """How the run ended and what to do next."""
-        advice = [", or ".join(str(each.values["text"]) for each in self.remedies)] if self.remedies else []
-        return ": ".join([self.ended.text, *advice])
+        return self.ended.text
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -83,7 +76,6 @@ def _document(run: EccentricRun) -> dict[str, Any]:
         "outcome": run.outcome.value,
         "status": run.status,
         "warnings": list(run.warnings),
-        "remedies": [dict(each.change) for each in run.remedies],
         "innovation": run.innovation,
         "limit_m": run.limit,
         "residual_ratio": run.residual_ratio,
@@ -176,7 +168,7 @@ def _rows(run: EccentricRun) -> Rows:
     return Rows(
         title=f"Run of {run.scene.name} ({run.scene.source}), eccentric masses",
         quantities=tuple(_quantities(run)),
-        findings=(run.ended, *run.remedies, *run.warned),
+        findings=(run.ended, *run.warned),
         facts=(("amplitude (log)", amplitude_line(run.time, run.amplitude, end=float(run.time[-1]))),),
         tables=(Table(caption="Stages", heads=("stage", "from, s", "to, s", "amplitude"), rows=stages),),
     )

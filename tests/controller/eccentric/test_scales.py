@@ -129,4 +129,3 @@ def test_a_coarse_euler_transition_is_named_before_the_stiffness() -> None:
     codes = {each.code for each in run.warned}
     assert "euler_too_coarse" in codes
     assert "innovations_unlike_model" not in codes
-    assert run.remedies[0].change == {"imbalance_filter.discretisation": "exact"}

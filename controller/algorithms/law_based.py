@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -28,8 +29,8 @@ LEAST_LAW_STANDARD_DEVIATION: Final = 0.05
 """Standard deviation, relative, below which no flow law's velocity is trusted."""
 MAGNITUDE_RANGE: Final = 10.0
 """Factor around the assumed magnitude that the estimate keeps to: no response proves no coefficient."""
-FILL_ERROR: Final = 1e-12
-"""Error in fill ratio at which a valve-open time is good enough."""
+FILL_ERROR: Final = 1e-3
+"""Error in fill ratio, over that allowed to a step, at which a valve-open time is good enough."""
 _HALVINGS: Final = 60
 END_STEP: Final = 1e-3
 """Share of the range of x over which a slope at its end is taken."""
@@ -85,7 +86,11 @@ class LawBased(BuiltIn):
         """The assumed disc, type `PLANT`, shape (1,)."""
         return self.ring.dynamics.kept_plant(total=self.ring.total)
 
-    @property
+    @cached_property
+    def _moments(self) -> MomentTable:
+        return MomentTable.of(model=self.ring.model, total=self.ring.total)
+
+    @cached_property
     def law_standard_deviation(self) -> float:
         """Standard deviation of the law's velocity at the start, relative."""
         level, flow = self.ring.total / 2, self.ring.model.flow
@@ -105,8 +110,7 @@ class LawBased(BuiltIn):
         loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
         loop["offset"][: len(self.offsets)] = self.offsets
         loop["axis"][: chambers // 2] = chamber_directions(chambers)[: chambers // 2]
-        table = MomentTable.of(model=self.ring.model, total=total)
-        loop["assumed_lowest"], loop["assumed_step"], loop["assumed_moment"] = table
+        loop["assumed_lowest"], loop["assumed_step"], loop["assumed_moment"] = self._moments
         lowest = total - self.ring.model.flow.max_fill_ratio
         loop["least_fill"] = max(min(self.ring.residual_fill, total / 2), lowest)
         loop["law_deviation"] = self.law_standard_deviation
@@ -115,6 +119,10 @@ class LawBased(BuiltIn):
 
     def liquid(self) -> npt.NDArray[np.void]:
         """As `BuiltIn.liquid`."""
+        return self._liquid.copy()
+
+    @cached_property
+    def _liquid(self) -> npt.NDArray[np.void]:
         level = packed(self.plant, fill=self.ring.total / 2, primed=False, motion=Motion())
         return np.repeat(level, self.ring.chambers // 2 + 1)
 
@@ -297,7 +305,7 @@ def _gas_time(
     if motion.event == _BLOCKED:
         return float(loop.probe)
     if reached <= target:
-        return _time_to(plant, liquid, pair, side, target, longest, notes, w)
+        return _time_to(plant, liquid, pair, side, target, now, reached, longest, notes, w)
     if motion.ended == 0.0:
         return float(longest)
     more = 0.0
@@ -316,22 +324,25 @@ def _time_to(
     pair: int,
     side: int,
     target: float,
+    now: float,
+    reached: float,
     longest: float,
     notes: FloatArray,
     w: FloatArray,
 ) -> float:
     """Valve-open time, at most `longest`, s, after which a driven chamber is at a fill that it reaches.
 
+    Args: `now`, `reached`: its fill at first, and after the longest time.
+
     By the secant within a bracket that shrinks, halving the weight of an end that stays (the Illinois rule).
     """
     low, high, stays = 0.0, longest, 0
-    above = _fill_after(plant, liquid, pair, side, 0.0, notes, w) - target
-    below = _fill_after(plant, liquid, pair, side, longest, notes, w) - target
+    above, below = now - target, reached - target
     time = longest
     for _ in range(_HALVINGS):
         time = low + (high - low) * above / (above - below) if above > below else (low + high) / 2.0
         found = _fill_after(plant, liquid, pair, side, time, notes, w) - target
-        if abs(found) <= FILL_ERROR or high - low <= 4e-16 * high:
+        if abs(found) <= FILL_ERROR * plant.relative_error or high - low <= 4e-16 * high:
             break
         if found > 0.0:
             low, above, below, stays = time, found, below * (0.5 if stays > 0 else 1.0), 1

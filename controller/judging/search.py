@@ -32,6 +32,8 @@ DEVICES: Final = _HEATS[-1][1]
 _FINAL: Final = (DEVICES, 4 * DEVICES)
 """Devices that choose between the last few settings, by first and last number."""
 _FINALISTS: Final = 8
+_FEW: Final = 3
+"""Of these where the best serve enough of the first devices: to tell a plateau's middle from its edge."""
 _BEHIND: Final = 0.2
 """Level of the paired test by which a setting is worse than the best and does not run in the next heat."""
 _MORE: Final = 2 / DEVICES
@@ -46,8 +48,9 @@ _ROUNDS: Final = 6
 """In which neighbours are tried."""
 _ALONG: Final = 3
 """The same at a level of an axis, from the best of the level beside it."""
-CURVE: Final = Draws.block(256, 64, whole=False)
-"""Devices of the answer along an axis: neither those of the choice nor those of the verdict."""
+_CURVE: Final = tuple(Draws.block(256 + first, count, whole=False) for first, count in ((0, 16), (16, 48)))
+"""Devices of the answer along an axis: neither those of the choice nor those of the verdict; a level at which
+none of the first settle is answered by them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,15 +171,26 @@ def _starts(tried: Sequence[Tried]) -> list[Tried]:
 
 
 def _final(balancer: Balancer, tried: Sequence[Tried]) -> Tried | None:
-    """The best; where few devices are served, of those that serve most on more devices."""
+    """The best on more devices, of those that serve most on the first: 32 of 32 are no proof of 0.9."""
     best = chosen(tried)
-    if best is None or best.count == 0 or best.fraction >= _ENOUGH:
+    if best is None or best.count == 0:
         return best
-    last = sorted(tried, key=lambda each: (-each.count, each is not best))[:_FINALISTS]
+    last = _finalists(tried, best)
     first, end = _FINAL
     settings = [each.judgement.settings for each in last]
     ran = balancer.run_all(settings, Draws.block(first, end - first, whole=False))
     return chosen(each.joined(outcomes) for each, outcomes in zip(last, ran, strict=True))
+
+
+def _finalists(tried: Sequence[Tried], best: Tried) -> list[Tried]:
+    """The best first; few where it serves enough, each the one to choose without those before."""
+    if best.fraction < _ENOUGH:
+        return sorted(tried, key=lambda each: (-each.count, each is not best))[:_FINALISTS]
+    last, others = [best], [each for each in tried if each is not best]
+    while len(last) < _FEW and (following := chosen(others)) is not None and following.count:
+        last.append(following)
+        others.remove(following)
+    return last
 
 
 def chosen(tried: Iterable[Tried]) -> Tried | None:
@@ -215,8 +229,8 @@ def _raced(balancer: Balancer, field: Sequence[Candidate], *, leading: Tried | N
         ranked = [each.judgement.meets for each in (*running.values(), leading) if each]
         best = max((meets[:last] for meets in ranked), key=np.count_nonzero)
         if not best.any():
-            # None settles: one of them goes on, to say why.
-            running = dict(list(running.items())[:1])
+            # None settles: one of them says why.
+            return [each for each in running.values() if each][:1]
         running = {i: each for i, each in running.items() if each and not _worse(each, best)}
     return [each for each in running.values() if each]
 
@@ -277,14 +291,16 @@ def _beside(balancer: Balancer, best: Tried, chosen_at: Mapping[int, Tried], *, 
 def _answered(balancer: Balancer, kept: Mapping[int, Candidate], axis: Axis) -> dict[int, Along]:
     settings = [each.settings or _bare(each, axis) for each in kept.values()]
     asked, demands = balancer.asked_fraction(), balancer.demands()
-    outcomes = balancer.run_all(settings, CURVE)
-    return {
-        at: Along(
-            level=axis.levels[at],
-            judgement=Judgement(settings=setting, asked=asked, demands=demands, outcomes=outcome),
-        )
-        for at, setting, outcome in zip(kept, settings, outcomes, strict=True)
-    }
+    few, more = _CURVE
+    judged = [
+        Judgement(settings=setting, asked=asked, demands=demands, outcomes=outcome)
+        for setting, outcome in zip(settings, balancer.run_all(settings, few), strict=True)
+    ]
+    serving = [i for i, each in enumerate(judged) if each.fraction.count]
+    if serving:
+        for i, outcome in zip(serving, balancer.run_all([settings[i] for i in serving], more), strict=True):
+            judged[i] = replace(judged[i], outcomes=judged[i].outcomes.joined(outcome))
+    return {at: Along(level=axis.levels[at], judgement=each) for at, each in zip(kept, judged, strict=True)}
 
 
 def _bare(candidate: Candidate, axis: Axis) -> Settings:

@@ -55,7 +55,9 @@ def tuned(
     if found and (along or best.verdict != MET):
         curve = searched_along(balancer, found[0], progress=told)
         best, found = _better(balancer, best, found, curve, progress=told)
-    longer = None if balancer.watched_to_end else _longer(balancer, best.settings, progress=told)
+    # Of devices of which none settles, none stays so for longer.
+    watched = balancer.watched_to_end or not best.fraction.count
+    longer = None if watched else _longer(balancer, best.settings, progress=told)
     axis = trials[0].along if trials else None
     level = None if axis is None else best.settings.get(axis.name)
     own_level = None if axis is None else value_at(balancer.scene, axis.name)

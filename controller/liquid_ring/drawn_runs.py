@@ -101,7 +101,8 @@ class DrawnRuns:
     def _setting(self, place: int, setting: Settings) -> _Setting:
         scene = with_values_at(self.scene, setting)
         check_settings(scene)
-        return _Setting(place=place, scene=scene, controller=controller_of(scene, self.model))
+        controller = controller_of(scene, self.model, relative_error=RELATIVE_ERROR)
+        return _Setting(place=place, scene=scene, controller=controller)
 
     def _runs(
         self, under: _Under, asked: Sequence[_Setting], further: float, *, whole: bool

@@ -18,13 +18,15 @@ from ringbalance.scene.origins import raw_value_at
 
 PRESSURE: Final = "gas.pressure"
 _GAIN: Final = Axis(
-    name="loop factor", levels=(0.1, 0.16, 0.25, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 1.9), first=(2, 4, 6, 8)
+    name="loop factor", levels=(0.06, 0.1, 0.16, 0.25, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 1.9), first=(3, 5, 7, 9)
 )
 _OFFSET: Final = Axis(
-    name="offset over dead time", levels=(0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0), first=(0, 2, 4)
+    name="offset over dead time",
+    levels=(0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 3.0),
+    first=(0, 4, 8),
 )
 _INTEGRAL: Final = Axis(
-    name="period over integral time", levels=(0.0, 0.05, 0.1, 0.2, 0.35, 0.5), first=(1, 3)
+    name="period over integral time", levels=(0.0, 0.03, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7), first=(2, 4, 6)
 )
 _PRESSURES: Final = tuple(float(f) for f in np.round(1.1 ** np.arange(-12, 13), 3))
 """Times the scene's."""

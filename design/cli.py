@@ -46,7 +46,8 @@ def sweep(
         vary: axes, such as tube.bore=0.5mm:2mm:30, gas.pressure=0.4MPa,0.7MPa or gas=valves.csv.
         plan: a TOML file with vary and sample instead.
         sample: sobol:N or latin:N points of the axes' ranges instead of every combination.
-        runs: drawn devices that every point is run as in closed loop; 0 for static answers alone.
+        runs: drawn devices that every point is run as in closed loop at most, fewer where they decide; 0
+            for static answers alone.
         no_intervals: leave out what the uncertain inputs do to static answers: most of their time.
         check: rows of a liquid ring to calibrate, which measures what the array core leaves out.
         workers: processes; default one for each processor.

@@ -35,6 +35,7 @@ STORE: Final = "store"
 _BEST: Final = "reach"
 """What static rows are ranked by: the largest."""
 _OF_RUNS: Final = {
+    "devices": ("devices", ""),
     "fraction": ("fraction", "1"),
     "low": ("fraction low", "1"),
     "high": ("fraction high", "1"),
@@ -58,7 +59,7 @@ class Sweep(Result):
     driven: tuple[Record, ...]
     """See `run_row`."""
     runs: int
-    """Drawn devices a point; 0: static alone."""
+    """Drawn devices a point at most; 0: static alone."""
     errors: tuple[Record, ...]
     """By quantity, of what the array core leaves out, see `trade.errors`; empty where nothing was checked."""
     designs_per_second: Mapping[str, float]

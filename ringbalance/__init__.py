@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from ringbalance.controller.rotor import Sensor as Sensor
     from ringbalance.controller.simulation import Simulation as Simulation
     from ringbalance.design.sweep import Sweep as Sweep
+    from ringbalance.designs import objective as objective
+    from ringbalance.designs import sweep as sweep
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
@@ -44,7 +46,6 @@ if TYPE_CHECKING:
     from ringbalance.studies import fit as fit
     from ringbalance.studies import plot as plot
     from ringbalance.studies import run_cases as run_cases
-    from ringbalance.studies import sweep as sweep
     from ringbalance.studies import trade as trade
     from ringbalance.studies import write_report as write_report
     from ringbalance.verification.extremes.study import Extremes as Extremes
@@ -89,6 +90,7 @@ _NAMES = {
     "controller.simulation": ("Simulation",),
     "controller.judging.tuning": ("Tuning",),
     "design.sweep": ("Sweep",),
+    "designs": ("objective", "sweep"),
     "face": (
         "compare",
         "simulate",
@@ -115,7 +117,6 @@ _NAMES = {
         "fit",
         "plot",
         "run_cases",
-        "sweep",
         "trade",
         "write_report",
     ),

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
-from ringbalance.design.axes import plan_of
-from ringbalance.design.sweep import Sweep, run_sweep
-from ringbalance.design.work import Progress as SweepProgress
 from ringbalance.identification.criticism import Review
 from ringbalance.identification.documents import fit_document, fit_rows
 from ringbalance.identification.fitting import FitResult, FittedParameter, Loss
@@ -95,47 +91,6 @@ def fit(
         data=observations,
         review=Review.of(result),
         next_measurement=next_measurement(result, next),
-    )
-
-
-def sweep(
-    scene: AnyScene,
-    vary: Mapping[Any, Any],
-    *,
-    sample: str = "",
-    runs: int = 0,
-    intervals: bool = True,
-    check: int = 0,
-    executor: Executor | None = None,
-    workers: int = 1,
-    store: str | PathLike[str] | None = None,
-    progress: SweepProgress | None = None,
-) -> Sweep:
-    """Answer every point of a grid, or of a sample, of changed scenes.
-
-    Args: `vary`: by path such as "tube.bore", an array in SI, a list of values as a scene file has them, or
-        a text such as "0.5mm:2mm:30"; by a tuple of paths that move together, one of these for each; by the
-        name of a table, a list of mappings from its keys, or a CSV file. `sample`: "sobol:1024" or
-        "latin:1024" instead of every combination; ranges are "0.5mm:2mm" then. `runs`: drawn devices that
-        each point is run as. `intervals`: whether uncertain inputs are followed through. `check`: rows of a
-        liquid ring to calibrate, which measures what the array core leaves out. `executor`: any
-        `concurrent.futures.Executor`; its answers are those of this process to the last bit. `workers`:
-        processes of its own where there is none. `store`: folder in which answers are kept, and from which
-        an interrupted sweep goes on. `progress`: called with how far it is.
-    Raises: SceneError: a scene or an axis that cannot be used; a point that is refused is a row with its
-        finding.
-    """
-    scene = checked_scene(scene)
-    return run_sweep(
-        scene,
-        plan_of(scene, vary, sample=sample),
-        runs=runs,
-        intervals=intervals,
-        check=check,
-        store=None if store is None else Path(store),
-        executor=executor,
-        workers=workers,
-        progress=progress,
     )
 
 

@@ -54,6 +54,17 @@ def test_runs_are_those_of_the_balancer(paper_scene: Scene) -> None:
     assert found.verdicts[0] == "not met"
 
 
+def test_one_design_is_answered_as_a_row_of_a_sweep(paper_scene: Scene) -> None:
+    changes = {"gas.pressure": 0.42e6}
+    answer = rb.objective(paper_scene, changes, runs=64)
+    row = rb.sweep(paper_scene, {"gas.pressure": [0.42e6]}, runs=64, intervals=False)
+    assert answer["usable_moment"] == row.static[0]["values"]["usable_moment"][0]
+    assert answer["fraction"] == row.driven[0]["fraction"]
+    # Sixteen devices of which none settles decide.
+    assert (answer["verdict"], answer["devices"]) == ("not met", 16)
+    assert rb.objective(paper_scene, {"tube.hump_radius": 0.5}, runs=64)["status"] == "point_refused"
+
+
 def test_eccentric_masses_have_their_own_rows() -> None:
     scene = rb.load_scene(rb.bundled_scene("driven_masses_small"))
     found = rb.sweep(scene, {"masses.mass": np.array([1.0, 1.1]) * scene.masses.mass}, runs=1)  # type: ignore[attr-defined]

@@ -1,0 +1,81 @@
+"""Many designs as a Python user calls them: a sweep, and one design as a function to optimise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ringbalance.design.axes import plan_of
+from ringbalance.design.runs import EMPTY, run_row
+from ringbalance.design.static import static_rows
+from ringbalance.design.sweep import Sweep, run_sweep
+from ringbalance.design.work import Progress
+from ringbalance.scene import AnyScene
+from ringbalance.scene.changes import checked_scene
+
+
+def sweep(
+    scene: AnyScene,
+    vary: Mapping[Any, Any],
+    *,
+    sample: str = "",
+    runs: int = 0,
+    intervals: bool = True,
+    check: int = 0,
+    executor: Executor | None = None,
+    workers: int = 1,
+    store: str | PathLike[str] | None = None,
+    progress: Progress | None = None,
+) -> Sweep:
+    """Answer every point of a grid, or of a sample, of changed scenes.
+
+    Args: `vary`: by path such as "tube.bore", an array in SI, a list of values as a scene file has them, or
+        a text such as "0.5mm:2mm:30"; by a tuple of paths that move together, one of these for each; by the
+        name of a table, a list of mappings from its keys, or a CSV file. `sample`: "sobol:1024" or
+        "latin:1024" instead of every combination; ranges are "0.5mm:2mm" then. `runs`: drawn devices that
+        each point is run as at most, fewer where they decide. `intervals`: whether uncertain inputs are
+        followed through. `check`: rows of a liquid ring to calibrate, which measures what the array core
+        leaves out. `executor`: any `concurrent.futures.Executor`; its answers are those of this process to
+        the last bit. `workers`: processes of its own where there is none. `store`: folder in which answers
+        are kept, and from which an interrupted sweep goes on. `progress`: called with how far it is.
+    Raises: SceneError: a scene or an axis that cannot be used; a point that is refused is a row with its
+        finding.
+    """
+    scene = checked_scene(scene)
+    return run_sweep(
+        scene,
+        plan_of(scene, vary, sample=sample),
+        runs=runs,
+        intervals=intervals,
+        check=check,
+        store=None if store is None else Path(store),
+        executor=executor,
+        workers=workers,
+        progress=progress,
+    )
+
+
+def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> dict[str, Any]:
+    """Answer one changed scene with plain numbers, for an optimiser: the same changes give the same answer.
+
+    Args: `changes`: values in SI, or texts as a scene file has them, by path such as "tube.bore". `runs`:
+        drawn devices that it is run as at most; 0: static answers alone.
+    Returns: The columns of a sweep's row in SI, None where not known: of a liquid ring `lambda`, `moment`,
+        `velocity`, `usable_moment` and others; with runs `fraction` of the devices that meets all that the
+        scene requires, its bounds `low` and `high` (95 %), and `settling_time`. `status` is "ok", "blocked"
+        (no flow) or "point_refused", `verdict` with runs "met", "not met" or "undecided", `finding` says why
+        there is no answer. A refused change raises nothing, so that a search goes on.
+    """
+    scene = checked_scene(scene)
+    (row,) = static_rows(scene, [dict(changes)], intervals=False)
+    run = run_row(scene, dict(changes), runs) if runs and row["sha256"] else EMPTY
+    finding = row["finding"] or run["finding"]
+    return {
+        **{name: value for name, (value, _) in row["values"].items()},
+        **{name: value for name, value in run.items() if name not in ("ended", "finding")},
+        "status": row["status"],
+        "finding": finding["values"]["text"] if finding else "",
+    }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_format
 from pathlib import Path
+from typing import Literal
 
 from ringbalance.controller.balancer import balancer_of, balancer_under, takes
 from ringbalance.controller.compare import compare as compare_balancers
@@ -68,15 +69,18 @@ def compare(
     second: Path,
     *,
     law: str = "calibrated",
+    rotor: Literal["first", "second"] | None = None,
     json: bool = False,
     tolerance: str | None = None,
     models: Models | None = None,
 ) -> int:
-    """Run two balancers, both tuned, on one rotor, that of the first scene, as the same drawn devices.
+    """Run two balancers, both tuned, on one rotor as the same drawn devices.
 
     Args:
-        first: a scene file; its rotor, vibration sensor and limit hold for both.
-        second: another scene file; only its balancer counts.
+        first: a scene file.
+        second: another scene file; the order does not matter.
+        rotor: "first" or "second", the scene whose rotor, vibration sensor and limit hold for both; needed
+            where the two scenes describe different rotors.
         law: of a liquid ring: "calibrated", "paper", or a file written by `ringbalance calibrate --save`.
         json: print one JSON document instead of a table.
         tolerance: in place of that of both scenes, such as "0.5 %" or 0.005.
@@ -95,7 +99,7 @@ def compare(
         for scene in [with_tolerance(load_scene(path), tolerance=tolerance, models=models)]
     )
     with activity("compare", "both balancers on one rotor ...") as shown:
-        found = compare_balancers(one, other, progress=shown.show)
+        found = compare_balancers(one, other, rotor=rotor, progress=shown.show)
     if json:
         print(json_format.dumps(found.to_dict(), allow_nan=False))
     else:

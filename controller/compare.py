@@ -1,8 +1,9 @@
 """Two balancers side by side on one rotor, each with settings chosen by runs: what fractions settle.
 
 Both are run as the devices of one number: with the same drawn rotor (speed, influence coefficient, unbalance
-in size and direction), each with its own inputs drawn, and with noise by that number.  The rotor is as
-uncertain as that of the two scenes which states more, so that the order of the scenes does not matter to it.
+in size and direction), each with its own inputs drawn, and with noise by that number.  The rotor is that of
+both scenes, or that of the one which is named; it is as uncertain as the scene that states more, and as much
+is asked as by the scene that asks more.  Nothing depends on the order of the scenes.
 """
 
 from __future__ import annotations
@@ -18,7 +19,15 @@ from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.judging.tuning_rows import plain_settings, setting_text
-from ringbalance.controller.rotor import CommonRotor, Rotors, rotors_of, vibrating
+from ringbalance.controller.rotor import (
+    CommonRotor,
+    Rotors,
+    one_rotor,
+    rotor_difference,
+    rotor_fault,
+    rotors_of,
+    vibrating,
+)
 from ringbalance.reduced_model.terms import ModelUsed
 from ringbalance.results.paired import Paired
 from ringbalance.results.proportion import Proportion
@@ -141,11 +150,11 @@ class Comparison(Result):
     """Two balancers on one rotor."""
 
     rotor: CommonRotor
-    """That of the first scene, as it says."""
+    """That of both scenes, or of the one that was named."""
     span: float
     """s, from the start of balancing, of every run: the longer time limit of both scenes."""
     asked: float
-    """Fraction of the devices, of the first scene."""
+    """Fraction of the devices, of the scene that asks more."""
     sides: tuple[Side, Side]
     """In the order of the scenes."""
 
@@ -234,39 +243,59 @@ class Comparison(Result):
         return Finding(code="compared_better", values={**values, "source": self.sides[better].scene.source})
 
 
+FIRST, SECOND = ("first", "second")
+"""Names of the scenes as a rotor is asked for."""
+
+
 def compare(
     first: Balancer,
     second: Balancer,
     *,
+    rotor: str | None = None,
     most: int = MOST,
     progress: Callable[[str], None] | None = None,
 ) -> Comparison:
-    """Put two balancers on the rotor of the first, choose settings for each, and run both as drawn devices.
+    """Put two balancers on one rotor, choose settings for each, and run both as drawn devices.
 
-    Of the second its balancer alone counts.
-    Args: `most`: after so many a difference that cannot be told is left open.
-    Raises: SceneError: a balancer that cannot work on that rotor.
+    Args: `rotor`: "first" or "second", the scene whose rotor, sensor and limit hold for both; default that
+        of both scenes. `most`: after so many a difference that cannot be told is left open.
+    Raises: SceneError: the scenes describe two rotors and none is named, or a balancer cannot work on it.
     """
     told = progress or (lambda _: None)
-    rotor = vibrating(first.scene, first.rotor())
-    rotors = rotors_of(first.rotor, second.rotor)
+    common, home = _common_rotor(first, second, rotor)
+    rotors = rotors_of(common, first.rotor, second.rotor)
     try:
-        # Whether the second can work there at all is known before anything is run.
-        placed = [each.on_rotor(rotor, rotors) for each in (first, second)]
+        # Whether the other can work there at all is known before anything is run.
+        placed = [each.on_rotor(common, rotors) for each in (first, second)]
         span = max(each.span() for each in placed)
         both = [each.lasting(span) for each in placed]
         settings = [searched(each, progress=told) for each in both]
         outcomes = _raced(both, settings, most=most, progress=told)
         one, other = (_side(*each, rotors) for each in zip(both, settings, outcomes, strict=True))
     except SceneError as error:
-        raise SceneError(_placed(first.scene, fault) for fault in error.faults) from error
-    return Comparison(rotor=rotor, span=span, asked=first.asked_fraction(), sides=(one, other))
+        raise SceneError(_placed(home, fault) for fault in error.faults) from error
+    asked = max(each.asked_fraction() for each in (first, second))
+    return Comparison(rotor=common, span=span, asked=asked, sides=(one, other))
 
 
-def _placed(first: SceneFile, fault: Fault) -> Fault:
-    if fault.file == first.file:
+def _common_rotor(first: Balancer, second: Balancer, rotor: str | None) -> tuple[CommonRotor, SceneFile]:
+    """The rotor for both, and the scene that it is taken from."""
+    if rotor is not None:
+        home = {FIRST: first, SECOND: second}[rotor]
+        return vibrating(home.scene, home.rotor()), home.scene
+    one, other = (vibrating(each.scene, each.rotor()) for each in (first, second))
+    if (name := rotor_difference(one, other)) is not None:
+        problem = f"another {name} than in {other.source}: two rotors, and neither is named for both"
+        allowed = f"one rotor in both scenes, or --rotor {FIRST} or {SECOND}"
+        raise rotor_fault(first.scene, "rotor", problem, allowed)
+    common = one_rotor(one, other)
+    return common, first.scene if common.source == one.source else second.scene
+
+
+def _placed(home: SceneFile, fault: Fault) -> Fault:
+    if fault.file == home.file:
         return fault
-    return replace(fault, problem=f"on the rotor of {first.source}: {fault.problem}")
+    return replace(fault, problem=f"on the rotor of {home.source}: {fault.problem}")
 
 
 def _raced(

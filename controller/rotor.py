@@ -131,7 +131,7 @@ Rotors = Callable[[int], CommonRotor]
 
 
 _COUNT: Final = 16
-"""Devices by which it is told which of two scenes draws a quantity more widely."""
+"""Devices by which it is told which of the scenes draws a quantity more widely."""
 
 
 class _Drawn(Protocol):
@@ -140,23 +140,46 @@ class _Drawn(Protocol):
     def __call__(self, number: int | None = None) -> CommonRotor: ...
 
 
-def rotors_of(first: _Drawn, second: _Drawn) -> Rotors:
-    """The rotor that the first scene says, drawn as widely as either scene draws its own.
+_SAME: Final = 0.01
+"""Relative difference of speed, alpha and U_0 up to which two scenes describe one rotor: files state these to
+two or three digits, and a balancing run leaves more of a vibration than so small a difference makes."""
+
+
+def rotor_difference(one: CommonRotor, other: CommonRotor) -> str | None:
+    """Name of a quantity in which two rotors differ; None: they are one, to the digits of scene files."""
+    for name in ("speed", "influence", "unbalance"):
+        values = getattr(one, name), getattr(other, name)
+        if abs(values[0] - values[1]) > _SAME * max(map(abs, values)):
+            return name
+    return None
+
+
+def one_rotor(one: CommonRotor, other: CommonRotor) -> CommonRotor:
+    """Of two descriptions of one rotor: the more vibration, the worse sensor and the narrower limit.
+
+    Symmetric in both: no verdict under it depends on which is named first.
+    """
+    rougher = max(one, other, key=lambda rotor: (rotor.amplitude, rotor.mass or 0.0))
+    return replace(rougher, noise=max(one.noise, other.noise), limit=min(one.limit, other.limit))
+
+
+def rotors_of(nominal: CommonRotor, *scenes: _Drawn) -> Rotors:
+    """A rotor, drawn as widely as any of the scenes draws its own.
 
     Each of speed, magnitude and angle of alpha, and size and direction of the unbalance deviates by what that
-    scene draws of which it is more uncertain: the order of the scenes does not matter to the deviations.
+    scene draws which is least sure of it: the order of the scenes does not matter to the deviations.
     """
-    nominal = first()
-    scenes = [_deviations(nominal, first)]
-    with suppress(SceneError):
-        # A rotor that stands still or does not vibrate says nothing of this one.
-        if (own := second()).amplitude > 0.0:
-            scenes.append(_deviations(own, second))
-    spread = np.array([np.std([of(number) for number in range(_COUNT)], axis=0) for of in scenes])
+    drawn_by = []
+    for scene in scenes:
+        with suppress(SceneError):
+            # A rotor that stands still or does not vibrate says nothing of this one.
+            if (own := scene()).amplitude > 0.0:
+                drawn_by.append(_deviations(own, scene))
+    spread = np.array([np.std([of(number) for number in range(_COUNT)], axis=0) for of in drawn_by])
     wider = np.argmax(spread, axis=0)
 
     def rotor(number: int) -> CommonRotor:
-        drawn = np.choose(wider, [of(number) for of in scenes])
+        drawn = np.choose(wider, [of(number) for of in drawn_by])
         speed, size, angle, unbalance, direction = drawn.tolist()
         return replace(
             nominal,

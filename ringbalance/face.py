@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import Any, Protocol, cast, overload
+from typing import Any, Literal, Protocol, cast, overload
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.balancer import AS_GIVEN, balancer_of
@@ -96,14 +96,16 @@ def simulate(
     return cast("Simulation | EccentricRun", run)
 
 
-def compare(first: AnyScene, second: AnyScene) -> Comparison:
-    """Put two balancers on the rotor of the first scene, and let each balance it.
+def compare(
+    first: AnyScene, second: AnyScene, *, rotor: Literal["first", "second"] | None = None
+) -> Comparison:
+    """Put two balancers on one rotor, and let each balance it; liquid rings under their calibrated laws.
 
-    Args: `first`: its rotor, vibration sensor and limit hold for both. `second`: only its balancer counts;
-        liquid rings run under their calibrated laws.
-    Raises: SceneError: a balancer that cannot work on that rotor.
+    Args: `rotor`: the scene whose rotor, vibration sensor and limit hold for both; default that of both.
+    Raises: SceneError: the scenes describe two rotors and none is named, or a balancer cannot work on it.
     """
-    return run_comparison(*(balancer_of(checked_scene(scene)) for scene in (first, second)))
+    one, other = (balancer_of(checked_scene(scene)) for scene in (first, second))
+    return run_comparison(one, other, rotor=rotor)
 
 
 def tune(

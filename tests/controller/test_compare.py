@@ -17,7 +17,7 @@ from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, SpeedPoint, eccentric_scene
 from ringbalance.controller.judging.judge import judged
-from ringbalance.controller.rotor import CommonRotor, rotors_of
+from ringbalance.controller.rotor import CommonRotor, one_rotor, rotors_of
 from ringbalance.results.paired import Paired
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.origins import SceneFile
@@ -114,8 +114,10 @@ def test_eccentric_masses_start_in_steady_whirl_at_constant_speed(driven: Eccent
 def test_no_ring_at_the_speed_of_the_eccentric_masses(driven: EccentricScene, paper_scene: Scene) -> None:
     pattern = "on the rotor of eccentric_mass_paper.toml: so slow that gravity"
     with pytest.raises(SceneError, match=pattern) as caught:
-        compare(under_paper_law(driven), under_paper_law(paper_scene))
+        compare(under_paper_law(driven), under_paper_law(paper_scene), rotor="first")
     assert caught.value.faults[0].file == str(bundled_scene("liquid_ring_paper"))
+    with pytest.raises(SceneError, match="another speed than in .*: two rotors"):
+        compare(under_paper_law(driven), under_paper_law(paper_scene))
 
 
 def _at(driven: EccentricScene, speed: float) -> EccentricScene:
@@ -168,8 +170,9 @@ def test_both_are_run_on_the_same_drawn_rotor_whichever_is_first(
     ring, masses = under_paper_law(paper_scene), balancer_of(small)
     both: dict[int, CommonRotor] = {}
     for first, second in ((ring, masses), (masses, ring)):
-        rotors = rotors_of(first.rotor, second.rotor)
-        placed = [each.on_rotor(first.rotor(), rotors) for each in (first, second)]
+        common = one_rotor(first.rotor(), second.rotor())
+        rotors = rotors_of(common, first.rotor, second.rotor)
+        placed = [each.on_rotor(common, rotors) for each in (first, second)]
         for number in (3, 70):
             rotor = both.setdefault(number, rotors(number))
             for other in (rotors(number), *(each.rotor(number) for each in placed)):
@@ -182,7 +185,8 @@ def test_both_are_run_on_the_same_drawn_rotor_whichever_is_first(
 def test_the_rotor_is_as_uncertain_as_the_scene_that_states_more(paper_scene: Scene) -> None:
     vague = paper_scene.with_values({"uncertainty.influence_coefficient": "20 %"})
     one, other = (under_paper_law(each) for each in (paper_scene, vague))
-    for rotors in (rotors_of(one.rotor, other.rotor), rotors_of(other.rotor, one.rotor)):
+    for scenes in ((one.rotor, other.rotor), (other.rotor, one.rotor)):
+        rotors = rotors_of(one.rotor(), *scenes)
         for number in (3, 70):
             assert rotors(number).influence == pytest.approx(other.rotor(number).influence)
 
@@ -267,11 +271,20 @@ def test_the_masses_do_as_well_on_their_own_rotor_as_on_the_same_one_of_a_ring(
         assert times[0] == pytest.approx(times[1], rel=0.03)
 
 
+def test_the_order_of_ring_and_masses_makes_no_difference(paper_scene: Scene, small: EccentricScene) -> None:
+    ring, masses = under_paper_law(paper_scene), balancer_of(small)
+    one, other = (compare(*both, most=8) for both in ((ring, masses), (masses, ring)))
+    assert one.rotor == other.rotor
+    assert [side.fraction for side in one.sides] == [side.fraction for side in reversed(other.sides)]
+    times = [[side.middle("settling_time") for side in found.sides] for found in (one, other)]
+    assert times[0] == times[1][::-1]
+
+
 def test_two_pairs_of_eccentric_masses(driven: EccentricScene) -> None:
     """A second pair of half the mass cannot undo the imbalance of the first one's rotor."""
     strong = replace(driven, run=replace(driven.run, time_limit=40.0))
     weak = replace(strong, masses=replace(driven.masses, mass=0.06), source="weak.toml")
-    found = compare(under_paper_law(strong), under_paper_law(weak), most=8)
+    found = compare(under_paper_law(strong), under_paper_law(weak), rotor="first", most=8)
     good, poor = found.sides
     assert (good.fraction.count, poor.fraction.count, found.better) == (8, 0, 0)
     middle = good.middle("settling_time")
@@ -289,7 +302,10 @@ def test_two_pairs_of_eccentric_masses(driven: EccentricScene) -> None:
 def test_the_command(capsys: pytest.CaptureFixture[str]) -> None:
     """One clean JSON document; a balancer that cannot work there is bad input, told in one line."""
     ring, masses = (str(bundled_scene(name)) for name in ("liquid_ring_paper", "eccentric_mass_paper"))
-    code = main(["compare", ring, str(bundled_scene("six_chamber")), "--law", "paper", "--json"])
+    words = ["compare", ring, str(bundled_scene("six_chamber")), "--law", "paper", "--json"]
+    assert main(words) == 2
+    assert "another speed" in capsys.readouterr().err
+    code = main([*words, "--rotor", "first"])
     told = capsys.readouterr()
     # A run that SIGTERM interrupts prints no document: its exit code and its message say so.
     assert code in (0, 1), told.err
@@ -298,7 +314,7 @@ def test_the_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert found["rotor"]["source"] == "liquid_ring_paper.toml"
     assert code == (0 if found["verdict"] == ["met", "met"] else 1)
     assert all(energy > 0 for energy in found["energy_J"])
-    assert main(["compare", masses, ring]) == 2
+    assert main(["compare", masses, ring, "--rotor", "first"]) == 2
     told = capsys.readouterr()
     assert told.out == ""
     assert "on the rotor of eccentric_mass_paper.toml" in told.err

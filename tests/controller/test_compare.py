@@ -116,7 +116,7 @@ def test_no_ring_at_the_speed_of_the_eccentric_masses(driven: EccentricScene, pa
     with pytest.raises(SceneError, match=pattern) as caught:
         compare(under_paper_law(driven), under_paper_law(paper_scene), rotor="first")
     assert caught.value.faults[0].file == str(bundled_scene("liquid_ring_paper"))
-    with pytest.raises(SceneError, match="another speed than in .*: two rotors"):
+    with pytest.raises(SceneError, match="another speed than in"):
         compare(under_paper_law(driven), under_paper_law(paper_scene))
 
 

@@ -23,7 +23,7 @@ from ringbalance.results.requirements import MET
 from ringbalance.results.rows import Finding
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.draws import BLOCK
-from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.origins import SceneFile, value_at
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import shortest, shortest_quantity
 
@@ -64,8 +64,25 @@ def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
             "path": tuning.along_name,
             "levels": [_level(each) for each in tuning.along],
         },
+        "moved": _moved(tuning),
         "ranking": tuning.ranking.document(),
         **_advice(tuning),
+    }
+
+
+def _moved(tuning: Tuning) -> Record | None:
+    """Where the recommended settings leave the scene's level of the axis, and what serves how many there."""
+    path = tuning.along_name
+    if path not in tuning.recommended.settings:
+        return None
+    before = value_at(tuning.given, path)
+    at = [each.judgement.fraction.document() for each in tuning.along if each.level == before]
+    return {
+        "name": key_words(path),
+        "unit": tuning.along_unit,
+        "before": before,
+        "after": tuning.recommended.settings[path],
+        "fraction": at[0] if at else None,
     }
 
 

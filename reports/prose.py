@@ -63,6 +63,7 @@ _ALONE: Final = ("accuracy", "environment", "run", "gas.ambient_pressure")
 """Tables, and a key, whose keys need no owner."""
 _MESH: Final = "disc.mesh"
 _KEYS: Final = {
+    "pressure": "gas pressure",
     "proportional": "gain",
     "initial_phase": "phase of the initial vibration",
     "gas_time_offset": "offset of the valve-open time",

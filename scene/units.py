@@ -199,10 +199,10 @@ def shortest(value: float) -> str:
 
 
 def shortest_quantity(value: float, usual: str) -> str:
-    """An SI value to 1e-6 in its usual unit, or in that of SI where this saves digits, such as "2.5 s"."""
+    """An SI value to 1e-6 in its usual unit, or in that of SI where this saves digits or it is zero."""
     si = next(next(iter(kind.units)) for kind in DIMENSIONS.values() if usual in kind.units)
     plain, other = (f"{shortest(value / unit_factor(unit))} {unit}" for unit in (usual, si))
-    return other if len(other) + _SAVED <= len(plain) else plain
+    return other if value == 0.0 or len(other) + _SAVED <= len(plain) else plain
 
 
 def unit_of(text: str) -> str:

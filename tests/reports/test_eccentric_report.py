@@ -91,7 +91,7 @@ def test_the_first_page_compares_with_the_locked_rotor(folder: Path, evidence: R
     assert status.split(":")[0].capitalize() in page
     assert "with the masses locked where they start" in page
     fraction = evidence["summary"]["own"]["fraction"]
-    assert f"{fraction['of']}</span> devices" in page
+    assert f"{fraction['of']}</span> drawn devices" in page
 
 
 def test_no_value_is_empty(scene: EccentricScene) -> None:

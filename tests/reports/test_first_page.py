@@ -36,7 +36,7 @@ def recommended(evidence: Record) -> Record:
 
 def test_the_fraction_of_devices_stands_first(evidence: Record, said: Said) -> None:
     page = said(evidence, "summary")
-    assert "107 of 128 devices" in page
+    assert "107 of 128 drawn devices" in page
     assert "an ideal valve" in page
     told = judged_sentences(recommended(evidence))
     assert [sentence.rpartition(": ")[2] for sentence in told] == ["not met.", "met."]

@@ -40,7 +40,7 @@ def test_the_fraction_of_devices_stands_first(evidence: Record, said: Said) -> N
     assert "an ideal valve" in page
     told = judged_sentences(recommended(evidence))
     assert [sentence.rpartition(": ")[2] for sentence in told] == ["not met.", "met."]
-    assert "64 of 64 devices" in said(recommended(evidence), "summary")
+    assert "64 of 64 drawn devices" in said(recommended(evidence), "summary")
 
 
 def test_each_step_says_what_it_reaches(evidence: Record, said: Said) -> None:

@@ -17,7 +17,9 @@ _USUAL: Final = (signal.default_int_handler, signal.SIG_DFL)
 _SAME: Final = 1.0
 """s within which another signal is taken for the same request: `timeout` sends two."""
 _AGAIN: Final = 0.01
-"""s after which a request that was lost is made again: Python is by then out of what lost it."""
+"""s after which a request that was lost, or would be, is made again."""
+_LOADING: Final = "<frozen importlib"
+"""How the files of the frames begin in which Python loads a module."""
 
 
 class _Interrupt:
@@ -25,6 +27,7 @@ class _Interrupt:
 
     Python drops an exception that is raised in a finaliser or in a weak reference's callback, and with it an
     interrupt that happens to arrive there; `unraisable` is called instead, and sends the signal again.
+    A module that is being loaded may catch whatever is raised: there the signal waits until it is loaded.
     """
 
     def __init__(self) -> None:
@@ -33,6 +36,9 @@ class _Interrupt:
         self._usual_hook = sys.unraisablehook
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
+        if _is_loading(frame):
+            self._repeat(number)
+            return
         now = time.monotonic()
         if now - self._last >= _SAME:
             self._last, self._number = now, number
@@ -44,9 +50,20 @@ class _Interrupt:
             self._usual_hook(dropped)
             return
         self._last = -_SAME
-        again = threading.Timer(_AGAIN, os.kill, (os.getpid(), self._number))
+        self._repeat(self._number)
+
+    def _repeat(self, number: int) -> None:
+        again = threading.Timer(_AGAIN, os.kill, (os.getpid(), number))
         again.daemon = True
         again.start()
+
+
+def _is_loading(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(_LOADING):
+            return True
+        frame = frame.f_back
+    return False
 
 
 @contextmanager

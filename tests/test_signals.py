@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -58,3 +59,25 @@ with interrupts():
 """
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=15)
     assert "of the finaliser" in ended.stderr
+
+
+def test_an_interrupt_waits_for_a_module_that_would_catch_it(tmp_path: Path) -> None:
+    (tmp_path / "catching.py").write_text(
+        "import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n    for _ in range(1000): pass\n"
+        "except:\n    pass\n"
+    )
+    program = """
+import signal, sys, time
+from ringbalance.signals import interrupts
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.path.insert(0, sys.argv[1])
+try:
+    with interrupts():
+        import catching
+        time.sleep(20)
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+    command = [sys.executable, "-c", program, str(tmp_path)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=15)
+    assert (ended.returncode, ended.stderr) == (130, "")

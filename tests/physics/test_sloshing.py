@@ -134,12 +134,17 @@ def test_the_interval_is_what_exact_waves_do_within_six_per_cent(disc: Disc, fil
 
 
 def test_a_peak_within_the_interval_is_found(disc: Disc) -> None:
-    """The third mode 3 % beside the speed: the upper end is about that where the mode is at the speed."""
+    """The third mode 3 % beside the speed: the upper end is what the peak over fills comes to.
+
+    Damping and the other modes move the peak off the undamped resonance, so that it is looked for.  Its fill
+    differs by at most 6 %; forcing and damping go with powers of it of two at most: 12 %.
+    """
     resonant = dict(resonant_fills(disc=disc, modes=3))[3]
     cells = ((8, 24), (4, 12), (2, 6))
-    found = forced(disc, [1.06 * resonant, resonant], kinematic_viscosity=1e-6, cells=cells)
-    beside, peak = found.amplification.value
-    assert 3 * beside < found.amplification_interval[0, 1] == pytest.approx(peak, rel=0.4)
+    fills = resonant * np.array([1.06, *np.linspace(1.0, 1.04, 21)])
+    found = forced(disc, fills, kinematic_viscosity=1e-6, cells=cells)
+    beside, *near = found.amplification.value
+    assert 3 * beside < found.amplification_interval[0, 1] == pytest.approx(max(near), rel=0.12)
 
 
 def test_gravity_only_tilts_the_surface_of_a_short_chamber(disc: Disc) -> None:

@@ -18,8 +18,8 @@ _SAME: Final = 1.0
 """s within which another signal is taken for the same request: `timeout` sends two."""
 _AGAIN: Final = 0.01
 """s after which a request that was lost, or would be, is made again."""
-_LOADING: Final = "<frozen importlib"
-"""How the files of the frames begin in which Python loads a module."""
+_WHOLE: Final = ("importlib._bootstrap", "multiprocessing.popen_")
+"""How the modules begin in which Python loads a module or starts a process."""
 
 
 class _Interrupt:
@@ -27,7 +27,9 @@ class _Interrupt:
 
     Python drops an exception that is raised in a finaliser or in a weak reference's callback, and with it an
     interrupt that happens to arrive there; `unraisable` is called instead, and sends the signal again.
-    A module that is being loaded may catch whatever is raised: there the signal waits until it is loaded.
+    A module that is being loaded may catch whatever is raised, and a process that is being started complains
+    when its parent falls silent: there the signal waits until that is done. To block it would not do, since
+    another thread may take it, and Python raises in the main one all the same.
     """
 
     def __init__(self) -> None:
@@ -36,7 +38,7 @@ class _Interrupt:
         self._usual_hook = sys.unraisablehook
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        if _is_loading(frame):
+        if _is_amid(_WHOLE, frame):
             self._repeat(number)
             return
         now = time.monotonic()
@@ -58,9 +60,9 @@ class _Interrupt:
         again.start()
 
 
-def _is_loading(frame: FrameType | None) -> bool:
+def _is_amid(modules: tuple[str, ...], frame: FrameType | None) -> bool:
     while frame is not None:
-        if frame.f_code.co_filename.startswith(_LOADING):
+        if frame.f_globals.get("__name__", "").startswith(modules):
             return True
         frame = frame.f_back
     return False

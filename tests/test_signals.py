@@ -81,3 +81,34 @@ except KeyboardInterrupt:
     command = [sys.executable, "-c", program, str(tmp_path)]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=15)
     assert (ended.returncode, ended.stderr) == (130, "")
+
+
+def test_an_interrupt_waits_for_a_process_that_is_being_started() -> None:
+    """Another thread takes the signal, the main one being closed to it: as the timer's does, or a library's."""
+    program = """
+import os, signal, sys, time
+from multiprocessing import util
+from threading import Event, Thread
+from ringbalance.scene.platform.processes import Workers
+from ringbalance.signals import interrupts
+signal.signal(signal.SIGINT, signal.default_int_handler)
+start, begun = util.spawnv_passfds, Event()
+def send():
+    begun.wait()
+    os.kill(os.getpid(), signal.SIGINT)
+sender = Thread(target=send, daemon=True)
+sender.start()
+def interrupted(*given):
+    made = start(*given)
+    begun.set()
+    sender.join()
+    return made
+try:
+    with interrupts(), Workers(1) as pool:
+        util.spawnv_passfds = interrupted
+        pool.submit(time.sleep, 20).result()
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=15)
+    assert (ended.returncode, ended.stderr) == (130, "")

@@ -1,4 +1,4 @@
-"""The source distribution holds what git holds and its tests run from it; both archives can be built again."""
+"""The source distribution holds what git holds and its tests run from it; built twice, nothing differs."""
 
 from __future__ import annotations
 

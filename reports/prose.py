@@ -116,14 +116,16 @@ def series(names: list[str]) -> str:
 
 
 def resting(evidence: Mapping[str, Any], *paths: str) -> str:
-    """The inputs among some that are neither given nor measured, with their origin."""
+    """The inputs among some that are neither given nor measured, with origin and value."""
     origins = evidence["scene"].get("origins") or {}
+    values = {row.get("path"): row.get("value", "") for row in evidence["scene"].get("table") or ()}
     by_origin: dict[str, list[str]] = {}
     for named in paths:
         # What follows from the mesh of an imported chamber rests on that.
         path = _MESH if origins.get(named) == "derived" else named
         if (origin := origins.get(path, "given")) not in _CERTAIN:
-            by_origin.setdefault(origin, []).append(key_words(path))
+            text = f"{key_words(path)} {values.get(path, '')}".rstrip()
+            by_origin.setdefault(origin, []).append(re.sub(r"\bum\b", "\N{MICRO SIGN}m", text))
     return "; ".join(f"{origin}: {', '.join(names)}" for origin, names in by_origin.items())
 
 

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Patch
 
 from ringbalance.reports.figure import FOUND, INK, MUTED, PAPER, THIRD, Drawing, draw, figure_of, panels
 from ringbalance.reports.section import Record
@@ -15,8 +16,9 @@ from ringbalance.scene.arrays import FloatArray
 
 _SHADES: Final = {MET: 0.28, OPEN: 0.1}
 """Opacity of the ground by what is known of the fraction there."""
-_LEFT, _WIDTH = 0.17, 0.8
-_BOXES: Final = ((0.60, 0.28), (0.35, 0.20), (0.11, 0.20))
+_NAMES: Final = {MET: "met", OPEN: "undecided"}
+_LEFT, _WIDTH = 0.12, 0.85
+_BOXES: Final = ((0.61, 0.22), (0.36, 0.175), (0.11, 0.175))
 """Bottom and height of the panels."""
 _MEGA, _TO_G_MM = 1e-6, 1e6
 
@@ -46,19 +48,29 @@ def pressure_figure(
             panel.set(xlim=(pressure[0], pressure[-1]))
         for panel in (share, moment):
             panel.tick_params(labelbottom=False)
-        time.set_xlabel("gas pressure in MPa")
+        time.set_xlabel("gas pressure in MPa, gauge")
         handles, labels = share.get_legend_handles_labels()
-        figure_of(axes).legend(handles, labels, loc="upper left", ncols=2, borderaxespad=0.0, borderpad=0.1)
+        grounds = [Patch(color=THIRD, alpha=_SHADES[code], linewidth=0) for code in _NAMES]
+        figure_of(axes).legend(
+            [*handles, *grounds],
+            [*labels, *_NAMES.values()],
+            loc="upper left",
+            ncols=2,
+            borderaxespad=0.0,
+            borderpad=0.1,
+        )
 
-    return draw("pressure-choice", paint, columns=0, height=3.5)
+    return draw("pressure-choice", paint, columns=0, height=3.9)
 
 
 def _shares(panel: Axes, pressure: FloatArray, shares: Sequence[Record], asked: float) -> None:
     value, low, high = (100 * np.array([each[key] for each in shares]) for key in ("value", "low", "high"))
     panel.fill_between(pressure, low, high, color=FOUND, alpha=0.25, linewidth=0)
-    panel.plot(pressure, value, color=FOUND, marker="o", markersize=3, label="settled")
-    panel.axhline(100 * asked, color=PAPER, linestyle="--", linewidth=1, label="asked")
-    panel.set(ylim=(0, 104), ylabel="devices in %")
+    panel.plot(pressure, value, color=FOUND, marker="o", markersize=3)
+    panel.axhline(100 * asked, color=PAPER, linestyle="--", linewidth=1)
+    _beside(panel, 100 * asked, "asked")
+    panel.set(ylim=(0, 104))
+    _name(panel, "devices that settle, in %")
 
 
 def _moments(panel: Axes, pressure: FloatArray, levels: Sequence[Record], needed: float) -> None:
@@ -66,7 +78,19 @@ def _moments(panel: Axes, pressure: FloatArray, levels: Sequence[Record], needed
     panel.fill_between(pressure, low, high, color=FOUND, alpha=0.25, linewidth=0)
     panel.plot(pressure, middle, color=FOUND)
     panel.axhline(_TO_G_MM * needed, color=PAPER, linestyle="--", linewidth=1)
-    panel.set(ylim=(0, None), ylabel="moment in g mm")
+    panel.set(ylim=(0, None))
+    _name(panel, "moment that can be corrected, in g mm")
+    _beside(panel, _TO_G_MM * needed, "unbalance")
+
+
+def _name(panel: Axes, text: str) -> None:
+    panel.set_title(text, loc="left", fontsize="medium", pad=3)
+
+
+def _beside(panel: Axes, level: float, text: str) -> None:
+    """Names a dashed level at its right end, below it."""
+    look: dict[str, Any] = {"color": PAPER, "fontsize": "small", "ha": "right", "va": "top"}
+    panel.annotate(text, (1.0, level), (-3, -2), panel.get_yaxis_transform(), "offset points", **look)
 
 
 def _times(panel: Axes, pressure: FloatArray, levels: Sequence[Record]) -> None:
@@ -77,7 +101,8 @@ def _times(panel: Axes, pressure: FloatArray, levels: Sequence[Record]) -> None:
     for key, look in looks:
         times = np.array([each[key][0] if each[key] else np.nan for each in levels])
         panel.plot(pressure, times, markersize=3, **look)
-    panel.set(ylim=(0, None), ylabel="time in s")
+    panel.set(ylim=(0, None))
+    _name(panel, "time to settle, in s")
     if not any(each["half_s"] for each in levels):
         panel.set_yticks([])
         panel.text(0.5, 0.5, "half of the devices nowhere settle", ha="center", transform=panel.transAxes)

@@ -92,7 +92,7 @@ THEMES: Final = (
 )
 
 
-_FONT_SIZE: Final = 27
+_FONT_SIZE: Final = 34
 """px of the finished picture."""
 
 

@@ -18,7 +18,7 @@ _SHADES: Final = {MET: 0.28, OPEN: 0.1}
 """Opacity of the ground by what is known of the fraction there."""
 _NAMES: Final = {MET: "met", OPEN: "undecided"}
 _LEFT, _WIDTH = 0.12, 0.85
-_BOXES: Final = ((0.61, 0.22), (0.36, 0.175), (0.11, 0.175))
+_BOXES: Final = ((0.64, 0.20), (0.385, 0.17), (0.12, 0.17))
 """Bottom and height of the panels."""
 _MEGA, _TO_G_MM = 1e-6, 1e6
 
@@ -60,7 +60,7 @@ def pressure_figure(
             borderpad=0.1,
         )
 
-    return draw("pressure-choice", paint, columns=0, height=3.9)
+    return draw("pressure-choice", paint, columns=0, height=3.5)
 
 
 def _shares(panel: Axes, pressure: FloatArray, shares: Sequence[Record], asked: float) -> None:

@@ -199,10 +199,11 @@ def shortest(value: float) -> str:
 
 
 def shortest_quantity(value: float, usual: str) -> str:
-    """An SI value to 1e-6 in its usual unit, or in that of SI where this saves digits or it is zero."""
+    """An SI value to 1e-6 in its usual unit, or in that of SI where it is zero or tiny or this saves digits."""
     si = next(next(iter(kind.units)) for kind in DIMENSIONS.values() if usual in kind.units)
     plain, other = (f"{shortest(value / unit_factor(unit))} {unit}" for unit in (usual, si))
-    return other if value == 0.0 or len(other) + _SAVED <= len(plain) else plain
+    tiny = abs(value) < _TINY * unit_factor(usual) and len(other) < len(plain)
+    return other if value == 0.0 or tiny or len(other) + _SAVED <= len(plain) else plain
 
 
 def unit_of(text: str) -> str:

@@ -70,6 +70,10 @@ COMMANDS = {
         "inside.",
     ),
     "plot": ("ringbalance.reports.cli:plot", "The off-screen 3-D pictures alone."),
+    "doctor": (
+        "ringbalance.doctor:doctor",
+        "What this machine gives the program, and what to do where something lacks.",
+    ),
 }
 THREAD_COUNTS = (
     "OPENBLAS_NUM_THREADS",

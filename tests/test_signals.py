@@ -84,7 +84,7 @@ except KeyboardInterrupt:
 
 
 def test_an_interrupt_waits_for_a_process_that_is_being_started() -> None:
-    """Another thread takes the signal, the main one being closed to it: as the timer's does, or a library's."""
+    """Another thread takes the signal, as the timer's or a library's does."""
     program = """
 import os, signal, sys, time
 from multiprocessing import util

@@ -9,13 +9,13 @@ WORKERS ?= 2
 SHORT_TESTS := tests/scene tests/mesh tests/architecture tests/test_public_names.py tests/test_cli.py \
 	tests/physics/test_pressure.py tests/physics/test_tube_loss.py tests/reduced_model/test_paper_law.py \
 	tests/reduced_model/test_hermite.py tests/controller/test_loop.py tests/controller/test_compiled.py
-CODE := scene results mesh physics reduced_model controller identification design verification reports tools benchmarks
+CODE := scene results mesh physics reduced_model controller identification export design verification reports tools benchmarks
 # One thread per process: the tests run side by side, and sums then come out the same on every machine.
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench bench-cfd lock clean
+.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench bench-cfd dist lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -64,6 +64,9 @@ bench: env ## timed comparisons, each a ratio within one run
 bench-cfd: env ## the tube and the waves beside OpenFOAM, an hour or so; keeps the results
 	@sh tools/make_openfoam.sh
 	$(PYTHON_IN_VENV) benchmarks/openfoam.py --keep
+
+dist: env ## source distribution and wheel of the last commit into dist/, the same bytes every time
+	$(PYTHON_IN_VENV) tools/make_dist.py
 
 lock: env ## rewrite the lock files from pyproject.toml (a change of dependencies only)
 	sh tools/make_lock.sh $(VENV)/bin/uv

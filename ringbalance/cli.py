@@ -43,6 +43,10 @@ COMMANDS = {
         "ringbalance.controller.cli:tune",
         "Recommended gain, its margins, and the settling times under it.",
     ),
+    "export": (
+        "ringbalance.export.cli:export",
+        "The flow law for another program: C, a Python module, a table.",
+    ),
     "sweep": (
         "ringbalance.design.cli:sweep",
         "Many designs: a row of answers for every point of a grid or a sample.",
@@ -66,6 +70,10 @@ COMMANDS = {
         "inside.",
     ),
     "plot": ("ringbalance.reports.cli:plot", "The off-screen 3-D pictures alone."),
+    "doctor": (
+        "ringbalance.doctor:doctor",
+        "What this machine gives the program, and what to do where something lacks.",
+    ),
 }
 THREAD_COUNTS = (
     "OPENBLAS_NUM_THREADS",

@@ -180,6 +180,10 @@ def test_keys_of_compare(folder: Path, printed: Any) -> None:
     compare("`compare --json`", [printed("compare", folder / "short.toml", folder / "line.toml")])
 
 
+def test_keys_of_doctor(printed: Any) -> None:
+    compare("`doctor --json`", [printed("doctor")])
+
+
 def test_keys_of_trade(printed: Any) -> None:
     compare("`trade --json`", [printed("trade", PAPER, "--level", "light")])
 

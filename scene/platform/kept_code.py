@@ -41,6 +41,8 @@ _LONGEST_TURN: Final = 60.0
 """s, for which another process is waited for: several times what the longest function takes."""
 _LONGEST_KEPT: Final = 60 * 86400.0
 """s, after which a file is removed when another one is kept."""
+_MOST_KEPT: Final = 5e8
+"""Bytes of all files: beyond, the oldest go. Each version of the program keeps some 30 MB."""
 _SIZE: Final = hashlib.sha256().digest_size
 
 _dumps: Any = serialize.dumps
@@ -254,10 +256,17 @@ class KeptCode(_NumbaCache):  # type: ignore[misc]
 
 @cache
 def _remove_old() -> None:
-    """Remove once in a process what was kept long ago."""
+    """Remove once in a process what was kept long ago, and the oldest of what takes too much room."""
+    files = []
     for path in [path for kind in (CODE, OTHER, _TURN) for path in code_root().glob(f"*{kind}")]:
         with contextlib.suppress(OSError):
-            if time.time() - path.stat().st_mtime > _LONGEST_KEPT:
+            status = path.stat()
+            files.append((status.st_mtime, status.st_size, path))
+    room = _MOST_KEPT
+    for kept_at, size, path in sorted(files, reverse=True):
+        room -= size
+        if room < 0 or time.time() - kept_at > _LONGEST_KEPT:
+            with contextlib.suppress(OSError):
                 path.unlink()
 
 

@@ -297,3 +297,17 @@ def test_a_real_run_survives_a_damaged_cache_and_ctrl_c(tmp_path: Path) -> None:
     time.sleep(5)
     running.send_signal(signal.SIGINT)
     assert running.wait(timeout=60) == 130
+
+
+def test_what_takes_too_much_room_goes_the_oldest_first(tmp_path: Path) -> None:
+    """Half a gigabyte on paper: the files have holes."""
+    cache = tmp_path / "cache" / "ringbalance"
+    cache.mkdir(parents=True, mode=0o700)
+    for age in (3, 2, 1):
+        path = cache / f"{age}.nbc"
+        with path.open("wb") as file:
+            file.truncate(300_000_000)
+        os.utime(path, (time.time() - age * 3600,) * 2)
+    _misses(tmp_path, tmp_path / "cache")
+    assert (cache / "1.nbc").exists()
+    assert not [age for age in (2, 3) if (cache / f"{age}.nbc").exists()]

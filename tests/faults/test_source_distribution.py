@@ -1,4 +1,4 @@
-"""The source distribution holds what git holds, and its tests run from it."""
+"""The source distribution holds what git holds and its tests run from it; built twice, nothing differs."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import tarfile
 from pathlib import Path
 
 import pytest
+from make_dist import build
 
 pytestmark = pytest.mark.faults
 
 ROOT = Path(__file__).resolve().parents[2]
-BUILD = "import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])"
 ADDED = {"PKG-INFO", "setup.cfg"}
 """What setuptools writes itself, beside the egg-info folder."""
 
@@ -38,18 +38,30 @@ def files() -> list[Path]:
 
 
 @pytest.fixture(scope="module")
-def unpacked(files: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The source distribution of a copy of the checkout, which no earlier build has touched."""
-    folder = tmp_path_factory.mktemp("sdist")
-    checkout = folder / "checkout"
-    for path in files:
-        (checkout / path).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / path, checkout / path)
-    subprocess.run([sys.executable, "-c", BUILD, folder], cwd=checkout, check=True, capture_output=True)
-    (archive,) = folder.glob("*.tar.gz")
+def archives(files: list[Path], tmp_path_factory: pytest.TempPathFactory) -> list[list[Path]]:
+    """Distributions of two copies of the checkout, which no earlier build has touched."""
+    made = []
+    for name in ("first", "second"):
+        folder = tmp_path_factory.mktemp(name)
+        for path in files:
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / path, folder / path)
+        made.append(build(folder, target=tmp_path_factory.mktemp("built"), epoch=1_700_000_000))
+    return made
+
+
+@pytest.fixture(scope="module")
+def unpacked(archives: list[list[Path]], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    archive, folder = archives[0][0], tmp_path_factory.mktemp("unpacked")
     with tarfile.open(archive) as tar:
         tar.extractall(folder, filter="data")
     return folder / archive.name.removesuffix(".tar.gz")
+
+
+def test_built_twice_they_are_the_same(archives: list[list[Path]]) -> None:
+    for first, second in zip(*archives, strict=True):
+        assert first.name == second.name
+        assert first.read_bytes() == second.read_bytes()
 
 
 def test_it_holds_what_git_holds(files: list[Path], unpacked: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged_all
 from ringbalance.design.axes import Point
-from ringbalance.design.static import FAULTS, REFUSED, Record, point_scene, refusal
+from ringbalance.design.static import EMPTY, FAULTS, REFUSED, Record, point_scene, refusal
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
 
@@ -42,17 +42,3 @@ def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
         "ended": dict(Counter(judgement.outcomes.ended)),
         "finding": None,
     }
-
-
-EMPTY: Record = {
-    "devices": None,
-    "fraction": None,
-    "low": None,
-    "high": None,
-    "verdict": "",
-    "settling_time": None,
-    "settling_time_high": None,
-    "ended": {},
-    "finding": None,
-}
-"""Of a point without runs."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
@@ -22,7 +21,7 @@ from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.changes import document_of
+from ringbalance.scene.changes import document_of, nameless
 from ringbalance.scene.designs import Designs, in_batches
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
@@ -53,12 +52,15 @@ _FIELDS: Final = {"lambda": "moment_per_mass"}
 BLOCKED: Final = "blocked"
 REFUSED: Final = "point_refused"
 """Codes of findings of a point."""
-_NAMES: Final[Mapping[str, Any]] = MappingProxyType(
-    dict.fromkeys(("name", "file", "source", "sha256", "values_sha256"), "")
-    | dict.fromkeys(("origins", "defaulted"), ())
-    | {"checked": None}
+EMPTY: Final[Mapping[str, Any]] = MappingProxyType(
+    {
+        **dict.fromkeys(("devices", "fraction", "low", "high", "settling_time", "settling_time_high")),
+        "verdict": "",
+        "ended": {},
+        "finding": None,
+    }
 )
-"""Fields of scenes that differ in numbers alone, without their names: they go through the core together."""
+"""What `run_row` gives, of a point without runs."""
 FAULTS: Final = (ValueError, ArithmeticError, RuntimeError)
 """Besides `SceneError`, how a point may break down."""
 
@@ -85,13 +87,13 @@ def static_rows(scene: SceneFile, points: Sequence[Point], *, intervals: bool = 
     scenes: list[Scene] = []
     for point in points:
         try:
-            made = point_scene(scene, point)
-            if isinstance(made, Scene):
-                check_ring(made)
-                scenes.append(replace(made, **_NAMES))
-                rows.append({"sha256": made.sha256})
-            else:
-                rows.append(_of_balancer(made))
+            if not isinstance(scene, Scene):
+                rows.append(_of_balancer(point_scene(scene, point)))
+                continue
+            made, digest = nameless(scene, point)
+            check_ring(made)
+            scenes.append(made)
+            rows.append({"sha256": digest})
         except (SceneError, *FAULTS) as error:
             rows.append(_failed(error))
     answers = iter(_answered(scenes, intervals))

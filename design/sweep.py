@@ -15,11 +15,9 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.design.axes import Plan, Point, unit_of_path
-from ringbalance.design.runs import EMPTY, run_row
-from ringbalance.design.static import Record, content_of, point_scene, static_rows
-from ringbalance.design.store import Store, key_of
-from ringbalance.design.trade import calibrated_row, chosen, errors
-from ringbalance.design.work import Done, Progress, Task, answers
+from ringbalance.design.static import EMPTY, Record, content_of, point_scene, static_rows
+from ringbalance.design.store import Store
+from ringbalance.design.work import Done, Progress, answers, tasks_of
 from ringbalance.results.numbers import given
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Result, Rows, Table, csv_text
@@ -28,8 +26,10 @@ from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.registry import registered
 
-_TOGETHER: Final = 256
-"""Points that are answered in one batch: of one composition, since a batch's last bits may depend on it."""
+_TOGETHER: Final = {True: 256, False: 1024}
+"""Points that are answered in one batch, with intervals and without: of one composition, since a batch's last
+bits may depend on it.
+"""
 STORE: Final = "store"
 """Folder of kept answers in that of a sweep."""
 _BEST: Final = "reach"
@@ -56,7 +56,7 @@ class Sweep(Result):
     """Changed values, SI or text, by path."""
     static: tuple[Record, ...]
     """See `static_rows`."""
-    driven: tuple[Record, ...]
+    driven: tuple[Mapping[str, Any], ...]
     """See `run_row`."""
     runs: int
     """Drawn devices a point at most; 0: static alone."""
@@ -279,21 +279,19 @@ def run_sweep(
 
     deal = partial(answers, store=Store(folder=store) if store else None, progress=shown)
     everywhere = partial(deal, executor=executor, workers=workers)
-    content = content_of(scene)
-    batches = [points[start : start + _TOGETHER] for start in range(0, len(points), _TOGETHER)]
-    tasks = [
-        _task(content, partial(static_rows, scene, each, intervals=intervals), each, intervals)
-        for each in batches
-    ]
-    static = [row for rows in everywhere("static", tasks) for row in rows]
-    driven = [EMPTY for _ in points]
+    content, size = content_of(scene), _TOGETHER[intervals]
+    batches = [points[start : start + size] for start in range(0, len(points), size)]
+    calls = [partial(static_rows, scene, each, intervals=intervals) for each in batches]
+    static = [row for rows in everywhere("static", tasks_of(content, calls)) for row in rows]
+    driven: list[Mapping[str, Any]] = [EMPTY for _ in points]
     places = [i for i, row in enumerate(static) if row["sha256"]] if runs else []
-    tasks = [_task(content, partial(run_row, scene, points[i], runs), [points[i]], runs) for i in places]
-    for i, row in zip(places, everywhere("runs", tasks) if places else [], strict=True):
-        driven[i] = row
-    places = chosen(static, check)
-    tasks = [_task(content, partial(calibrated_row, scene, points[i]), [points[i]]) for i in places]
-    finer = deal("calibrate", tasks, executor=None) if places else []
+    if places:
+        run_row = registered("function", "run_row")
+        calls = [partial(run_row, scene, points[i], runs=runs) for i in places]
+        for i, row in zip(places, everywhere("runs", tasks_of(content, calls)), strict=True):
+            driven[i] = row
+    here = partial(deal, executor=None)
+    left_out = registered("function", "left_out")(scene, points, static, check, here) if check else []
     return Sweep(
         scene=scene,
         plan=plan,
@@ -301,12 +299,6 @@ def run_sweep(
         static=tuple(static),
         driven=tuple(driven),
         runs=runs,
-        errors=tuple(errors([static[i] for i in places], finer)),
+        errors=tuple(left_out),
         designs_per_second=rates,
     )
-
-
-def _task(content: Record, call: partial[Any], points: Sequence[Point], *options: float) -> Task:
-    """A task that is kept by all that its answer follows from."""
-    name = {"call": call.func.__name__, "scene": content, "points": [*points], "options": options}
-    return Task(key=key_of(name), call=call, weight=len(points))

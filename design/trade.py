@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
 
 from ringbalance.design.axes import Point
-from ringbalance.design.static import FAULTS, Record, point_scene
+from ringbalance.design.static import FAULTS, Record, content_of, point_scene
+from ringbalance.design.work import Task, tasks_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
@@ -30,7 +32,21 @@ def calibrated_row(scene: SceneFile, point: Point) -> Record:
     }
 
 
-def chosen(rows: Sequence[Record], count: int) -> list[int]:
+def left_out(
+    scene: SceneFile,
+    points: Sequence[Point],
+    static: Sequence[Record],
+    count: int,
+    deal: Callable[[str, Sequence[Task]], list[Record]],
+) -> list[Record]:
+    """Calibrate some rows; see `_errors`. Args: `deal`: answers tasks, see `work.answers`."""
+    places = _chosen(static, count)
+    calls = [partial(calibrated_row, scene, points[i]) for i in places]
+    finer = deal("calibrate", tasks_of(content_of(scene), calls)) if places else []
+    return _errors([static[i] for i in places], finer)
+
+
+def _chosen(rows: Sequence[Record], count: int) -> list[int]:
     """Rows to calibrate, evenly over those that have an answer."""
     answered = [
         place for place, row in enumerate(rows) if row["status"] == "ok" and "lambda" in row["values"]
@@ -41,7 +57,7 @@ def chosen(rows: Sequence[Record], count: int) -> list[int]:
     return [answered[place] for place in dict.fromkeys(places.tolist())]
 
 
-def errors(rows: Sequence[Record], calibrated: Sequence[Record]) -> list[Record]:
+def _errors(rows: Sequence[Record], calibrated: Sequence[Record]) -> list[Record]:
     """By quantity the largest error of the rows and the largest uncertainty beside it, both as fractions of
     the largest value.
 

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
-from ringbalance.design.store import Store
+from ringbalance.design.store import Store, key_of
 from ringbalance.scene.platform.processes import beside
 
 _BUNDLE: Final = 0.5
@@ -28,12 +29,27 @@ _SHARES: Final = 8
 class Task:
     """One answer, plain data."""
 
-    key: str
-    """Under which it is kept."""
-    call: Callable[[], Any]
-    """It can be pickled."""
-    weight: int = 1
-    """Points that it answers."""
+    call: partial[Any]
+    """Of a scene and one of its points, or several; it can be pickled."""
+    content: Mapping[str, Any]
+    """All that decides the scene's answers, plain data."""
+
+    @property
+    def weight(self) -> int:
+        """Points that it answers."""
+        points = self.call.args[1]
+        return 1 if isinstance(points, Mapping) else len(points)
+
+    @property
+    def key(self) -> str:
+        """Under which it is kept: all that its answer follows from."""
+        name, (_, points) = self.call.func.__name__, self.call.args
+        return key_of({"call": name, "scene": self.content, "points": points, "options": self.call.keywords})
+
+
+def tasks_of(content: Mapping[str, Any], calls: Sequence[partial[Any]]) -> list[Task]:
+    """Args: `content`: of the scene that each call begins with."""
+    return [Task(call=call, content=content) for call in calls]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +128,7 @@ def _computed(
     seconds = 0.0
     for place in missing[:2]:
         start = time.perf_counter()
-        payload = _bundle([tasks[place]])
+        payload = _bundle([tasks[place].call])
         seconds = time.perf_counter() - start
         yield [place], payload
     rest = missing[2:]
@@ -126,7 +142,7 @@ def _computed(
             yield from _dealt(tasks, rest, pool, seconds, workers)
             return
         for place in rest:
-            yield [place], _bundle([tasks[place]])
+            yield [place], _bundle([tasks[place].call])
 
 
 def _dealt(
@@ -136,14 +152,14 @@ def _dealt(
     bundles = [places[start : start + size] for start in range(0, len(places), size)]
     with _cancelled() as futures:
         for bundle in bundles:
-            futures[executor.submit(_bundle, [tasks[place] for place in bundle])] = bundle
+            futures[executor.submit(_bundle, [tasks[place].call for place in bundle])] = bundle
         for future in as_completed(list(futures)):
             bundle = futures[future]
             try:
                 payloads = future.result()
             except BrokenExecutor:
                 # Ended by the system, usually for lack of memory: this process needs less than several do.
-                payloads = _bundle([tasks[place] for place in bundle])
+                payloads = _bundle([tasks[place].call for place in bundle])
             yield bundle, payloads
 
 
@@ -167,5 +183,5 @@ def bundle_size(seconds: float, *, count: int, workers: int) -> int:
     return max(1, min(enough, math.ceil(count / (_SHARES * workers))))
 
 
-def _bundle(tasks: Sequence[Task]) -> list[Any]:
-    return [task.call() for task in tasks]
+def _bundle(calls: Sequence[Callable[[], Any]]) -> list[Any]:
+    return [call() for call in calls]

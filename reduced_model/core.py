@@ -13,8 +13,8 @@ import numpy as np
 
 from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.reduced_model.chamber.values import chamber_pressure, measured_closed_forms
+from ringbalance.reduced_model.fill_limits import NEARLY_EMPTY, drawn_fill, first_gas, first_stalled
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.residual_liquid import NEARLY_EMPTY, drawn_fill, first_gas, first_stalled
 from ringbalance.reduced_model.tube.flow import TubeFlow
 from ringbalance.reduced_model.tube.regime import (
     ColumnFlow,

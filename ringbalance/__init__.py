@@ -64,8 +64,11 @@ register(
     scene="ringbalance.controller.eccentric_mass.scene_records:KIND",
     balancer="ringbalance.controller.eccentric_mass.balancer:EccentricMassBalancer",
 )
+register_function("with_chamber", place="ringbalance.scene.chamber_file.loading:with_chamber")
 register_function("with_values", place="ringbalance.scene.changes:with_values")
 register_function("sobol", place="ringbalance.design.sobol:sobol")
+register_function("run_row", place="ringbalance.design.runs:run_row")
+register_function("left_out", place="ringbalance.design.trade:left_out")
 register_function("sweep_figures", place="ringbalance.reports.sweep_figures:sweep_figures")
 register_function("pandas_frame", place="pandas:DataFrame")
 register_function("xarray_array", place="xarray:DataArray")

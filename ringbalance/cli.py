@@ -43,6 +43,10 @@ COMMANDS = {
         "ringbalance.controller.cli:tune",
         "Recommended gain, its margins, and the settling times under it.",
     ),
+    "export": (
+        "ringbalance.export.cli:export",
+        "The flow law for another program: C, a Python module, a table.",
+    ),
     "sweep": (
         "ringbalance.design.cli:sweep",
         "Many designs: a row of answers for every point of a grid or a sample.",

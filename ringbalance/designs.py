@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from ringbalance.design.axes import plan_of
-from ringbalance.design.runs import EMPTY, run_row
-from ringbalance.design.static import static_rows
+from ringbalance.design.static import EMPTY, static_rows
 from ringbalance.design.sweep import Sweep, run_sweep
 from ringbalance.design.work import Progress
 from ringbalance.scene import AnyScene
 from ringbalance.scene.changes import checked_scene
+from ringbalance.scene.registry import registered
 
 
 def sweep(
@@ -71,7 +71,8 @@ def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> 
     """
     scene = checked_scene(scene)
     (row,) = static_rows(scene, [dict(changes)], intervals=False)
-    run = run_row(scene, dict(changes), runs) if runs and row["sha256"] else EMPTY
+    driven = runs and row["sha256"]
+    run = registered("function", "run_row")(scene, dict(changes), runs) if driven else EMPTY
     finding = row["finding"] or run["finding"]
     return {
         **{name: value for name, (value, _) in row["values"].items()},

@@ -20,8 +20,8 @@ from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import ORIGIN, Schema
 from ringbalance.scene.kinds import scene_kind
-from ringbalance.scene.loader import CHANGED, scene_of
-from ringbalance.scene.narrowing import AnyScene
+from ringbalance.scene.loader import CHANGED, nameless_scene, scene_of
+from ringbalance.scene.narrowing import AnyScene, Kind, scene_as
 from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile
 from ringbalance.scene.toml import toml_bytes, toml_text
 from ringbalance.scene.units import DIMENSIONS
@@ -44,12 +44,7 @@ def with_values(scene: SceneFile, values: Mapping[str, object], *, origin: Origi
 def _changed(
     scene: SceneFile, known: CheckedValues, values: Mapping[str, object], origin: Origin
 ) -> AnyScene:
-    schema = scene_kind(scene.balancer).schema
-    document = deepcopy(dict(known.document))
-    for path, value in values.items():
-        if not isinstance(path, str):
-            raise TypeError(f'a value is named by its path, such as "tube.bore", and not by {path!r}')
-        _place(document, path, value, schema=schema, origin=origin)
+    document = _changed_document(scene, known, values, origin)
     if document == known.document:
         return scene
     changed = scene_of(
@@ -57,15 +52,53 @@ def _changed(
         file=scene.file,
         source=scene.source.removesuffix(CHANGED) + CHANGED,
         folder=known.folder,
-        sha256=lambda: hashlib.sha256(toml_bytes(document)).hexdigest(),
+        sha256=lambda: _digest(document, known),
         derived={} if _concerned(_OF_CHECKS, values) else known.derived,
+        before=known,
     )
+    return _with_same_mesh(scene, changed, values)
+
+
+def nameless(scene: Kind, values: Mapping[str, object]) -> tuple[Kind, str]:
+    """The scene of `with_values` without names, hashes and origins, and the SHA-256 that it would have.
+
+    For thousands of designs: what did not change is neither read nor made again.
+    Args: `scene`: one that `checked_scene` passes. `values`: see `SceneFile.with_values`.
+    Raises: SceneError: as `with_values`.
+    """
+    known = _known(scene)
+    document = _changed_document(scene, known, values, "given")
+    derived = {} if _concerned(_OF_CHECKS, values) else known.derived
+    changed = nameless_scene(document, file=scene.file, derived=derived, before=known)
+    digest = scene.sha256 if document == known.document else _digest(document, known)
+    return scene_as(type(scene), _with_same_mesh(scene, changed, values)), digest
+
+
+def _digest(document: Mapping[str, Any], known: CheckedValues) -> str:
+    alike = {name: text for name, text in known.texts.items() if document.get(name) is known.document[name]}
+    return hashlib.sha256(toml_bytes(document, alike)).hexdigest()
+
+
+def _changed_document(
+    scene: SceneFile, known: CheckedValues, values: Mapping[str, object], origin: Origin
+) -> dict[str, Any]:
+    """The document with other values; what none of them concerns are the same objects."""
+    schema, document = scene_kind(scene.balancer).schema, dict(known.document)
+    for path, value in values.items():
+        if not isinstance(path, str):
+            raise TypeError(f'a value is named by its path, such as "tube.bore", and not by {path!r}')
+        _place(document, path, value, schema=schema, origin=origin)
+    return document
+
+
+def _with_same_mesh(scene: SceneFile, changed: AnyScene, values: Mapping[str, object]) -> AnyScene:
+    """The changed scene. Raises: SceneError: the file of its mesh is another one than it was."""
     if not _concerned(_OF_MESH, values) and changed.mesh_digest != scene.mesh_digest:
         fault = Fault(
             file=scene.file,
             table="disc",
             key="mesh",
-            value=toml_text(document["disc"]["mesh"]),
+            value=toml_text(_known(scene).document["disc"]["mesh"]),
             problem="the file has changed since the scene was read",
             allowed="ringbalance.load_scene(path) again",
         )
@@ -160,17 +193,21 @@ def _same(now: object, before: object) -> bool:
 
 
 def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema, origin: Origin) -> None:
-    """Put a value into a document, or take it away for None; reading refuses what no key takes."""
+    """Put a value into a document, or take it away for None; reading refuses what no key takes.
+
+    Tables on the way to it are copied, since other documents may have them too.
+    """
     *steps, name = path.split(".")
     content, keys = document, schema.top
     for place, step in enumerate(steps):
         default = keys[step].presence.default if step in keys else None
         keys = _inside(schema, steps[: place + 1])
-        inside = content.setdefault(step, dict(default) if isinstance(default, Mapping) else {})
-        if not isinstance(inside, dict):
+        inside = content.get(step, default if isinstance(default, Mapping) else {})
+        if not isinstance(inside, Mapping):
             content[".".join((*steps[place:], name))] = value
             return
-        content = inside
+        content[step] = dict(inside)
+        content = content[step]
     if value is None and (name in keys or path in schema.tables):
         content.pop(name, None)
     else:

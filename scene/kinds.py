@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ringbalance.scene.faults import Fault
-from ringbalance.scene.keys.reading import Reading, read_document
+from ringbalance.scene.keys.reading import Reading, TableRead, read_document
 from ringbalance.scene.keys.schema import Schema
 from ringbalance.scene.registry import registered
 from ringbalance.scene.units import format_quantity
@@ -16,7 +16,13 @@ from ringbalance.scene.units import format_quantity
 
 class _Reads(Protocol):
     def __call__(
-        self, document: Mapping[str, Any], *, file: str, folder: Path, derived: Mapping[str, Any]
+        self,
+        document: Mapping[str, Any],
+        *,
+        file: str,
+        folder: Path,
+        derived: Mapping[str, Any],
+        before: Mapping[str, TableRead],
     ) -> tuple[Reading, tuple[Fault, ...]]: ...
 
 
@@ -89,8 +95,10 @@ def failed_checks(reading: Reading, checks: tuple[Check, ...]) -> Iterator[Fault
 def reader_of(schema: Schema, checks: tuple[Check, ...]) -> Callable[..., tuple[Reading, tuple[Fault, ...]]]:
     """How a kind of scene is read that consists of its keys and rules alone; see `SceneKind.read`."""
 
-    def read(document: Mapping[str, Any], *, file: str, **_: object) -> tuple[Reading, tuple[Fault, ...]]:
-        reading, faults = read_document(document, file=file, schema=schema)
+    def read(
+        document: Mapping[str, Any], *, file: str, before: Mapping[str, TableRead], **_: object
+    ) -> tuple[Reading, tuple[Fault, ...]]:
+        reading, faults = read_document(document, file=file, schema=schema, before=before)
         reading = reading.completed()
         return reading, (*faults, *reading.missing_faults(), *failed_checks(reading, checks))
 

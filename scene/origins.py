@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeVar, cast
 
@@ -17,6 +17,7 @@ from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, 
 from ringbalance.scene.keys.fields import Bounds, OneLine, number, numbers, whole
 from ringbalance.scene.loop_models import RunSettings
 from ringbalance.scene.registry import registered
+from ringbalance.scene.toml import table_text
 
 Number = Annotated[float, number(Bounds())]
 Numbers = Annotated[tuple[float, ...], numbers()]
@@ -124,6 +125,15 @@ class CheckedValues:
     """Fields of the scene by name, without this one."""
     derived: Mapping[str, Any]
     """Values that the mesh of a chamber gives, SI, by path."""
+    tables: Mapping[str, Any]
+    """The document's tables by name, see `keys.reading.TableRead`."""
+
+    @cached_property
+    def texts(self) -> Mapping[str, str]:
+        """The document's tables as TOML, by name."""
+        return {
+            name: table_text(name, each) for name, each in self.document.items() if isinstance(each, dict)
+        }
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,6 +8,8 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, Final
 
 _LONGEST_VALUE, _LONGEST_LIST, _DEEPEST = 60, 10, 4
@@ -31,18 +33,36 @@ def read_toml(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
 
 
-def toml_bytes(document: Mapping[str, Any]) -> bytes:
-    """A document of texts, numbers, truth values, lists and tables, which `tomllib` reads back as it was."""
+def toml_bytes(document: Mapping[str, Any], known: Mapping[str, str] = MappingProxyType({})) -> bytes:
+    """A document of texts, numbers, truth values, lists and tables, which `tomllib` reads back as it was.
+
+    Args: `known`: texts of some of its tables.
+    """
     tables = {name: value for name, value in document.items() if isinstance(value, Mapping)}
     top = {key: value for key, value in document.items() if key not in tables}
-    lines = list(_table_lines(top))
-    for name, table in tables.items():
-        lines += ["", f"[{toml_key(name)}]", *_table_lines(table)]
-    return ("\n".join(lines) + "\n").encode()
+    parts = (known.get(name) or table_text(name, table) for name, table in tables.items())
+    return (_lines(top) + "".join(parts) or "\n").encode()
 
 
-def _table_lines(table: Mapping[str, Any]) -> list[str]:
-    return [f"{toml_key(key)} = {_value_text(value, indent='  ')}" for key, value in table.items()]
+def table_text(name: str, table: Mapping[str, Any]) -> str:
+    """One table of a document."""
+    return f"\n[{toml_key(name)}]\n{_lines(table)}"
+
+
+def _lines(table: Mapping[str, Any]) -> str:
+    return "".join(
+        (_text_line if isinstance(value, str) else _line)(key, value) for key, value in table.items()
+    )
+
+
+def _line(key: str, value: Any) -> str:
+    return f"{toml_key(key)} = {_value_text(value, indent='  ')}\n"
+
+
+@lru_cache(maxsize=1024)
+def _text_line(key: str, value: str) -> str:
+    """The same of a text: thousands of scenes that differ in few keys have most lines alike."""
+    return _line(key, value)
 
 
 def _value_text(value: Any, *, indent: str = "") -> str:

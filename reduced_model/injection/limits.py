@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from ringbalance.reduced_model.fill_limits import NEARLY_EMPTY, drawn_fill, first_gas
 from ringbalance.reduced_model.injection.column import holds, steady
 from ringbalance.reduced_model.injection.dynamics import Lift, Record
-from ringbalance.reduced_model.residual_liquid import NEARLY_EMPTY, drawn_fill, first_gas
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.designs import Designs
 from ringbalance.scene.platform.compiled import in_place

@@ -18,7 +18,7 @@ from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, plain
-from ringbalance.scene.platform.compiled import both_ways, chosen
+from ringbalance.scene.platform.both_ways import both_ways, chosen
 
 CLEARING: Final = (0.6, 1.1)
 """Froude numbers u/sqrt(g_c d), g_c = omega^2 r_m, below which gas stays over the crest, and above which the

@@ -6,7 +6,7 @@ What a file leaves out follows from its other values where a default says so, or
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Any, Literal
 
@@ -33,6 +33,17 @@ class _Rejected:
 
 
 @dataclass(frozen=True, kw_only=True)
+class TableRead:
+    """One table of a document as it was read: what is the same object there is not read again."""
+
+    content: Any
+    """As TOML has it; None for a table that is not there."""
+    values: Mapping[str, Any]
+    """SI values by path, standard defaults included."""
+    rejected: tuple[_Rejected, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Reading:
     """What is known of a scene file so far; paths are "table.key", or "key" at the top level."""
 
@@ -48,6 +59,8 @@ class Reading:
     """What such a file can hold."""
     derived: frozenset[str] = frozenset()
     """Paths of values that another file gives, which this one names."""
+    tables: Mapping[str, TableRead] = field(default_factory=dict)
+    """Of the document, by name."""
 
     def adding(self, values: Mapping[str, Any]) -> Reading:
         """Copy with more values, SI, by path."""
@@ -64,12 +77,11 @@ class Reading:
 
     def known(self, *paths: str) -> bool:
         """Whether there is a value for each path, read or by default."""
-        return all(path in self.values for path in paths)
+        return set(paths) <= self.values.keys()
 
     def lacks(self, path: str) -> bool:
         """Whether a value is missing, rather than present but unreadable."""
-        table, _, _ = path.rpartition(".")
-        return not self.known(path) and not {path, table} & self.broken
+        return path not in self.values and not {path, path.rpartition(".")[0]} & self.broken
 
     def allowed(self, path: str) -> str:
         """What a key takes, for messages."""
@@ -100,18 +112,15 @@ class Reading:
         """
         unnamed = self.lacks("name")
         known = self.adding({"name": PurePath(self.file).stem or "scene"}) if unnamed else self
-        for name, table in self.schema.tables.items():
-            for key, declared in table.keys.items():
-                path, needs = f"{name}.{key}", declared.presence.needs
-                if needs and known.lacks(path) and known.known(*needs):
-                    result = declared.presence.value(*(known.values[need] for need in needs))
-                    known = known.adding({} if result is None else {path: result})
+        for path, presence in self.schema.following:
+            if known.lacks(path) and known.known(*presence.needs):
+                result = presence.value(*(known.values[need] for need in presence.needs))
+                known = known if result is None else known.adding({path: result})
         return known
 
     def missing_faults(self) -> Iterator[Fault]:
         """One error for each missing key, defaults included; one for a whole table that is missing."""
-        for name, table in self.schema.tables.items():
-            keys = [key for key, declared in table.keys.items() if declared.presence.kind == "needed"]
+        for name, keys in self.schema.needed.items():
             if not keys and name != "liquid":
                 continue
             if self.given(name):
@@ -129,10 +138,21 @@ class Reading:
 
 
 def read_document(
-    document: Mapping[str, Any], *, file: str, schema: Schema
+    document: Mapping[str, Any], *, file: str, schema: Schema, before: Mapping[str, TableRead] | None = None
 ) -> tuple[Reading, tuple[Fault, ...]]:
-    """What could be read of a TOML document, and an error for each value, key or table that could not."""
-    values, rejected = _read_tables(document, schema)
+    """What could be read of a TOML document, and an error for each value, key or table that could not.
+
+    Args: `before`: tables of another document that this one was made from.
+    """
+    tables = {
+        name: _table_read(document.get(name), table.keys, name, before.get(name) if before else None)
+        for name, table in schema.tables.items()
+    }
+    values, rejected = _read_keys(document, schema.top, ())
+    for each in tables.values():
+        values.update(each.values)
+        rejected.extend(each.rejected)
+    rejected += _unknown_keys(document, (*schema.top, *schema.tables), ())
     unknown = [each for each in rejected if each.kind == "unknown"][:_MOST_GUESSED]
     meant = {each.place: _meant(each, schema) for each in unknown}
     broken = frozenset(".".join(map(str, each.place[:2])) for each in rejected) | {
@@ -140,8 +160,11 @@ def read_document(
         for place, path in meant.items()
         if path and len(place) <= 2 and not _stands_there(document, path)
     }
-    known = {path: value for path, value in values.items() if not {path, path.split(".")[0]} & broken}
-    reading = Reading(file=file, document=document, values=known, broken=broken, schema=schema)
+    if broken:
+        values = {path: value for path, value in values.items() if not {path, path.split(".")[0]} & broken}
+    reading = Reading(
+        file=file, document=document, values=values, broken=broken, schema=schema, tables=tables
+    )
     # A key that is missing where a misspelt one was meant for it is one error, not two.
     reported = [
         each
@@ -157,43 +180,50 @@ def _stands_there(document: Mapping[str, Any], path: str) -> bool:
     return isinstance(content, Mapping) and key in content
 
 
-def _read_tables(document: Mapping[str, Any], schema: Schema) -> tuple[dict[str, Any], list[_Rejected]]:
-    """Values by path, and all that could not be read."""
-    values, rejected = _read_keys(document, schema.top, ())
-    for name, table in schema.tables.items():
-        inside, wrong = _read_table(document.get(name, {}), table.keys, (name,))
-        values |= {f"{name}.{key}": value for key, value in inside.items()}
-        rejected += wrong
-    return values, rejected + _unknown_keys(document, (*schema.top, *schema.tables), ())
+def _table_read(content: Any, keys: Mapping[str, Key], name: str, before: TableRead | None) -> TableRead:
+    if before is not None and before.content is content:
+        return before
+    inside, rejected = _read_table({} if content is None else content, keys, (name,), before)
+    values = {f"{name}.{key}": value for key, value in inside.items()}
+    return TableRead(content=content, values=values, rejected=tuple(rejected))
 
 
 def _read_table(
-    content: object, keys: Mapping[str, Key], place: Place
+    content: object, keys: Mapping[str, Key], place: Place, before: TableRead | None = None
 ) -> tuple[dict[str, Any], list[_Rejected]]:
     if not isinstance(content, Mapping):
         allowed = f"a table with {', '.join(keys)}"
         return {}, [_Rejected(place=place, content=content, problem="it is not a table", allowed=allowed)]
-    values, rejected = _read_keys(content, keys, place)
+    values, rejected = _read_keys(content, keys, place, before)
     return values, rejected + _unknown_keys(content, keys, place)
 
 
 def _read_keys(
-    content: Mapping[str, Any], keys: Mapping[str, Key], place: Place
+    content: Mapping[str, Any], keys: Mapping[str, Key], place: Place, before: TableRead | None = None
 ) -> tuple[dict[str, Any], list[_Rejected]]:
     """Values of keys, defaults included; a key that an entry of another key lacks is rejected at once."""
     values: dict[str, Any] = {}
     rejected: list[_Rejected] = []
     for name, key in keys.items():
-        at = (*place, name)
         if name not in content and key.presence.default is None:
             if len(place) > 1 and key.presence.kind == "needed":
-                rejected.append(_Rejected(place=at, content=content, kind="missing"))
+                rejected.append(_Rejected(place=(*place, name), content=content, kind="missing"))
             continue
-        value, wrong = _read_value(content.get(name, key.presence.default), key, at)
+        given = content.get(name, key.presence.default)
+        if before is not None and _same(before, f"{place[0]}.{name}", name, given, key):
+            values[name] = before.values[f"{place[0]}.{name}"]
+            continue
+        value, wrong = _read_value(given, key, (*place, name))
         rejected += wrong
         if not wrong:
             values[name] = value
     return values, rejected
+
+
+def _same(before: TableRead, path: str, name: str, given: object, key: Key) -> bool:
+    """Whether a key was read there already, from the same object."""
+    known = before.content or {}
+    return path in before.values and known.get(name, key.presence.default) is given
 
 
 def _unknown_keys(content: Mapping[str, Any], known: Iterable[str], place: Place) -> list[_Rejected]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -45,6 +46,26 @@ class Schema:
     tables: Mapping[str, Table]
     scene: Callable[..., Any]
     """What is made of it all."""
+
+    @cached_property
+    def following(self) -> tuple[tuple[str, Presence], ...]:
+        """Path and presence of each key whose default follows from other values, in order."""
+        return tuple(
+            (f"{name}.{key}", declared.presence)
+            for name, table in self.tables.items()
+            for key, declared in table.keys.items()
+            if declared.presence.needs
+        )
+
+    @cached_property
+    def needed(self) -> Mapping[str, tuple[str, ...]]:
+        """By table the keys that every scene must have."""
+        return MappingProxyType(
+            {
+                name: tuple(key for key, declared in table.keys.items() if declared.presence.kind == "needed")
+                for name, table in self.tables.items()
+            }
+        )
 
     def key_at(self, place: Place) -> Key:
         """The key at a place: table, key and so on; entries of lists are passed over."""

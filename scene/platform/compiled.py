@@ -25,11 +25,11 @@ from types import FrameType
 from typing import Any, Final, ParamSpec, TypeVar, cast
 
 import numba
-import numpy as np
 from numba.core import compiler, registry, sigutils, types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import overload, register_jitable
 
+from ringbalance.scene.platform.both_ways import both_ways, called_both_ways, chosen
 from ringbalance.scene.platform.kept_code import KeptCode
 
 P = ParamSpec("P")
@@ -39,7 +39,7 @@ _OPTIONS: Final[dict[str, Any]] = {"nogil": True, "fastmath": False, "error_mode
 _FOR_COMPILED_CODE: Final[dict[str, Any]] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _PLAIN: Final = frozenset({"None", "bool", "int", "float", "complex", "tuple", "Pair"})
 """Names in the annotation of a result that numba makes without calling a Python function."""
-_MARK: Final = f"from {__name__} import".encode()
+_MARKS: Final = tuple(f"from {name} import".encode() for name in (__name__, both_ways.__module__))
 """In each source that holds compiled functions."""
 
 # A private part of numba: without it, functions are compiled as numba does and signals are not deferred.
@@ -72,19 +72,6 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
     return _dispatcher(function, _nrt=False, forceinline=True)
 
 
-def both_ways(function: Callable[P, R]) -> Callable[P, R]:
-    """A plain function for numbers and arrays, which compiled code may call with numbers."""
-    registered: Callable[P, R] = register_jitable(
-        error_model="numpy", _nrt=False, forceinline=True, **_FOR_COMPILED_CODE
-    )(function)
-    return registered
-
-
-def chosen(condition: Any, first: Any, second: Any) -> Any:
-    """The first where a condition holds, elsewhere the second; in compiled code of numbers."""
-    return np.where(condition, first, second)
-
-
 def _chosen_number(condition, first, second):  # type: ignore[no-untyped-def]  # noqa: ARG001
     return lambda condition, first, second: first if condition else second
 
@@ -92,7 +79,15 @@ def _chosen_number(condition, first, second):  # type: ignore[no-untyped-def]  #
 overload(chosen)(_chosen_number)
 
 
+@cache
+def _callable_too(function: Callable[..., Any]) -> None:
+    """Let compiled code call a function of `both_ways`."""
+    register_jitable(error_model="numpy", _nrt=False, forceinline=True, **_FOR_COMPILED_CODE)(function)
+
+
 def _dispatcher(function: Callable[P, R], **options: Any) -> Callable[P, R]:
+    for each in called_both_ways(function):
+        _callable_too(each)
     dispatcher = numba.njit(function, **_OPTIONS, **options)
     if not hasattr(dispatcher, "py_func"):
         # NUMBA_DISABLE_JIT is set: it is the function itself.
@@ -245,8 +240,18 @@ def compiled_sources() -> tuple[Path, ...]:
     """Every source that holds functions that are compiled, and the machinery's own."""
     here, root = Path(__file__), Path(__file__).parents[2]
     sources = [path for each in _COMPILED for path in (root / each).rglob("*.py")]
-    marked = [path for path in sources if _MARK in path.read_bytes()]
-    return tuple(sorted([here, here.with_name("kept_code.py"), root / "physics/gas.py", *marked]))
+    marked = [path for path in sources if any(mark in path.read_bytes() for mark in _MARKS)]
+    return tuple(
+        sorted(
+            [
+                here,
+                here.with_name("both_ways.py"),
+                here.with_name("kept_code.py"),
+                root / "physics/gas.py",
+                *marked,
+            ]
+        )
+    )
 
 
 _Handler = Callable[[int, FrameType | None], Any]

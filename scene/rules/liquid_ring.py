@@ -7,26 +7,31 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from ringbalance.scene.chamber_file.loading import with_chamber
 from ringbalance.scene.chamber_file.record import MeshKeys
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.derivations import shortest_path
-from ringbalance.scene.keys.reading import Reading, read_document
+from ringbalance.scene.keys.reading import Reading, TableRead, read_document
 from ringbalance.scene.keys.schema import LIQUID_RING
 from ringbalance.scene.kinds import SceneKind, failed_checks
 from ringbalance.scene.liquids import with_liquid
+from ringbalance.scene.registry import registered
 from ringbalance.scene.rules import shape, working
 
 
 def _read(
-    document: Mapping[str, Any], *, file: str, folder: Path, derived: Mapping[str, Any]
+    document: Mapping[str, Any],
+    *,
+    file: str,
+    folder: Path,
+    derived: Mapping[str, Any],
+    before: Mapping[str, TableRead],
 ) -> tuple[Reading, tuple[Fault, ...]]:
-    reading, faults = read_document(document, file=file, schema=LIQUID_RING)
+    reading, faults = read_document(document, file=file, schema=LIQUID_RING, before=before)
     if derived:
         reading = reading.following(derived)
     elif any(reading.given(f"disc.{key}") for key in keys_of(MeshKeys)):
-        reading, mesh_faults = with_chamber(reading, folder=folder)
+        reading, mesh_faults = registered("function", "with_chamber")(reading, folder=folder)
         faults = (*faults, *mesh_faults)
     reading = reading.completed()
     reading, liquid_faults = with_liquid(reading.adding(_shortest_length(reading)))

@@ -17,6 +17,7 @@ ROOM_ORDER = (
     "reduced_model",
     "controller",
     "identification",
+    "export",
     "design",
     "verification",
     "reports",

@@ -16,6 +16,7 @@ import pytest
 import ringbalance as rb
 from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.scene import AnyScene, Scene, SceneError, bundled_scene, load_scene
+from ringbalance.scene.changes import document_of, nameless
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
@@ -169,3 +170,19 @@ def test_another_mesh_under_the_same_name_is_refused() -> None:
     other = replace(geometry, points=geometry.points * 1.1)
     with pytest.raises(SceneError):
         rb.calibrate(replace(scene, disc=replace(scene.disc, geometry=other)))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"tube.bore": 1.1e-3, "gas.pressure": "0.5 MPa"}, {"rotor.initial_vibration.amplitude": "5 um"}, {}],
+)
+def test_a_nameless_scene_has_the_values_and_the_hash_of_the_named_one(values: dict[str, Any]) -> None:
+    scene = bundled(PAPER)
+    before = toml_bytes(document_of(scene))
+    whole, (bare, digest) = scene.with_values(values), nameless(scene, values)
+    assert digest == whole.sha256
+    blank = {"name": "", "source": "", "sha256": "", "values_sha256": "", "defaulted": (), "origins": ()}
+    assert bare == replace(whole, **blank)  # type: ignore[arg-type]
+    assert toml_bytes(document_of(scene)) == before
+    again = pickle.loads(pickle.dumps(scene))
+    assert again.with_values(values).sha256 == digest

@@ -1,0 +1,88 @@
+"""The command `ringbalance export`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final, Literal
+
+from ringbalance.export.compact import CompactLaw, compact_law
+from ringbalance.export.grid import csv_files
+from ringbalance.export.hosts import c_files, identifier, python_files
+from ringbalance.reduced_model.calibration import calibrate
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.loader import load_scene
+from ringbalance.scene.narrowing import liquid_ring_scene
+from ringbalance.scene.platform.files import staged
+from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+
+Host = Literal["c", "csv", "python"]
+POINTS: Final = 41
+MOST_POINTS: Final = 1001
+_BEYOND: Final = 1.5
+"""Of the scene's gas pressure, where a grid ends."""
+_WITHOUT_PRESSURE: Final = 1e6
+"""Pa, where it ends for a scene without one."""
+
+
+def export(
+    scene: Path, *, to: Host, out: Path = Path("out"), name: str = "", points: int | None = None
+) -> int:
+    """Write the calibrated flow law for another program, the same bits in each.
+
+    Args:
+        scene: the scene file.
+        to: c (C99), python (a module that imports nothing of others), or csv (a grid).
+        out: folder for the files.
+        name: of files and functions; default that of the scene.
+        points: of each axis of the grid of csv, 2 to 1001; default 41.
+
+    Returns:
+        Exit code 0.
+
+    Raises:
+        SceneError: a scene or an option that cannot be used.
+        OSError: a file that cannot be written.
+    """
+    _check_points(to, points)
+    called = _checked_name(name) if name else identifier(scene.stem)
+    told = liquid_ring_scene(load_scene(scene))
+    with staged(out) as folder:
+        with activity("export", "calibrating ..."):
+            law = compact_law(scene=told, law=calibrate(told).flow_law)
+        highest = _BEYOND * told.gas.pressure if told.gas.pressure > 0 else _WITHOUT_PRESSURE
+        files = _files(law, called, to, points or POINTS, highest)
+        for file, text in files.items():
+            (folder / file).write_text(text, encoding="utf-8", newline="\n")
+    for file in files:
+        results_console().print(str(out / file), highlight=False)
+    text = f"{8 * len(law.constants)} bytes of constants, within {law.head_error:.1e} of the calibrated law"
+    messages_console().print(text, highlight=False)
+    return 0
+
+
+def _files(law: CompactLaw, name: str, to: Host, points: int, highest: float) -> dict[str, str]:
+    if to == "csv":
+        return csv_files(law, name, points=points, highest=highest)
+    return {"c": c_files, "python": python_files}[to](law, name)
+
+
+def _check_points(to: Host, points: int | None) -> None:
+    if points is None:
+        return
+    if to != "csv":
+        problem = f"{to} has no grid"
+        raise SceneError.of_option(option="--points", value=points, problem=problem, allowed="--to csv")
+    if not 2 <= points <= MOST_POINTS:
+        problem, allowed = "no grid has so many points on an axis", f"2 to {MOST_POINTS}"
+        raise SceneError.of_option(option="--points", value=points, problem=problem, allowed=allowed)
+
+
+def _checked_name(name: str) -> str:
+    if name != identifier(name):
+        raise SceneError.of_option(
+            option="--name",
+            value=name,
+            problem="it names functions in every language",
+            allowed="lower-case letters, digits and single underscores, a letter first",
+        )
+    return name

@@ -1,0 +1,84 @@
+"""The compact law as a table of values, for programs that interpolate, with the error of doing so."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from ringbalance.export.compact import Answer, CompactLaw
+from ringbalance.export.hosts import facts
+from ringbalance.scene.arrays import FloatArray
+
+COLUMNS: Final = (
+    "fill_ratio",
+    "gas_pressure_Pa",
+    "primed",
+    "velocity_m_per_s",
+    "uncertainty_m_per_s",
+    "regime",
+    "status",
+    "primed_afterwards",
+)
+
+
+def csv_files(law: CompactLaw, name: str, *, points: int, highest: float) -> dict[str, str]:
+    """A grid of fills and pressures; the opposite chamber holds the rest of the pair's liquid.
+
+    Args: `points`: on each axis. `highest`: gas pressure that the grid ends at, gauge, Pa.
+    """
+    fills, pressures = np.linspace(0.0, law.max_fill_ratio, points), np.linspace(0.0, highest, points)
+    rows = {
+        key: law.answer(fill_ratio=key[0], gas_pressure=key[1], primed=key[2])
+        for key in product(fills.tolist(), pressures.tolist(), (False, True))
+    }
+    lines = [*_header(law, _interpolation_errors(law, fills, pressures, rows)), ",".join(COLUMNS)]
+    for (fill, pressure, primed), found in rows.items():
+        values = (found.velocity, found.uncertainty, found.regime, found.status, int(found.primed))
+        lines.append(f"{fill!r},{pressure!r},{int(primed)}," + ",".join(map(repr, values)))
+    return {f"{name}.csv": "\n".join(lines) + "\n"}
+
+
+def _header(law: CompactLaw, errors: tuple[FloatArray, float]) -> list[str]:
+    off, across = errors
+    largest = float(np.max(off)) if off.size else 0.0
+    most = float(np.quantile(off, 0.95)) if off.size else 0.0
+    return [
+        f"# {line.strip()}"
+        for line in (
+            *facts(law).splitlines(),
+            "units: fill ratios in 1, gauge pressures in Pa, velocities in m/s; uncertainty expanded (95 %)",
+            "regime: 0 blocked, 1 siphon, 2 separated, 3 reverse, 4 siphon or separated",
+            "status: 0 ok, 1 extrapolated, 2 blocked, 3 undecided, 4 invalid",
+            f"opposite fill ratio: {law.max_fill_ratio!r} less the fill ratio",
+            "bilinear interpolation, looked at in the middle of cells whose corners have one regime: at most "
+            f"{largest:.2g} m/s, 95 % below {most:.2g} m/s",
+            f"cells with more than one regime, where interpolation is worth nothing: {100 * across:.1f} %",
+        )
+    ]
+
+
+def _interpolation_errors(
+    law: CompactLaw,
+    fills: FloatArray,
+    pressures: FloatArray,
+    rows: dict[tuple[float, float, bool], Answer],
+) -> tuple[FloatArray, float]:
+    """In the middle of cells of one regime, m/s, and the fraction of the others."""
+    off, across = [], 0
+    cells = list(product(range(fills.size - 1), range(pressures.size - 1), (False, True)))
+    for i, j, primed in cells:
+        corners = [
+            rows[float(fills[i + a]), float(pressures[j + b]), primed] for a, b in product((0, 1), (0, 1))
+        ]
+        middle = law.answer(
+            fill_ratio=float(fills[i : i + 2].mean()),
+            gas_pressure=float(pressures[j : j + 2].mean()),
+            primed=primed,
+        )
+        if {each.regime for each in corners} == {middle.regime}:
+            off.append(abs(middle.velocity - sum(each.velocity for each in corners) / 4))
+        else:
+            across += 1
+    return np.array(off), across / len(cells)

@@ -1,0 +1,382 @@
+"""Writes functions of numbers in C99 and in structured text (IEC 61131-3), from their Python syntax tree.
+
+What a language could take differently is refused: only +, -, *, /, sqrt, comparisons, `if`, `while`, whole
+numbers that divide without remainder or towards zero, and rows of numbers.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Final
+
+NUMBER, WHOLE, TRUTH, NOTHING = "float", "int", "bool", "None"
+LAW, QUERY = "Law", "Query"
+"""Types of the subset, as Python's annotations name them; two rows of numbers, of which one is only read."""
+_BINARY: Final = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
+
+
+_NOT_OF: Final = {NUMBER: ast.FloorDiv, WHOLE: ast.Div}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Function:
+    """One function of the source."""
+
+    name: str
+    summary: str
+    """First line of its docstring."""
+    arguments: Mapping[str, str]
+    """Name to type."""
+    result: str
+    body: Sequence[ast.stmt]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A module of functions of numbers."""
+
+    constants: Mapping[str, int | float]
+    functions: Mapping[str, Function]
+
+    @classmethod
+    def of(cls, module: ModuleType) -> Source:
+        """Read a module's source.
+
+        Raises: ValueError: something in it that is not of the subset.
+        """
+        return cls.of_text(inspect.getsource(module))
+
+    @classmethod
+    def of_text(cls, text: str) -> Source:
+        """The same of a text."""
+        tree = ast.parse(text)
+        constants = {
+            name.id: ast.literal_eval(value)
+            for node in tree.body
+            if isinstance(node, ast.Assign)
+            for name, value in _pairs(node)
+        }
+        functions = [_function(node) for node in tree.body if isinstance(node, ast.FunctionDef)]
+        return cls(constants=constants, functions={each.name: each for each in functions})
+
+
+def _pairs(node: ast.Assign) -> Iterator[tuple[ast.Name, ast.expr]]:
+    target = node.targets[0]
+    if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+        for name, value in zip(target.elts, node.value.elts, strict=True):
+            if isinstance(name, ast.Name):
+                yield name, value
+
+
+def _function(node: ast.FunctionDef) -> Function:
+    documented = ast.get_docstring(node) or ""
+    return Function(
+        name=node.name,
+        summary=documented.split("\n")[0],
+        arguments={each.arg: ast.unparse(each.annotation or ast.Constant("?")) for each in node.args.args},
+        result=ast.unparse(node.returns or ast.Constant("?")),
+        body=node.body[1 if documented else 0 :],
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Language:
+    """What two languages write differently."""
+
+    types: Mapping[str, str]
+    operators: Mapping[type, str]
+    """Of comparisons and of `and`, `or`, `not`."""
+    to_whole: str
+    to_number: str
+    truths: tuple[str, str]
+    """False and true."""
+    variable: str
+    """Format of a variable's name."""
+    function: str
+    constants: bool
+    """Whether constants go by their names."""
+    assign: str
+    open_if: str
+    else_if: str
+    otherwise: str
+    close_if: str
+    open_while: str
+    close_while: str
+
+
+C99: Final = Language(
+    types={
+        NUMBER: "double ",
+        WHOLE: "int ",
+        TRUTH: "int ",
+        NOTHING: "void ",
+        LAW: "const double *",
+        QUERY: "double *",
+    },
+    operators={
+        ast.Lt: "<",
+        ast.LtE: "<=",
+        ast.Gt: ">",
+        ast.GtE: ">=",
+        ast.Eq: "==",
+        ast.NotEq: "!=",
+        ast.And: "&&",
+        ast.Or: "||",
+        ast.Not: "!",
+    },
+    to_whole="(int)({})",
+    to_number="(double)({})",
+    truths=("0", "1"),
+    variable="{}",
+    function="{}",
+    constants=True,
+    assign="{} = {};",
+    open_if="if ({}) {{",
+    else_if="}} else if ({}) {{",
+    otherwise="} else {",
+    close_if="}",
+    open_while="while ({}) {{",
+    close_while="}",
+)
+
+
+def structured_text(prefix: str) -> Language:
+    """Structured text, whose names do not distinguish cases and whose functions share one space."""
+    return Language(
+        types={NUMBER: "LREAL", WHOLE: "DINT", TRUTH: "BOOL", NOTHING: "BOOL"},
+        operators={
+            ast.Lt: "<",
+            ast.LtE: "<=",
+            ast.Gt: ">",
+            ast.GtE: ">=",
+            ast.Eq: "=",
+            ast.NotEq: "<>",
+            ast.And: "AND",
+            ast.Or: "OR",
+            ast.Not: "NOT ",
+        },
+        to_whole="LREAL_TO_DINT({})",
+        to_number="DINT_TO_LREAL({})",
+        truths=("FALSE", "TRUE"),
+        variable="v_{}",
+        function=prefix + "_{}",
+        constants=False,
+        assign="{} := {};",
+        open_if="IF {} THEN",
+        else_if="ELSIF {} THEN",
+        otherwise="ELSE",
+        close_if="END_IF;",
+        open_while="WHILE {} DO",
+        close_while="END_WHILE;",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Writer:
+    """Writes one function."""
+
+    language: Language
+    source: Source
+    function: Function
+    types: dict[str, str] = field(default_factory=dict)
+    """Of arguments, and of local variables as they are met."""
+
+    def lines(self) -> list[str]:
+        """The body, one statement a line."""
+        self.types.update(self.function.arguments)
+        return list(self._block(self.function.body))
+
+    def local_variables(self) -> dict[str, str]:
+        """Name to type, after `lines`."""
+        return {name: kind for name, kind in self.types.items() if name not in self.function.arguments}
+
+    def _block(self, body: Sequence[ast.stmt]) -> Iterator[str]:
+        for node in body:
+            yield from self._statement(node)
+
+    def _statement(self, node: ast.stmt) -> Iterator[str]:
+        match node:
+            case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                text, kind = self._expression(value)
+                if self.types.setdefault(name, kind) != kind or name in self.source.constants:
+                    raise self._refused(node)
+                yield self.language.assign.format(self.language.variable.format(name), text)
+            case ast.Assign(targets=[ast.Subscript() as target], value=value):
+                yield self.language.assign.format(self._expression(target)[0], self._typed(value, NUMBER))
+            case ast.If(test=test, body=body, orelse=orelse):
+                yield from self._if(self.language.open_if, test, body, orelse)
+            case ast.While(test=test, body=body, orelse=[]):
+                yield self.language.open_while.format(self._typed(test, TRUTH))
+                yield from self._inner(body)
+                yield self.language.close_while
+            case ast.Return(value=value):
+                yield from self._return(value)
+            case ast.Expr(value=ast.Call() as call) if self._expression(call)[1] == NOTHING:
+                yield f"{self._expression(call)[0]};"
+            case _:
+                raise self._refused(node)
+
+    def _inner(self, body: Sequence[ast.stmt]) -> Iterator[str]:
+        return (f"    {line}" for line in self._block(body))
+
+    def _if(
+        self, opening: str, test: ast.expr, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]
+    ) -> Iterator[str]:
+        yield opening.format(self._typed(test, TRUTH))
+        yield from self._inner(body)
+        match orelse:
+            case [ast.If(test=other, body=inner, orelse=rest)]:
+                yield from self._if(self.language.else_if, other, inner, rest)
+                return
+            case [_, *_]:
+                yield self.language.otherwise
+                yield from self._inner(orelse)
+        yield self.language.close_if
+
+    def _return(self, value: ast.expr | None) -> Iterator[str]:
+        text = self._typed(value, self.function.result) if value is not None else ""
+        if self.language is C99:
+            yield f"return {text};" if text else "return;"
+            return
+        if text:
+            yield self.language.assign.format(self.language.function.format(self.function.name), text)
+        yield "RETURN;"
+
+    def _typed(self, node: ast.expr, kind: str) -> str:
+        text, given = self._expression(node)
+        if given != kind:
+            raise self._refused(node)
+        return text
+
+    def _expression(self, node: ast.expr) -> tuple[str, str]:
+        """Text and type."""
+        match node:
+            case ast.Constant(value=value):
+                return self._constant(value, node)
+            case ast.Name(id=name) if name in self.source.constants:
+                text, kind = self._constant(self.source.constants[name], node)
+                return (name if self.language.constants else text), kind
+            case ast.Name(id=name) if name in self.types:
+                return self.language.variable.format(name), self.types[name]
+            case ast.Subscript(value=row, slice=place) if self._expression(row)[1] in (LAW, QUERY):
+                return f"{self._expression(row)[0]}[{self._typed(place, WHOLE)}]", NUMBER
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                return self._call(node, name, arguments)
+        return self._operation(node)
+
+    def _operation(self, node: ast.expr) -> tuple[str, str]:
+        signs = self.language.operators
+        match node:
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return f"-{self._operand(operand, NUMBER)}", NUMBER
+            case ast.UnaryOp(op=ast.Not() as no, operand=operand):
+                return f"{signs[type(no)]}({self._typed(operand, TRUTH)})", TRUTH
+            case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _BINARY:
+                return self._arithmetic(left, operator, right)
+            case ast.Compare(left=left, ops=[comparison], comparators=[right]):
+                kind = self._expression(left)[1]
+                sign = signs[type(comparison)]
+                return f"{self._operand(left, kind)} {sign} {self._operand(right, kind)}", TRUTH
+            case ast.BoolOp(op=join, values=values):
+                sign = f" {signs[type(join)]} "
+                return sign.join(f"({self._typed(each, TRUTH)})" for each in values), TRUTH
+        raise self._refused(node)
+
+    def _constant(self, value: object, node: ast.expr) -> tuple[str, str]:
+        if isinstance(value, bool):
+            return self.language.truths[value], TRUTH
+        if isinstance(value, int):
+            return str(value), WHOLE
+        if isinstance(value, float):
+            return number_text(value), NUMBER
+        raise self._refused(node)
+
+    def _operand(self, node: ast.expr, kind: str) -> str:
+        text = self._typed(node, kind)
+        return f"({text})" if isinstance(node, ast.BinOp | ast.UnaryOp | ast.BoolOp | ast.Compare) else text
+
+    def _arithmetic(self, left: ast.expr, operator: ast.operator, right: ast.expr) -> tuple[str, str]:
+        kind = self._expression(left)[1]
+        if isinstance(operator, _NOT_OF.get(kind, ast.operator)):
+            raise self._refused(left)
+        # Every operation in brackets of its own: no language's order of them matters.
+        return f"{self._operand(left, kind)} {_BINARY[type(operator)]} {self._operand(right, kind)}", kind
+
+    def _call(self, node: ast.expr, name: str, arguments: Sequence[ast.expr]) -> tuple[str, str]:
+        if name == "sqrt" and len(arguments) == 1:
+            root = "sqrt({})" if self.language is C99 else "SQRT({})"
+            return root.format(self._typed(arguments[0], NUMBER)), NUMBER
+        if name == "int":
+            return self.language.to_whole.format(self._typed(arguments[0], NUMBER)), WHOLE
+        if name == "float":
+            return self.language.to_number.format(self._typed(arguments[0], WHOLE)), NUMBER
+        if name not in self.source.functions:
+            raise self._refused(node)
+        called = self.source.functions[name]
+        given = [
+            self._typed(each, kind) for each, kind in zip(arguments, called.arguments.values(), strict=True)
+        ]
+        return f"{self.language.function.format(name)}({', '.join(given)})", called.result
+
+    def _refused(self, node: ast.stmt | ast.expr) -> ValueError:
+        return ValueError(f"{self.function.name}: not of the subset that is translated: {ast.unparse(node)}")
+
+
+def number_text(value: float) -> str:
+    """The shortest decimal that is this number, with a point as structured text asks for."""
+    text = repr(value)
+    if "." in text:
+        return text
+    digits, _, exponent = text.partition("e")
+    return f"{digits}.0e{exponent}" if exponent else f"{digits}.0"
+
+
+def c_functions(source: Source) -> str:
+    """All functions of a source in C99, each `static`, and its constants; nothing is exported."""
+    whole = [f"    {name} = {value}" for name, value in source.constants.items() if isinstance(value, int)]
+    parts = ["enum {\n" + ",\n".join(whole) + "\n};\n"]
+    parts += [
+        f"static const double {name} = {number_text(value)};\n"
+        for name, value in source.constants.items()
+        if isinstance(value, float)
+    ]
+    for function in source.functions.values():
+        writer = Writer(language=C99, source=source, function=function)
+        lines = writer.lines()
+        variables = [f"{C99.types[kind]}{name};" for name, kind in writer.local_variables().items()]
+        arguments = [f"{C99.types[kind]}{name}" for name, kind in function.arguments.items()]
+        body = "".join(f"    {line}\n" for line in [*variables, *lines])
+        head = f"static {C99.types[function.result]}{function.name}({', '.join(arguments)})"
+        parts.append(f"\n/* {function.summary} */\n{head}\n{{\n{body}}}\n")
+    return "".join(parts)
+
+
+def st_functions(source: Source, *, prefix: str, sizes: Mapping[str, int]) -> str:
+    """All functions of a source in structured text.
+
+    Args: `prefix`: of their names. `sizes`: numbers in each row, by its type.
+    """
+    language = structured_text(prefix)
+    parts = []
+    for function in source.functions.values():
+        writer = Writer(language=language, source=source, function=function)
+        lines = writer.lines()
+        rows = {name: kind for name, kind in function.arguments.items() if kind in sizes}
+        parts.append(f"\n(* {function.summary} *)\n")
+        parts.append(f"FUNCTION {prefix}_{function.name} : {language.types[function.result]}\n")
+        inputs = [
+            f"{language.variable.format(name)} : {language.types[kind]};"
+            for name, kind in function.arguments.items()
+            if kind not in sizes
+        ]
+        in_out = [f"v_{name} : ARRAY[0..{sizes[kind] - 1}] OF LREAL;" for name, kind in rows.items()]
+        inner = [f"v_{name} : {language.types[kind]};" for name, kind in writer.local_variables().items()]
+        for kind, declared in (("VAR_IN_OUT", in_out), ("VAR_INPUT", inputs), ("VAR", inner)):
+            if declared:
+                parts.append(f"{kind}\n" + "".join(f"    {each}\n" for each in declared) + "END_VAR\n")
+        parts.append("".join(f"{line}\n" for line in lines) + "END_FUNCTION\n")
+    return "".join(parts)

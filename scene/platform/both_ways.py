@@ -1,0 +1,34 @@
+"""Plain functions of numbers and arrays that compiled code calls with numbers; here no compiler loads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, Final, ParamSpec, TypeVar
+
+import numpy as np
+
+P = ParamSpec("P")
+R = TypeVar("R")
+_MARK: Final = "_both_ways"
+
+
+def both_ways(function: Callable[P, R]) -> Callable[P, R]:
+    """Mark a plain function that compiled code may call too."""
+    setattr(function, _MARK, True)
+    return function
+
+
+def chosen(condition: Any, first: Any, second: Any) -> Any:
+    """The first where a condition holds, elsewhere the second; in compiled code of numbers."""
+    return np.where(condition, first, second)
+
+
+def called_both_ways(function: Callable[..., Any]) -> Iterator[Callable[..., Any]]:
+    """Marked functions that a function may call by name, and those that they may call in turn."""
+    todo, seen = [function], {id(function)}
+    while todo:
+        for each in todo.pop().__globals__.copy().values():
+            if id(each) not in seen and callable(each) and _MARK in getattr(each, "__dict__", {}):
+                seen.add(id(each))
+                todo.append(each)
+                yield each

@@ -1,0 +1,32 @@
+"""Calibrated laws and their compact forms, made once."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import pytest
+
+import ringbalance as rb
+from ringbalance.export.compact import CompactLaw, compact_law
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.scene.models import Scene
+
+Both = tuple[CalibratedLaw, CompactLaw]
+
+
+def both_laws(name: str) -> Both:
+    """Of a bundled scene."""
+    scene = cast(Scene, rb.load_scene(rb.bundled_scene(name)))
+    law = rb.calibrate(scene).flow_law
+    return law, compact_law(scene=scene, law=law)
+
+
+@pytest.fixture(scope="session", params=["liquid_ring_paper", "six_chamber", "grinding_spindle"])
+def laws(request: pytest.FixtureRequest) -> Both:
+    return both_laws(request.param)
+
+
+@pytest.fixture(scope="session")
+def six() -> Both:
+    """Of the scene that has all regimes."""
+    return both_laws("six_chamber")

@@ -1,0 +1,41 @@
+"""The command: its files, and one clear error for what it cannot use."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import ringbalance as rb
+from ringbalance.cli import main
+
+OIL = str(rb.bundled_scene("silicone_oil_100cst"))
+
+
+@pytest.mark.parametrize(("to", "files"), [("c", ["a.c", "a.h"]), ("python", ["a.py"]), ("csv", ["a.csv"])])
+def test_it_writes_the_files_it_names(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], to: str, files: list[str]
+) -> None:
+    words = ["--points", "3"] if to == "csv" else []
+    assert main(["export", OIL, "--to", to, "--out", str(tmp_path), "--name", "a", *words]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == files
+    assert sorted(capsys.readouterr().out.split()) == [str(tmp_path / name) for name in files]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([OIL, "--to", "c", "--points", "5"], "--points = 5"),
+        ([OIL, "--to", "csv", "--points", "1"], "--points = 1"),
+        ([OIL, "--to", "c", "--name", "2 b"], '--name = "2 b"'),
+        ([OIL, "--to", "rust"], "rust"),
+        ([str(rb.bundled_scene("driven_masses_small")), "--to", "c"], "eccentric_mass"),
+        (["none.toml", "--to", "c"], "none.toml"),
+    ],
+)
+def test_bad_input_is_one_error_and_no_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], told: str
+) -> None:
+    assert main(["export", *words, "--out", str(tmp_path / "out")]) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,85 @@
+"""The compact law beside the calibrated one, and what it answers where there is nothing to answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from law_queries import answers, queries
+
+from ringbalance.export import point
+from ringbalance.export.compact import TOLERANCE, CompactLaw, compact_law
+from ringbalance.mesh.geometry import surface_radius
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.loader import load_scene
+from ringbalance.scene.models import Scene
+from ringbalance.scenes import __file__ as scenes
+
+Both = tuple[CalibratedLaw, CompactLaw]
+OK, EXTRAPOLATED, BLOCKED, UNDECIDED, INVALID = range(5)
+
+
+def test_it_is_small_and_within_its_tolerance_of_the_calibrated_law(laws: Both) -> None:
+    law, compact = laws
+    assert 8 * len(compact.constants) <= 4096
+    asked = queries(law, 6000)
+    x, y, p, primed = asked
+    right = law.evaluate(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=primed.astype(bool))
+    velocity, width, regime, status, after = np.array(list(answers(compact.constants, asked))).T
+    flows = (right.velocity != 0) & (status != EXTRAPOLATED)
+    assert np.count_nonzero(flows) > 1000
+    assert np.all(np.abs(velocity - right.velocity)[flows] <= TOLERANCE * np.abs(right.velocity)[flows])
+    assert np.array_equal(velocity != 0, right.velocity != 0)
+    assert np.array_equal(after, right.primed)
+    # Next to where the uncertainty begins to allow another regime, the tabulation decides.
+    assert np.count_nonzero(regime != right.regime) <= 12
+    assert np.quantile(np.abs(width[flows] / right.uncertainty[flows] - 1), 0.99) < 0.05
+    assert np.array_equal(status == BLOCKED, right.velocity == 0)
+
+
+def test_a_chamber_has_its_surface_and_its_moment(laws: Both, paper_scene: Scene) -> None:
+    law, compact = laws
+    fill = np.linspace(0.0, law.max_fill_ratio, 57)
+    moment = [point.moment(compact.constants, each) for each in fill.tolist()]
+    right = law.moment.chamber_moment(fill)
+    assert moment == pytest.approx(right, abs=2e-5 * float(np.max(np.abs(right))))
+    if compact.scene == paper_scene.file:
+        radius = [point.surface_radius(compact.constants, each) for each in fill.tolist()]
+        assert radius == pytest.approx(surface_radius(disc=paper_scene.disc, fill_ratio=fill), rel=1e-5)
+
+
+def test_what_lies_outside_is_extrapolated_or_invalid_and_never_refused(six: Both) -> None:
+    _, law = six
+    most = law.max_fill_ratio
+
+    def status(fill: float, pressure: float) -> int:
+        return law.answer(fill_ratio=fill, opposite_fill_ratio=0.1, gas_pressure=pressure).status
+
+    assert status(0.3, 0.0) == BLOCKED
+    assert [status(fill, 3e5) for fill in (most + 0.01, -0.01, np.inf)] == [EXTRAPOLATED] * 3
+    assert status(most, 1e11) == EXTRAPOLATED
+    assert [status(0.3, p) for p in (np.nan, -1e6, 2e12)] == [INVALID] * 3
+    assert law.answer(fill_ratio=np.nan, gas_pressure=3e5).velocity == 0.0
+    clamped = law.answer(fill_ratio=most + 0.01, opposite_fill_ratio=0.1, gas_pressure=3e5)
+    inside = law.answer(fill_ratio=most, opposite_fill_ratio=0.1, gas_pressure=3e5)
+    assert clamped.velocity == inside.velocity
+
+
+def test_the_error_of_tabulation_is_in_the_uncertainty(six: Both) -> None:
+    _, law = six
+    without = list(law.constants)
+    without[point.TABULATION] = 0.0
+    asked = np.array([[0.3], [0.2], [6e5], [1.0]])
+    (velocity, wide, *_), (_, narrow, *_) = (*answers(law.constants, asked), *answers(tuple(without), asked))
+    assert np.hypot(narrow, law.constants[point.TABULATION] * velocity) == pytest.approx(wide, rel=1e-12)
+    assert wide > narrow
+
+
+def test_inputs_that_were_fitted_together_are_refused(six: Both) -> None:
+    law, _ = six
+    scene = load_scene(scenes.replace("__init__.py", "six_chamber.toml"))
+    assert isinstance(scene, Scene)
+    object.__setattr__(law, "variants", (law,))
+    with pytest.raises(SceneError, match="fitted together"):
+        compact_law(scene=scene, law=law)
+    object.__setattr__(law, "variants", ())

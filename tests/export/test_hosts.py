@@ -1,0 +1,107 @@
+"""Every host answers with the same bits as the program's own evaluator."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from law_queries import answers, queries
+
+from ringbalance.export.compact import CompactLaw
+from ringbalance.export.grid import COLUMNS, csv_files
+from ringbalance.export.hosts import c_files, identifier, python_files
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.scene.arrays import FloatArray
+
+Both = tuple[CalibratedLaw, CompactLaw]
+WARNINGS = [
+    "-std=c99",
+    "-pedantic",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Wshadow",
+    "-Werror",
+]
+HARNESS = """
+#include <stdio.h>
+#include "disc.h"
+int main(void)
+{
+    double q[4];
+    while (fread(q, sizeof(double), 4, stdin) == 4) {
+        disc_flow f = disc_answer(q[0], q[1], q[2], q[3] != 0.0);
+        double a[7];
+        a[0] = f.velocity; a[1] = f.uncertainty; a[2] = f.regime; a[3] = f.status; a[4] = f.primed;
+        a[5] = disc_moment(q[0]); a[6] = disc_surface_radius(q[0]);
+        fwrite(a, sizeof(double), 7, stdout);
+    }
+    return 0;
+}
+"""
+
+
+def compiled_answers(folder: Path, law: CompactLaw, asked: FloatArray, *flags: str) -> FloatArray:
+    """What a C program answers, shape (queries, 7)."""
+    for name, text in (c_files(law, "disc") | {"main.c": HARNESS}).items():
+        (folder / name).write_text(text)
+    command = ["gcc", *WARNINGS, *flags, "disc.c", "main.c", "-o", "ask", "-lm"]
+    subprocess.run(command, cwd=folder, check=True)
+    ran = subprocess.run([folder / "ask"], input=asked.T.tobytes(), capture_output=True, check=True)
+    assert ran.stderr == b""
+    return np.frombuffer(ran.stdout).reshape(-1, 7)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+@pytest.mark.parametrize(
+    "flags",
+    [
+        ("-O3", "-march=native", "-std=gnu11", "-fanalyzer"),
+        ("-O1", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"),
+    ],
+)
+def test_c_has_the_bits_of_python_and_no_warning(tmp_path: Path, six: Both, flags: tuple[str, ...]) -> None:
+    law, compact = six
+    asked = queries(law, 20000, outside=True)
+    right = np.array(list(answers(compact.constants, asked)))
+    assert np.all(np.bincount(right[:, 2].astype(int), minlength=5) > 0)
+    assert np.all(np.bincount(right[:, 3].astype(int), minlength=5) > 0)
+    found = compiled_answers(tmp_path, compact, asked, *flags)
+    assert found[:, :5].tobytes() == right.tobytes()
+
+
+def test_a_module_of_its_own_has_the_same_bits(six: Both) -> None:
+    law, compact = six
+    module: dict[str, object] = {}
+    exec(python_files(compact, "disc")["disc.py"], module)
+    flow = module["flow"]
+    assert callable(flow)
+    asked = queries(law, 500)
+    found = [flow(x, p, y, primed) for x, y, p, primed in asked.T.tolist()]
+    assert np.array(found).tobytes() == np.array(list(answers(compact.constants, asked))).tobytes()
+
+
+def test_a_table_says_its_units_and_its_error(six: Both) -> None:
+    _, law = six
+    text = csv_files(law, "disc", points=9, highest=8e5)["disc.csv"]
+    header = [line for line in text.splitlines() if line.startswith("#")]
+    lines = text.splitlines()[len(header) :]
+    assert lines[0].split(",") == list(COLUMNS)
+    assert len(lines) == 1 + 9 * 9 * 2
+    fill, pressure, primed, velocity, *_ = map(float, lines[100].split(","))
+    assert law.answer(fill_ratio=fill, gas_pressure=pressure, primed=primed != 0).velocity == velocity
+    assert any("units" in line for line in header)
+    finer = csv_files(law, "disc", points=33, highest=8e5)["disc.csv"]
+    assert _error(finer) < 0.5 * _error(text)
+
+
+def _error(text: str) -> float:
+    return float(text.partition("95 % below ")[2].split()[0])
+
+
+def test_names_are_those_of_every_language() -> None:
+    assert [identifier(each) for each in ("My disc-2", "2nd", "ä")] == ["my_disc_2", "law_2nd", "law"]

@@ -89,6 +89,8 @@ DIMENSIONS: Mapping[str, Dimension] = _dimensions()
 _LONGEST_TEXT = 60
 _READS_BACK = 1e-6
 """Relative change of a value that is written and read again."""
+_TINY = 0.01
+"""In its usual unit: 0.06 s is easier read than 0.001 min."""
 _SAVED = 4
 """Characters that another unit than the usual one must save."""
 _NUMBER = re.compile(
@@ -199,7 +201,7 @@ def shortest(value: float) -> str:
 
 
 def shortest_quantity(value: float, usual: str) -> str:
-    """An SI value to 1e-6 in its usual unit, or in that of SI where it is zero or tiny or this saves digits."""
+    """An SI value to 1e-6 in its usual unit, or in that of SI where it is tiny or this saves digits."""
     si = next(next(iter(kind.units)) for kind in DIMENSIONS.values() if usual in kind.units)
     plain, other = (f"{shortest(value / unit_factor(unit))} {unit}" for unit in (usual, si))
     tiny = abs(value) < _TINY * unit_factor(usual) and len(other) < len(plain)

@@ -220,8 +220,12 @@ def _axis_of(scene: SceneFile, name: Any, values: Any) -> Axis:
     if name in scene_kind(scene.balancer).schema.tables:
         if isinstance(values, str | Path):
             return _table_axis(scene, name, Path(values))
-        rows = tuple({f"{name}.{key}": value for key, value in row.items()} for row in values)
-        return Axis(ranges={}, choices=rows)
+        rows = [{f"{name}.{key}": value for key, value in row.items()} for row in values]
+        readers = {path: _reader(scene, path) for row in rows for path in row}
+        choices = (
+            {path: _checked(path, value, readers[path]) for path, value in row.items()} for row in rows
+        )
+        return Axis(ranges={}, choices=tuple(choices))
     return _linked([_values(scene, name, values)], name)
 
 

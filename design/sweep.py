@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.design.axes import Plan, Point, unit_of_path
+from ringbalance.design.sensitivity import first_order
 from ringbalance.design.static import EMPTY, Record, content_of, point_scene, static_rows
 from ringbalance.design.store import Store
 from ringbalance.design.work import Done, Progress, answers, tasks_of
@@ -43,7 +44,7 @@ _OF_RUNS: Final = {
     "settling_time_high": ("settling_time high", "s"),
 }
 """Columns of runs: name and SI unit."""
-_EXTRA: Final = "this needs the package {0}: pip install {0}"
+_EXTRA: Final = "this needs the package {0}: pip install {0}, or ringbalance[sweep-tables] with all of them"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -140,19 +141,43 @@ class Sweep(Result):
         return _extra("pandas", "pandas_frame")(self.columns())
 
     def to_xarray(self) -> Any:
-        """`columns` as a Dataset with units, over the axes of a grid or the rows of a sample.
+        """`columns` as a Dataset over the axes of a grid or the rows of a sample, with units as CF has them.
 
         Raises: ModuleNotFoundError: without xarray.
         """
         grids = self.grid()
         names, shape = list(grids), tuple(map(len, grids.values()))
         array, dataset = _extra("xarray", "xarray_array"), _extra("xarray", "xarray_dataset")
-        fields = {
-            name: array(_array(values).reshape(shape), dims=names, attrs={"units": unit})
-            for name, unit, values in self.fields()
+        fields = self.fields()
+        units = {name: {"units": unit} if unit else {} for name, unit, _ in fields}
+        coords = {name: (name, _array(values), units[name]) for name, values in grids.items()}
+        variables = {
+            name: array(_array(values).reshape(shape), dims=names, attrs=units[name])
+            for name, _, values in fields
             if name not in names
         }
-        return dataset(fields, coords=grids)
+        source = {"title": self.scene.name, "source": f"ringbalance sweep of {self.scene.source}"}
+        return dataset(variables, coords=coords, attrs=source | {"scene_sha256": self.scene.sha256})
+
+    def sensitivity(self) -> dict[str, dict[str, tuple[float, float]]]:
+        """By result and varied number: the share of the variance that it explains, and its half-width.
+
+        Of a sample: see `first_order`. Empty for a grid, and of a result that too few points have.
+        """
+        columns = {name: _array(values) for name, _, values in self.fields()}
+        numbers = {name: each for name, each in columns.items() if each.dtype == np.float64}
+        paths = [path for path in self.plan.paths if path in numbers] if self.plan.sample else []
+        found = {}
+        for name, each in numbers.items() if paths else ():
+            known = np.isfinite(np.array([each, *(numbers[path] for path in paths)])).all(axis=0)
+            if name not in paths and known.any():
+                inputs = np.array([numbers[path][known] for path in paths]).T
+                shares, widths = first_order(inputs, each[known])
+                if np.isfinite(shares).all():
+                    found[name] = dict(
+                        zip(paths, zip(shares.tolist(), widths.tolist(), strict=True), strict=True)
+                    )
+        return found
 
     def grid(self) -> dict[str, list[Any]]:
         """Values by path of a grid whose axes are one key each, the last fastest; else "row" with numbers."""

@@ -56,7 +56,8 @@ def export(
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
     for file in files:
         results_console().print(str(out / file), highlight=False)
-    text = f"{8 * len(law.constants)} bytes of constants, within {law.head_error:.1e} of the calibrated law"
+    size = f"{8 * len(law.constants)} bytes of constants"
+    text = f"{size}, velocities within {law.departure:.1e} of the calibrated law's"
     messages_console().print(text, highlight=False)
     return 0
 

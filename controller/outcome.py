@@ -29,7 +29,11 @@ from ringbalance.results.rows import Finding, Value, sentences
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
-MANY_OVERSHOOTS: Final = 2
+_BY_SETTINGS: Final = {
+    *(Outcome.HOVERING, Outcome.UNSTABLE, Outcome.TIME_LIMIT),
+    *(Outcome.DIVERGING, Outcome.GAS_TIME_TOO_SHORT),
+}
+"""Ends that other settings may change."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -196,15 +200,12 @@ def _numbers(facts: Facts) -> dict[str, Value]:
 
 
 def _causes(facts: Facts) -> Iterator[Finding]:
-    outcome, turned = facts.outcome, int(facts.run["overshoots"])
+    """What a formula or a count explains; what to change, runs of drawn devices tell."""
+    outcome = facts.outcome
     if outcome is Outcome.HOVERING:
         yield from _noise(facts)
-    if outcome in {Outcome.HOVERING, Outcome.UNSTABLE} or (
-        outcome in {Outcome.TIME_LIMIT, Outcome.DIVERGING} and turned > _allowed(outcome)
-    ):
-        yield from _smaller_steps(facts)
-    elif outcome is Outcome.TIME_LIMIT:
-        yield from _dead_time(facts) or [_larger_gain(facts, "slow")]
+    if outcome in {Outcome.TIME_LIMIT, Outcome.GAS_TIME_TOO_SHORT}:
+        yield from _dead_time(facts)
     if outcome is Outcome.DIVERGING:
         yield Finding(code="check_direction")
     if outcome is Outcome.STALLED and facts.unreachable_amplitude > facts.scene.controller.limit:
@@ -213,14 +214,9 @@ def _causes(facts: Facts) -> Iterator[Finding]:
         total = 2 * facts.scene.disc.initial_fill
         fill = total - min(facts.plant.residual_fill, total / 2)
         yield Holding.of(facts.scene, fill_ratio=fill).finding or Finding(code="tube_runs_back")
-    if outcome is Outcome.GAS_TIME_TOO_SHORT:
-        larger = [_larger_gain(facts, "valve_minimum")]
-        yield from larger if facts.moves else _dead_time(facts) or [_pushed(facts)]
-
-
-def _allowed(outcome: Outcome) -> int:
-    """Overshoots that need no remedy."""
-    return 1 if outcome is Outcome.DIVERGING else MANY_OVERSHOOTS
+    if outcome in _BY_SETTINGS:
+        code = "own_overshoots" if facts.own_algorithm else "overshoots"
+        yield Finding(code=code, values={"overshoots": int(facts.run["overshoots"])})
 
 
 def _noise(facts: Facts) -> Iterator[Finding]:
@@ -229,33 +225,6 @@ def _noise(facts: Facts) -> Iterator[Finding]:
         yield Finding(code="sensor_noise_too_high", values={"noise": sigma})
     elif deviation is not None and math.isfinite(deviation):
         yield Finding(code="noise_sustained", values={"deviation": deviation})
-
-
-def _smaller_steps(facts: Facts) -> Iterator[Finding]:
-    """What to change in a loop that overshoots; the law-based algorithm has no gain to lower."""
-    settings = facts.scene.controller
-    turns: dict[str, Value] = {"overshoots": int(facts.run["overshoots"])}
-    if facts.own_algorithm:
-        yield Finding(code="own_gain_too_high", values={**turns, "algorithm": facts.own_algorithm})
-    elif settings.kind == "law_based":
-        yield from _dead_time(facts) or [Finding(code="assumed_influence_wrong", values=turns)]
-    elif settings.kind == "trial":
-        yield Finding(code="trial_steps_too_long", values=turns)
-    else:
-        gain = 1.0 / facts.loop.rate if facts.loop.rate else 0.0
-        if facts.loop.value is None or not 0 < gain < settings.proportional:
-            yield Finding(code="gain_too_high", values=turns)
-        else:
-            change = {"controller.proportional": gain}
-            yield Finding(code="gain_too_high_by", values={**turns, "gain": gain}, change=change)
-
-
-def _larger_gain(facts: Facts, code: str) -> Finding:
-    """Args: `code`: "slow" or "valve_minimum"."""
-    numbers: dict[str, Value] = {"minimum_gas_time": facts.scene.controller.minimum_gas_time}
-    if facts.own_algorithm:
-        return Finding(code=f"own_{code}", values={**numbers, "algorithm": facts.own_algorithm})
-    return Finding(code=code, values=numbers)
 
 
 def _dead_time(facts: Facts) -> list[Finding]:
@@ -269,15 +238,6 @@ def _dead_time(facts: Facts) -> list[Finding]:
     if rest * per_time <= scene.controller.limit:
         return []
     return [Finding(code="dead_time", values={"standing_amplitude": rest * per_time, "dead_time": lost})]
-
-
-def _pushed(facts: Facts) -> Finding:
-    """What moves liquid where an amplitude stands still."""
-    settings = facts.scene.controller
-    from_scene = settings.kind == "target_vector" and not facts.own_algorithm
-    return Finding(
-        code="integral_missing" if from_scene and settings.integral_time is None else "valve_too_slow"
-    )
 
 
 def _shortened(facts: Facts) -> Iterator[Finding]:

@@ -48,7 +48,7 @@ def facts(law: CompactLaw) -> str:
     """What a law holds and how exact it is, in sentences."""
     return (
         f"{len(law.constants)} constants, {8 * len(law.constants)} bytes; velocities {_RANGE}, beyond\n"
-        f"   extrapolated. Largest error of tabulation: {law.head_error:.1e} of a velocity at a pressure,\n"
+        f"   extrapolated. Largest error of tabulation: {law.departure:.1e} of a velocity,\n"
         f"   {law.level_error:.1e} Pa of a chamber's level; both are part of the uncertainty."
     )
 

@@ -199,7 +199,8 @@ def advice_view(found: Record) -> Record:
 def _remedy(row: Record) -> str:
     """The change of the scene in words."""
     changes = [f"{key_words(path)} {setting_text(path, value)}" for path, value in row["changes"].items()]
-    text = ", ".join(changes)
+    # What a sensor does, a filter may be told in a key of the same name.
+    text = ", ".join(dict.fromkeys(changes))
     return f"{text[0].upper()}{text[1:]}"
 
 

@@ -13,11 +13,11 @@ from ringbalance.controller.judging.search import Along
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.results.numbers import given, percent
 from ringbalance.results.requirements import MET, MISSED, OPEN
-from ringbalance.results.result import Rows, Table
+from ringbalance.results.result import Cells, Rows, Table
 from ringbalance.results.rows import Finding, Quantity, Value
 from ringbalance.scene.arrays import finite
 from ringbalance.scene.describe import in_usual_unit, usual_unit
-from ringbalance.scene.origins import raw_value_at
+from ringbalance.scene.origins import SceneFile, raw_value_at
 
 LONGER: Final = 300.0
 """s, for which devices under the recommended settings are watched once more."""
@@ -185,7 +185,7 @@ def _mending(tuning: Tuning) -> Iterator[Finding]:
     best, clipped = tuning.recommended, tuning.recommended.outcomes.clipped
     for each in tuning.remedies[:1]:
         code = "remedy_meets" if each.met else "remedy_best"
-        values = {**_values(each.judgement), "what": _changes_text(each.changes)}
+        values = {**_values(each.judgement), "what": _changes_text(each.changes, ", ")}
         yield Finding(code=code, values=values, change=each.changes)
     if best.verdict != MET:
         yield from tuning.ranking.findings()
@@ -199,12 +199,12 @@ def _mending(tuning: Tuning) -> Iterator[Finding]:
         yield Finding(code="inputs_clipped", values=values)
 
 
-def _changes_text(changes: Settings) -> str:
-    return ", ".join(f"{path} {setting_text(path, value)}" for path, value in changes.items())
+def _changes_text(changes: Settings, between: str = "\n") -> str:
+    return between.join(f"{path} {setting_text(path, value)}" for path, value in changes.items())
 
 
 def _remedies_table(caption: str, tried: Sequence[Remedied]) -> Table:
-    rows = [
+    rows: list[Cells] = [
         (
             each.remedies[0].name or each.code.replace("_", " "),
             _changes_text(each.changes),
@@ -215,7 +215,9 @@ def _remedies_table(caption: str, tried: Sequence[Remedied]) -> Table:
         )
         for each in tried
     ]
-    heads = ("remedy", "change", "devices that meet all", "verdict", "half within", "90 % within", "settings")
+    heads = ["remedy", "change", "devices that meet all", "verdict", "half within", "90 % within", "settings"]
+    if not any(each.judgement.settings for each in tried):
+        heads, rows = heads[:-1], [row[:-1] for row in rows]
     return Table(caption=caption, heads=heads, rows=rows)
 
 
@@ -233,14 +235,25 @@ def _values(judgement: Judgement) -> dict[str, Value]:
 
 def _causes(judgement: Judgement) -> list[str]:
     """How many devices ended in which way without meeting what is required, most first."""
-    ended = zip(judgement.outcomes.ended, judgement.meets, strict=True)
-    counted = Counter("settled too late" if code == _SETTLED else code for code, met in ended if not met)
+    missed = [(demand.code, ~demand.met(judgement.outcomes)) for demand in judgement.demands]
+    counted = Counter(
+        " and ".join(f"{name} missed" for name, misses in missed if misses[place])
+        if code == _SETTLED
+        else code
+        for place, (code, met) in enumerate(zip(judgement.outcomes.ended, judgement.meets, strict=True))
+        if not met
+    )
     return [f"{code.replace('_', ' ')} {count}" for code, count in counted.most_common(_MOST_CAUSES)]
+
+
+def _given_text(scene: SceneFile, path: str) -> str:
+    text = setting_text(path, raw_value_at(scene, path))
+    return f"{text} (default)" if scene.origin_of(path) == "default" else text
 
 
 def _settings_table(tuning: Tuning) -> Table:
     rows = [
-        (path, setting_text(path, raw_value_at(tuning.given, path)), setting_text(path, value))
+        (path, _given_text(tuning.given, path), setting_text(path, value))
         for path, value in tuning.recommended.settings.items()
     ]
     return Table(caption="Settings", heads=("key", "the scene's", "recommended"), rows=rows)

@@ -27,7 +27,7 @@ def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
     """
     try:
         balancer = balancer_of(point_scene(scene, point))
-        (judgement,) = judged_all(balancer, [{}], first=min(_FIRST, runs), most=runs)
+        (judgement,) = judged_all(balancer, [{}], first=min(_FIRST, runs), most=runs, whole=False)
     except (SceneError, *FAULTS) as error:
         return {**EMPTY, "verdict": REFUSED, "finding": refusal(error)}
     time, high = judgement.settling_time(judgement.asked) or (None, None)

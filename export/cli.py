@@ -7,7 +7,7 @@ from typing import Final, Literal
 
 from ringbalance.export.compact import CompactLaw, compact_law
 from ringbalance.export.grid import csv_files
-from ringbalance.export.hosts import c_files, identifier, python_files
+from ringbalance.export.hosts import c_files, identifier, python_files, st_files
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
@@ -15,7 +15,7 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 
-Host = Literal["c", "csv", "python"]
+Host = Literal["c", "st", "csv", "python"]
 POINTS: Final = 41
 MOST_POINTS: Final = 1001
 _BEYOND: Final = 1.5
@@ -31,7 +31,8 @@ def export(
 
     Args:
         scene: the scene file.
-        to: c (C99), python (a module that imports nothing of others), or csv (a grid).
+        to: c (C99), st (IEC 61131-3 structured text), python (a module that imports nothing of others), or
+            csv (a grid).
         out: folder for the files.
         name: of files and functions; default that of the scene.
         points: of each axis of the grid of csv, 2 to 1001; default 41.
@@ -64,7 +65,7 @@ def export(
 def _files(law: CompactLaw, name: str, to: Host, points: int, highest: float) -> dict[str, str]:
     if to == "csv":
         return csv_files(law, name, points=points, highest=highest)
-    return {"c": c_files, "python": python_files}[to](law, name)
+    return {"c": c_files, "st": st_files, "python": python_files}[to](law, name)
 
 
 def _check_points(to: Host, points: int | None) -> None:

@@ -83,12 +83,13 @@ def judged_all(
     most: int | None = None,
     start: int = FRESH,
     further: float = FURTHER,
+    whole: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[Judgement, ...]:
     """Settings over the same devices, twice as many each time until the verdict on each is known.
 
     Args: `first`, `most`: numbers of devices; default the balancer's. `start`: number of the first one.
-    `further`: as `Balancer.run_all`. `progress`: told what is done.
+    `further`: as `Balancer.run_all`. `whole`: as `Draws`. `progress`: told what is done.
     """
     asked, demands = balancer.asked_fraction(), balancer.demands()
 
@@ -101,7 +102,8 @@ def judged_all(
     while left and count < most:
         if progress is not None:
             progress(f"{count} of at most {most} drawn devices")
-        ran = balancer.run_all([settings[i] for i in left], Draws.block(start + count, more), further=further)
+        draws = Draws.block(start + count, more, whole=whole)
+        ran = balancer.run_all([settings[i] for i in left], draws, further=further)
         for place, outcomes in zip(left, ran, strict=True):
             before = done.get(place)
             done[place] = judgement(place, before.outcomes.joined(outcomes) if before else outcomes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections import Counter
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -15,7 +16,7 @@ import pytest
 
 import ringbalance as rb
 from ringbalance.controller.balancer import Draws, balancer_of
-from ringbalance.controller.judging.judge import FRESH
+from ringbalance.controller.judging.judge import FRESH, judged_all
 from ringbalance.design.store import Store
 from ringbalance.design.work import bundle_size
 from ringbalance.scene.models import Scene
@@ -192,3 +193,13 @@ def test_a_map_is_drawn_with_its_boundary(paper_scene: Scene, tmp_path: Path) ->
     assert found.best is not None
     assert math.isfinite(found.static[found.best]["values"]["reach"][0])
     assert "not feasible" in (tmp_path / names[0]).read_text()
+
+
+def test_devices_out_of_reach_are_not_run_and_count_all_the_same(paper_scene: Scene) -> None:
+    """Where many devices lack capacity, fraction and codes are those of runs to their ends."""
+    scene = paper_scene.with_values({"rotor.initial_vibration.amplitude": "24 um"})
+    (row,) = rb.sweep(scene, {"gas.pressure": [0.7e6]}, runs=16, intervals=False).driven
+    (whole,) = judged_all(balancer_of(scene.with_values({"gas.pressure": 0.7e6})), [{}], first=16, most=16)
+    assert row["fraction"] == whole.fraction.value
+    assert row["ended"] == dict(Counter(whole.outcomes.ended))
+    assert row["ended"]["capacity_exceeded"] > 0

@@ -1,0 +1,158 @@
+"""Structured text, run from the syntax tree of a parser by others, has the bits of Python."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from math import sqrt
+from typing import Any, Final
+
+import numpy as np
+import pytest
+from law_queries import answers, queries
+
+from ringbalance.export import point
+from ringbalance.export.compact import CompactLaw
+from ringbalance.export.hosts import st_files
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+
+parse = pytest.importorskip("blark.parse")
+Both = tuple[CalibratedLaw, CompactLaw]
+STANDARD: Final[dict[str, Callable[[Any], Any]]] = {
+    "SQRT": sqrt,
+    "LREAL_TO_DINT": round,
+    "DINT_TO_LREAL": float,
+}
+OPERATORS: Final[dict[str, Callable[[Any, Any], Any]]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "=": operator.eq,
+    "<>": operator.ne,
+    # Both sides, as a controller may do.
+    "AND": lambda a, b: a and b,
+    "OR": lambda a, b: a or b,
+}
+
+
+class Returned(Exception):  # noqa: N818
+    """RETURN."""
+
+
+class Machine:
+    """Runs what it has parsed: assignments, IF, WHILE, RETURN and calls of numbers, truths and rows."""
+
+    def __init__(self, text: str) -> None:
+        found = re.findall(r"^FUNCTION .*?^END_FUNCTION$", text, re.DOTALL | re.MULTILINE)
+        items = [parse.parse_source_code(each).transform().items[0] for each in found]
+        self.functions = {str(item.name): item for item in items}
+        self.arguments = {name: list(_arguments(item)) for name, item in self.functions.items()}
+
+    def call(self, name: str, given: list[Any]) -> Any:
+        names = dict(zip(self.arguments[name], given, strict=True))
+        with suppress(Returned):
+            self._run(self.functions[name].body.statements, names)
+        return names.get(name)
+
+    def _run(self, statements: list[Any], names: dict[str, Any]) -> None:
+        for each in statements:
+            getattr(self, f"_{type(each).__name__}")(each, names)
+
+    def _AssignmentStatement(self, node: Any, names: dict[str, Any]) -> None:  # noqa: N802
+        target, value = node.variables[0], self._value(node.expression, names)
+        if hasattr(target, "elements"):
+            names[str(target.name.name)][self._place(target, names)] = value
+        else:
+            names[str(target.name)] = value
+
+    def _IfStatement(self, node: Any, names: dict[str, Any]) -> None:  # noqa: N802
+        branches = [(node.if_expression, node.statements)]
+        branches += [(each.if_expression, each.statements) for each in node.else_ifs]
+        for test, statements in branches:
+            if self._value(test, names):
+                return self._run(statements.statements, names)
+        if node.else_clause is not None:
+            self._run(node.else_clause.statements.statements, names)
+        return None
+
+    def _WhileStatement(self, node: Any, names: dict[str, Any]) -> None:  # noqa: N802
+        while self._value(node.expression, names):
+            self._run(node.statements.statements, names)
+
+    def _ReturnStatement(self, _node: Any, _names: dict[str, Any]) -> None:  # noqa: N802
+        raise Returned
+
+    def _FunctionCallStatement(self, node: Any, names: dict[str, Any]) -> None:  # noqa: N802
+        self._FunctionCall(node, names)
+
+    def _FunctionCall(self, node: Any, names: dict[str, Any]) -> Any:  # noqa: N802
+        name, given = str(node.name.name), [self._value(each.value, names) for each in node.parameters]
+        return STANDARD[name](*given) if name in STANDARD else self.call(name, given)
+
+    def _place(self, node: Any, names: dict[str, Any]) -> int:
+        place: int = self._value(node.elements[0].subscripts[0], names)
+        return place
+
+    def _value(self, node: Any, names: dict[str, Any]) -> Any:  # noqa: C901
+        match type(node).__name__:
+            case "Integer":
+                return int(node.value)
+            case "Boolean":
+                return str(node.value) == "TRUE"
+            case "Real":
+                return float(node.value)
+            case "SimpleVariable":
+                return names[str(node.name)]
+            case "MultiElementVariable":
+                return names[str(node.name.name)][self._place(node, names)]
+            case "ParenthesizedExpression":
+                return self._value(node.expr, names)
+            case "UnaryOperation":
+                value = self._value(node.expr, names)
+                return not value if str(node.op) == "NOT" else -value
+            case "BinaryOperation":
+                left, right = self._value(node.left, names), self._value(node.right, names)
+                if str(node.op) == "/":
+                    return left // right if isinstance(left, int) else left / right
+                return OPERATORS[str(node.op)](left, right)
+            case "FunctionCall":
+                return self._FunctionCall(node, names)
+        raise TypeError(type(node).__name__)
+
+
+def _arguments(item: Any) -> Iterator[str]:
+    for block in item.declarations:
+        if type(block).__name__ in ("InputDeclarations", "InputOutputDeclarations"):
+            for each in block.items:
+                yield from (str(one.variable.name) for one in each.variables)
+
+
+def test_structured_text_has_the_bits_of_python(six: Both) -> None:
+    law, compact = six
+    text = st_files(compact, "disc")["disc.st"]
+    machine = Machine(text)
+    block = text.partition("FUNCTION_BLOCK")[2]
+    constants = [float(each) for each in re.split(r"[\s,]+", block.split("[")[2].split("]")[0].strip())]
+    assert constants == list(compact.constants)
+    asked = queries(law, 400, seed=3, outside=True)
+    right = np.array(list(answers(compact.constants, asked)))
+    assert np.unique(right[:, 2]).size == 5
+    for query, expected in zip(asked.T.tolist(), right, strict=True):
+        row = query + [0.0] * (point.PLACES_OF_QUERY - 4)
+        machine.call("disc_answer", [constants, row])
+        assert np.array(row[point.VELOCITY : point.PRIMED_AFTER + 1]).tobytes() == expected.tobytes()
+
+
+def test_the_function_block_is_one(six: Both) -> None:
+    """With three of its constants: the parser takes minutes for them all."""
+    text = st_files(six[1], "disc")["disc.st"]
+    block = "FUNCTION_BLOCK" + text.partition("FUNCTION_BLOCK")[2]
+    few = re.sub(r":= \[.*?\]", ":= [1.0, 2.0, 3.0]", block, flags=re.DOTALL)
+    (item,) = parse.parse_source_code(few).transform().items
+    assert str(item.name) == "FB_disc"

@@ -65,6 +65,8 @@ class Axis:
     """By path; empty for a list."""
     choices: tuple[Point, ...] = ()
     """Of a list, one after the other."""
+    names: tuple[str, ...] = ()
+    """Of the rows of a CSV file that names them."""
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -167,13 +169,18 @@ def plan_of(scene: SceneFile, vary: Mapping[Any, Any], *, sample: str = "") -> P
     return Plan(axes=tuple(axes), sample=sample)
 
 
-def plan_of_texts(scene: SceneFile, texts: Sequence[str], *, sample: str = "") -> Plan:
-    """A plan from axes as the command line has them, each KEY=VALUES; see `plan_of`."""
+def plan_of_texts(
+    scene: SceneFile, texts: Sequence[str], *, sample: str = "", folder: Path | None = None
+) -> Plan:
+    """A plan from axes as the command line has them, each KEY=VALUES; see `plan_of`.
+
+    Args: `folder`: from which files are looked for; default that of the process.
+    """
     axes: list[Axis] = []
     faults: list[Fault] = []
     for text in texts:
         try:
-            axes.append(_axis_of_text(scene, text, folder=Path()))
+            axes.append(_axis_of_text(scene, text, folder=folder or Path()))
         except SceneError as error:
             faults += error.faults
     if faults:
@@ -318,6 +325,7 @@ def _table_axis(scene: SceneFile, table: str, file: Path) -> Axis:
     readers = {key: _reader(scene, f"{table}.{key}") for key in columns}
     return Axis(
         ranges={},
+        names=tuple(row.get(NAME, "") for row in rows),
         choices=tuple(
             {
                 f"{table}.{key}": _checked(f"{table}.{key}", text, reader) if (text := row[key]) else None

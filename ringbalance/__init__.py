@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from ringbalance.controller.judging.tuning import Tuning as Tuning
     from ringbalance.controller.rotor import Sensor as Sensor
     from ringbalance.controller.simulation import Simulation as Simulation
+    from ringbalance.design.designing import Design as Design
     from ringbalance.design.sweep import Sweep as Sweep
+    from ringbalance.designs import find_design as find_design
     from ringbalance.designs import objective as objective
     from ringbalance.designs import sweep as sweep
     from ringbalance.face import compare as compare
@@ -92,8 +94,9 @@ _NAMES = {
     "controller.rotor": ("Sensor",),
     "controller.simulation": ("Simulation",),
     "controller.judging.tuning": ("Tuning",),
+    "design.designing": ("Design",),
     "design.sweep": ("Sweep",),
-    "designs": ("objective", "sweep"),
+    "designs": ("find_design", "objective", "sweep"),
     "face": (
         "compare",
         "simulate",

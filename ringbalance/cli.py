@@ -51,6 +51,10 @@ COMMANDS = {
         "ringbalance.design.cli:sweep",
         "Many designs: a row of answers for every point of a grid or a sample.",
     ),
+    "design": (
+        "ringbalance.design.cli:design",
+        "The smallest disc, with bore, pressure, valve and settings, that meets what a scene requires.",
+    ),
     "fit": (
         "ringbalance.reports.fit_cli:fit",
         "Parameters of a built disc from measurements, with intervals and what the data identify.",

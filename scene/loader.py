@@ -22,7 +22,7 @@ from ringbalance.scene.rules.fitted import fitted_faults
 from ringbalance.scene.toml import read_toml, toml_text
 
 _LARGEST_FILE = 2**20
-_DECIDE_NOTHING = ("requirement.", "measured.", "rotor.mass", "liquid.source")
+_DECIDE_NOTHING = ("requirement.", "design.", "measured.", "rotor.mass", "liquid.source")
 """Values that no result depends on."""
 CHANGED: Final = ", changed"
 """Behind the name of a file some of whose values were changed since."""

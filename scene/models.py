@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
+from ringbalance.scene.design_settings import DesignSettings
 from ringbalance.scene.fitted import DrawDownFactor, ExtraLoss, GaugeCorrection, ModelErrors
 from ringbalance.scene.keys.declaration import (
     UNCERTAIN,
@@ -378,6 +379,7 @@ class Scene(SceneFile):
     sensor: Sensor
     controller: ControllerSettings
     requirement: RequirementSettings = field(default_factory=RequirementSettings)
+    design: DesignSettings = field(default_factory=DesignSettings)
 
     balancer: ClassVar[str] = "liquid_ring"
 

@@ -36,7 +36,7 @@ def tuning_rows(tuning: Tuning) -> Rows:
         facts=tuning.information.facts,
         tables=(
             _settings_table(tuning),
-            _required_table(tuning),
+            required_table(tuning.recommended),
             _along_table(tuning),
             _tried_table(tuning),
             _remedies_table("Remedies, each with its best settings", tuning.remedies),
@@ -56,24 +56,14 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
         "balancer": scene.balancer,
         "status": tuning.status,
         "asked": tuning.recommended.asked,
-        **_judgement(tuning.recommended),
+        **judgement_document(tuning.recommended),
         "settings": plain_settings(tuning.recommended.settings),
-        "own": None if tuning.own is None else _judgement(tuning.own),
+        "own": None if tuning.own is None else judgement_document(tuning.own),
         "further_s": FURTHER,
         "longer": None
         if tuning.longer is None
         else {"further_s": LONGER, "fraction": tuning.longer.fraction.document()},
-        "required": [
-            {
-                "code": each.code,
-                "sense": each.sense,
-                "required": each.required,
-                "unit": each.unit,
-                "stated": each.stated,
-                "fraction": tuning.recommended.fraction_of(each).document(),
-            }
-            for each in tuning.recommended.demands
-        ],
+        "required": required_document(tuning.recommended),
         "along": {
             "path": tuning.along_name,
             "unit": tuning.along_unit,
@@ -96,7 +86,23 @@ def tuning_document(tuning: Tuning) -> dict[str, Any]:
     }
 
 
-def _judgement(judgement: Judgement) -> dict[str, Any]:
+def required_document(judgement: Judgement) -> list[dict[str, Any]]:
+    """What is asked of every device, and the fraction that meets it; SI."""
+    return [
+        {
+            "code": each.code,
+            "sense": each.sense,
+            "required": each.required,
+            "unit": each.unit,
+            "stated": each.stated,
+            "fraction": judgement.fraction_of(each).document(),
+        }
+        for each in judgement.demands
+    ]
+
+
+def judgement_document(judgement: Judgement) -> dict[str, Any]:
+    """Verdict, fraction and times of settings; SI."""
     return {
         "verdict": judgement.verdict,
         "fraction": judgement.fraction.document(),
@@ -159,7 +165,7 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
         for path, value in best.settings.items()
         if value is not None
     }
-    yield Finding(code=_CODES[best.verdict], values=_values(best), change=changes)
+    yield Finding(code=_CODES[best.verdict], values=share_values(best), change=changes)
     times = times_of(best)
     if times["p50"] is not None:
         code = "tuned_half" if times["p90"] is None else "tuned_times"
@@ -169,11 +175,11 @@ def _findings(tuning: Tuning) -> Iterator[Finding]:
     elif not best.settings:
         yield Finding(code="tuned_own_best")
     else:
-        yield Finding(code="tuned_own", values={**_values(tuning.own), "verdict": tuning.own.verdict})
+        yield Finding(code="tuned_own", values={**share_values(tuning.own), "verdict": tuning.own.verdict})
     if tuning.longer is not None:
-        values = {**_values(tuning.longer), "time": LONGER, "first": FURTHER}
+        values = {**share_values(tuning.longer), "time": LONGER, "first": FURTHER}
         yield Finding(code="tuned_longer", values=values)
-    if best.verdict != MET and (causes := _causes(best)):
+    if best.verdict != MET and (causes := causes_of(best)):
         yield Finding(code="tuned_causes", values={"causes": causes})
     if not tuning.remedies and tuning.along and best.verdict != MET:
         yield Finding(code="tuned_no_level", values={"key": tuning.along_name})
@@ -185,7 +191,7 @@ def _mending(tuning: Tuning) -> Iterator[Finding]:
     best, clipped = tuning.recommended, tuning.recommended.outcomes.clipped
     for each in tuning.remedies[:1]:
         code = "remedy_meets" if each.met else "remedy_best"
-        values = {**_values(each.judgement), "what": _changes_text(each.changes, ", ")}
+        values = {**share_values(each.judgement), "what": _changes_text(each.changes, ", ")}
         yield Finding(code=code, values=values, change=each.changes)
     if best.verdict != MET:
         yield from tuning.ranking.findings()
@@ -221,7 +227,8 @@ def _remedies_table(caption: str, tried: Sequence[Remedied]) -> Table:
     return Table(caption=caption, heads=heads, rows=rows)
 
 
-def _values(judgement: Judgement) -> dict[str, Value]:
+def share_values(judgement: Judgement) -> dict[str, Value]:
+    """What sentences say of a fraction."""
     share = judgement.fraction
     return {
         "share": share.value,
@@ -233,7 +240,7 @@ def _values(judgement: Judgement) -> dict[str, Value]:
     }
 
 
-def _causes(judgement: Judgement) -> list[str]:
+def causes_of(judgement: Judgement) -> list[str]:
     """How many devices ended in which way without meeting what is required, most first."""
     missed = [(demand.code, ~demand.met(judgement.outcomes)) for demand in judgement.demands]
     counted = Counter(
@@ -270,14 +277,15 @@ def setting_text(path: str, value: object) -> str:
     return str(value)
 
 
-def _required_table(tuning: Tuning) -> Table:
+def required_table(judgement: Judgement) -> Table:
+    """What is asked of every device, and how many meet it."""
     rows = [
         (
             each.code.replace("_", " "),
             f"{each.sense} {given(each.required, each.unit, digits=4)}",
-            percent(tuning.recommended.fraction_of(each).value),
+            percent(judgement.fraction_of(each).value),
         )
-        for each in tuning.recommended.demands
+        for each in judgement.demands
     ]
     return Table(caption="Required of every device", heads=("what", "required", "met by"), rows=rows)
 

@@ -278,6 +278,19 @@ def text() -> Reader:
     return Reader(read=read, allowed=allowed, summary=allowed)
 
 
+def texts(*, example: str) -> Reader:
+    """Reader of a list of texts; its values are tuples."""
+    one, allowed = text(), f"a list of texts, such as {example}"
+
+    def read(value: object) -> tuple[str, ...]:
+        if not isinstance(value, list):
+            raise FieldError("it is not a list", allowed)
+        values: tuple[str, ...] = each_of(one, count=len(value), example=example).read(value)
+        return values
+
+    return Reader(read=read, allowed=allowed, summary="a list of texts")
+
+
 def chamber_letters() -> Reader:
     """Reader of the order in which chambers are tried: different capital letters."""
     allowed = 'a list of chamber letters, each once, such as ["A", "C", "B", "D"]'

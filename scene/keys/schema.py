@@ -10,6 +10,7 @@ from typing import Any
 
 from ringbalance.scene import loop_models, models
 from ringbalance.scene.chamber_file.record import MeshKeys
+from ringbalance.scene.design_settings import DesignSettings
 from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Entries, Key, Presence, derived, keys_of, standard, unused
 from ringbalance.scene.keys.fields import Bounds, Reader, choice, half_width, one_of, share, text
@@ -216,6 +217,7 @@ _LIQUID_RING = {
         loop_models.RequirementSettings,
         "what is required of the balancer; reports compare it with what is reached",
     ),
+    "design": Table.of(DesignSettings, "what `ringbalance design` may choose"),
 }
 LIQUID_RING = Schema.of(
     _LIQUID_RING,

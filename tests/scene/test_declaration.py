@@ -10,6 +10,7 @@ import pytest
 import scene_reference
 
 from ringbalance.scene import Fault, bundled_scene, liquid_ring_scene, load_scene, scene_table
+from ringbalance.scene.design_settings import DesignSettings
 from ringbalance.scene.keys.declaration import (
     UNCERTAIN,
     Listed,
@@ -108,5 +109,6 @@ def test_every_description_of_a_scene_reaches_its_table() -> None:
     optional = {"critical pressure ratio b", "dead volume", "valve lag", "gas inlet radius", "mass"}
     optional |= {"measured factor on lambda", "geometry of a chamber"}
     optional |= {entry.name for entry in descriptions_of(RequirementSettings).values()}
+    optional |= {entry.name for entry in descriptions_of(DesignSettings).values()}
     assert names - described <= optional
     assert described - names == {"tolerance"}

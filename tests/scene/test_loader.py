@@ -37,6 +37,7 @@ BUNDLED = (
     "perfluorinated_oil",
     "six_chamber",
     "grinding_spindle",
+    "spindle_design",
 )
 DRIVEN = ("eccentric_mass_paper", "washing_machine", "driven_masses_small")
 """Tested in test_eccentric_scene.py."""

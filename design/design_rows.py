@@ -1,0 +1,237 @@
+"""A `Design` as rows and as a JSON document."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.balancer import Demand
+from ringbalance.controller.judging.judge import Judgement
+from ringbalance.controller.judging.tuning_rows import (
+    causes_of,
+    judgement_document,
+    plain_settings,
+    required_document,
+    required_table,
+    setting_text,
+    share_values,
+    times_of,
+)
+from ringbalance.design.designing import VALVE, Design, Effect
+from ringbalance.design.hunt import Candidate
+from ringbalance.results.numbers import MISSING, given, percent
+from ringbalance.results.requirements import AT_LEAST, MET, MISSED, OPEN
+from ringbalance.results.result import Rows, Table
+from ringbalance.results.rows import Finding, Quantity, Value
+from ringbalance.scene.arrays import finite
+from ringbalance.scene.origins import raw_value_at
+
+_CODES: Final = {MET: "design_met", MISSED: "design_missed", OPEN: "design_open"}
+_EDGE: Final = 0.02
+"""Of a range: nearer to its end, a value stands at it."""
+
+
+def design_rows(design: Design) -> Rows:
+    """The design, its verdict, others, and what changes of it would do."""
+    judgement = design.judgement
+    whole = () if judgement is None else (_keys_table(design, judgement), required_table(judgement))
+    return Rows(
+        title=f"Design for {design.given.name} ({design.given.source})",
+        quantities=tuple(_quantities(design)),
+        findings=tuple(_findings(design)),
+        tables=(*whole, _effects_table(design), _front_table(design)),
+    )
+
+
+def design_document(design: Design) -> dict[str, Any]:
+    """In SI."""
+    scene, judgement, static = design.given, design.judgement, design.static
+    return {
+        "scene": {"name": scene.name, "source": scene.source, "sha256": scene.sha256},
+        "balancer": scene.balancer,
+        "designs": {
+            "static": static.points,
+            "refused": static.refused,
+            "blocked": static.blocked,
+            "able": static.able,
+            "raced": design.raced,
+        },
+        "needed_unbalance_kg_m": design.needed,
+        "largest_reach_kg_m": finite(static.reach),
+        "reach_kg_m": design.reach,
+        "size_m3": None if judgement is None else design.size,
+        "changes": plain_settings(design.point) if judgement else {},
+        "settings": plain_settings(judgement.settings) if judgement else {},
+        "asked": judgement.asked if judgement else None,
+        **(judgement_document(judgement) if judgement else {"verdict": MISSED, "fraction": None}),
+        "required": required_document(judgement) if judgement else [],
+        "effects": [_effect_document(each) for each in design.effects],
+        "front": [_candidate_document(each) for each in design.front],
+        "ranking": design.ranking.document(),
+        **design.rows().document(),
+    }
+
+
+def _effect_document(effect: Effect) -> dict[str, Any]:
+    return {
+        "path": effect.path,
+        "changes": plain_settings(effect.changes),
+        "fraction": None if effect.met is None else effect.met.document(),
+    }
+
+
+def _candidate_document(candidate: Candidate) -> dict[str, Any]:
+    race = candidate.race
+    return {
+        "changes": plain_settings(candidate.point),
+        "settings": plain_settings(race.settings),
+        "size_m3": candidate.size,
+        "fraction": race.fraction,
+        "devices": int(race.meets.size),
+        "settling_time_s": {"p50": finite(race.time(0.5)), "p90": finite(race.time(0.9))},
+        "energy_J": finite(race.gas),
+    }
+
+
+def _quantities(design: Design) -> Iterator[Quantity]:
+    judgement = design.judgement
+    if judgement is not None:
+        share = judgement.fraction
+        yield Quantity(
+            key="fraction_met",
+            name="devices that meet what is required",
+            value=share.value,
+            lower=share.low,
+            upper=share.high,
+            origin="simulated",
+        )
+        yield Quantity(
+            key="size", name="cylinder around the chambers", value=design.size, unit="m^3", digits=4
+        )
+        yield Quantity(
+            key="reach", name="cancels in any direction", value=design.reach, unit="kg m", digits=4
+        )
+    yield Quantity(
+        key="needed_unbalance", name="initial unbalance", value=design.needed, unit="kg m", digits=4
+    )
+
+
+def _findings(design: Design) -> Iterator[Finding]:
+    static, judgement = design.static, design.judgement
+    counted = {"points": static.points, "able": static.able, "raced": design.raced}
+    if judgement is None:
+        reach = 0.0 if math.isnan(static.reach) else static.reach
+        values = {**counted, "reach": reach, "needed": design.needed, "share": reach / design.needed}
+        yield Finding(code="design_none_able" if reach else "design_none_flows", values=values)
+        return
+    changes = {path: value for path, value in design.point.items() if isinstance(value, float | int | str)}
+    yield Finding(code=_CODES[judgement.verdict], values=share_values(judgement), change=changes)
+    times = times_of(judgement)
+    if times["p50"] is not None:
+        code = "tuned_half" if times["p90"] is None else "tuned_times"
+        yield Finding(code=code, values={"half": times["p50"], "most": times["p90"]})
+    yield Finding(code="design_looked", values=counted)
+    if judgement.verdict != MET:
+        yield from _misses(design, judgement)
+    for path, end in _edges(design):
+        name = VALVE if path == VALVE else path
+        yield Finding(code="design_edge", values={"path": name, "end": end})
+
+
+def _misses(design: Design, judgement: Judgement) -> Iterator[Finding]:
+    """What stands against it, and by how much."""
+    worst = min(judgement.demands, key=lambda each: judgement.fraction_of(each).value)
+    reached = _reached(judgement, worst)
+    values: dict[str, Value] = {
+        "what": worst.code.replace("_", " "),
+        "required": f"{worst.sense} {given(worst.required, worst.unit, digits=4)}",
+        "share": judgement.fraction_of(worst).value,
+        "asked": judgement.asked,
+        "reached": given(reached, worst.unit, digits=3) if math.isfinite(reached) else MISSING,
+    }
+    yield Finding(code="design_demand" if math.isfinite(reached) else "design_demand_open", values=values)
+    if causes := causes_of(judgement):
+        yield Finding(code="tuned_causes", values={"causes": causes})
+    yield from design.ranking.findings()
+
+
+def _reached(judgement: Judgement, demand: Demand) -> float:
+    """What the fraction asked for comes to."""
+    values = np.sort(getattr(judgement.outcomes, demand.outcome))
+    count = max(math.ceil(judgement.asked * values.size), 1)
+    return float(values[-count] if demand.sense == AT_LEAST else values[count - 1])
+
+
+def _edges(design: Design) -> Iterator[tuple[str, str]]:
+    """Keys that stand at an end of their range, with that end."""
+    for axis in design.space.axes:
+        for path, ends in axis.ranges.items():
+            value = float(design.point[path])
+            if abs(value - ends.low) <= _EDGE * abs(ends.low):
+                yield path, setting_text(path, ends.low)
+            elif abs(value - ends.high) <= _EDGE * abs(ends.high):
+                yield path, setting_text(path, ends.high)
+
+
+def _keys_table(design: Design, judgement: Judgement) -> Table:
+    """All that a drawing and a controller need."""
+    rows = [
+        (
+            path,
+            setting_text(path, raw_value_at(design.given, path)),
+            setting_text(path, value),
+            design.space.range_text(path) if path in design.space.paths else "follows",
+        )
+        for path, value in design.point.items()
+    ]
+    if valve := design.space.valve(design.point):
+        rows.insert(0, (VALVE, "", valve, ", ".join(design.space.valves)))
+    rows += [
+        (path, setting_text(path, raw_value_at(design.given, path)), setting_text(path, value), "by runs")
+        for path, value in judgement.settings.items()
+    ]
+    return Table(caption="Design", heads=("key", "the scene's", "designed", "among"), rows=rows)
+
+
+def _effects_table(design: Design) -> Table:
+    rows = [
+        (
+            each.path,
+            _effect_text(design, each),
+            "no such design" if each.met is None else percent(each.met.value),
+            "" if each.met is None else f"{percent(each.met.low)} to {percent(each.met.high)}",
+        )
+        for each in design.effects
+    ]
+    heads = ("key", "instead", "devices that meet all", "95 %")
+    return Table(caption="One key changed, the settings as they are", heads=heads, rows=rows)
+
+
+def _effect_text(design: Design, effect: Effect) -> str:
+    if effect.path == VALVE:
+        return design.space.valve({**design.point, **effect.changes})
+    return setting_text(effect.path, effect.changes[effect.path])
+
+
+def _front_table(design: Design) -> Table:
+    paths = [path for path in design.space.paths if path not in design.space.valve_paths]
+    rows = [
+        (
+            given(each.size, "m^3", digits=4),
+            given(finite(each.race.time(0.9)), "s", digits=3),
+            given(finite(each.race.gas), "J", digits=3),
+            *([design.space.valve(each.point)] if design.space.valves else []),
+            *(setting_text(path, each.point.get(path)) for path in paths),
+        )
+        for each in design.front
+    ]
+    valve = (VALVE,) if design.space.valves else ()
+    heads = ("size", "90 % within", "gas, median", *valve, *paths)
+    return Table(
+        caption="Others, none of which is better in everything; on the devices of the search",
+        heads=heads,
+        rows=rows,
+    )

@@ -1,0 +1,247 @@
+"""A design for a scene's table [design]: the smallest disc, with its bore, pressure, valve and settings, of
+whose drawn devices enough meet what is required; or what stands against it.
+
+What the search finds is judged as `tune` judges: on devices on which nothing was chosen, the smallest first.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final
+
+from ringbalance.controller.balancer import Draws, Settings, balancer_of
+from ringbalance.controller.judging.judge import FRESH, Judgement
+from ringbalance.controller.judging.ranking import Ranking, ranked
+from ringbalance.design.axes import Axis, Point
+from ringbalance.design.hunt import Candidate, Hunt, Static, deal, hunt
+from ringbalance.design.racing import devices_row, judged_design
+from ringbalance.design.space import Space
+from ringbalance.design.static import point_scene, static_rows
+from ringbalance.results.proportion import Proportion
+from ringbalance.results.requirements import MET
+from ringbalance.results.result import Presentation, PresentedResult
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.platform.processes import beside
+
+VALVE: Final = "valve"
+"""Stands for the keys of a thing with a name."""
+_TOGETHER, _MOST = 2, 8
+"""Designs that are judged at a time, and at the most."""
+_NEAR: Final = 4
+"""Smaller ones that nearly pass, for which settings are searched as `tune` does."""
+_MOVED: Final = 0.05
+"""By which a key is moved to either side, relative."""
+_DEVICES: Final = 64
+"""On which a moved key is answered."""
+_FRONT: Final = 6
+_APART: Final = 0.05
+"""Relative difference in size, time or gas that makes another design worth a line."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect:
+    """What a change of one key, with everything else as it is, makes of a design."""
+
+    path: str
+    changes: Point
+    """SI; with what follows from it."""
+    met: Proportion | None
+    """Of the devices; None: no such design."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Design(PresentedResult):
+    """A design and what it rests on."""
+
+    given: SceneFile
+    space: Space
+    static: Static
+    """Of the points that were answered without a run."""
+    raced: int
+    """Designs that ran as few devices."""
+    needed: float
+    """Unbalance that is to be cancelled, kg m."""
+    reach: float | None
+    """What the design cancels in any direction, kg m."""
+    point: Point
+    """Changes of the scene; of the design that comes nearest where none meets what is required."""
+    judgement: Judgement | None
+    """Of it under its best settings; None: no design can work."""
+    front: tuple[Candidate, ...]
+    """Of those that meet it on the devices of the search, none better than another in size, time and gas."""
+    effects: tuple[Effect, ...]
+    ranking: Ranking
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the design meets what is required."""
+        return self.judgement is not None and self.judgement.verdict == MET
+
+    @property
+    def size(self) -> float:
+        """Volume of the cylinder around its chambers, m^3."""
+        return self.space.size(self.point)
+
+    @property
+    def recommended_scene(self) -> SceneFile:
+        """The scene as designed, checked. Raises: SceneError: no design can work."""
+        if self.judgement is None:
+            problem, allowed = "no design can work", "more space, pressure or a smaller unbalance"
+            raise SceneError.of_file(self.given.file, problem, allowed)
+        return self.given.with_values({**self.point, **self.judgement.settings})
+
+
+def run_design(
+    scene: SceneFile,
+    *,
+    presentation: Presentation,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Design:
+    """Design what a scene leaves open; see `ringbalance.design`.
+
+    Args: `executor`: who computes; default `workers` processes, default one for each processor.
+    Raises: SceneError: a scene without [design], or one that leaves nothing to choose.
+    """
+    space, told = _space(scene), progress or (lambda _: None)
+    balancer = balancer_of(space.scene)
+    needed = abs(balancer.rotor().unbalance)
+    workers = workers or os.cpu_count() or 1
+    with beside(workers + 1 if executor is None and workers > 1 else 1) as pool:
+        crew = executor or pool
+        asked = balancer.asked_fraction()
+        found = hunt(space, asked=asked, needed=needed, executor=crew, told=told)
+        best, judgement = _best(space, found, crew, told)
+        effects: tuple[Effect, ...] = ()
+        if best is not None and judgement is not None:
+            told("the verdict, and what changes of it would do")
+            whole = partial(judged_design, scene, best.point, settings=judgement.settings, search=False)
+            effects, judgement = _effects(space, best, judgement.settings, crew, whole)
+    ranking, reach = Ranking(), None
+    if best is not None and judgement is not None:
+        ranking = ranked(balancer_of(point_scene(scene, best.point)), judgement)
+        reach = _reach(space, best.point)
+    return Design(
+        presentation=presentation,
+        given=scene,
+        space=space,
+        static=found.static,
+        raced=len(found.candidates),
+        needed=needed,
+        reach=reach,
+        point=found.static.reach_point if best is None else best.point,
+        judgement=judgement,
+        front=_front(found, asked),
+        effects=effects,
+        ranking=ranking,
+    )
+
+
+def _space(scene: SceneFile) -> Space:
+    if not isinstance(scene, Scene):
+        allowed = "a liquid ring"
+        raise SceneError.of_file(scene.file, "only a disc with liquid is designed", allowed)
+    return Space.of(scene)
+
+
+def _reach(space: Space, point: Point) -> float | None:
+    (row,) = static_rows(space.scene, [point], intervals=False)
+    reach: float | None = row["values"].get("reach", (None,))[0]
+    return reach
+
+
+def _best(
+    space: Space, found: Hunt, executor: Executor | None, told: Callable[[str], None]
+) -> tuple[Candidate | None, Judgement | None]:
+    """The smallest that meets what is required on fresh devices, else the one that serves most of them."""
+    best: tuple[Candidate | None, Judgement | None] = None, None
+    finalists = [(each, True) for each in found.near_misses(_NEAR)]
+    finalists += [(each, False) for each in found.passing[:_MOST]]
+    for start in range(0, len(finalists), _TOGETHER):
+        told(f"judging designs {start + 1} and on of {len(finalists)}")
+        together = finalists[start : start + _TOGETHER]
+        calls = [
+            partial(
+                judged_design,
+                space.hasty,
+                each.point,
+                settings=each.race.settings,
+                search=search and not space.sets_controller,
+            )
+            for each, search in together
+        ]
+        for (each, _), now in zip(together, deal(executor, calls), strict=True):
+            if now is not None and now.verdict == MET:
+                return each, now
+            if now is not None and (best[1] is None or now.fraction.value > best[1].fraction.value):
+                best = each, now
+    return best
+
+
+def _effects(
+    space: Space,
+    best: Candidate,
+    settings: Settings,
+    executor: Executor | None,
+    whole: Callable[[], Judgement | None],
+) -> tuple[tuple[Effect, ...], Judgement | None]:
+    """Of every key moved alone; and beside them the verdict on the design itself, which takes longest."""
+    moves = [(path, change) for axis in space.axes for path, change in _moves(axis, best.point)]
+    base = {path: value for path, value in best.point.items() if path in space.paths}
+    points = [space.followed({**base, **change}) for _, change in moves]
+    draws = Draws.block(FRESH, _DEVICES)
+    calls = [partial(devices_row, space.hasty, point, settings=settings, draws=draws) for point in points]
+    judgement, *counts = deal(executor, [whole, *calls])
+    effects = [
+        Effect(
+            path=path,
+            changes=change,
+            met=None if count is None else Proportion(count=count, of=_DEVICES),
+        )
+        for (path, change), count in zip(moves, counts, strict=True)
+    ]
+    return tuple(effects), judgement
+
+
+def _moves(axis: Axis, point: Point) -> Sequence[tuple[str, dict[str, Any]]]:
+    """A number to both sides, another entry of a list instead."""
+    if axis.ranges:
+        return [
+            (path, {path: float(f"{(1 + by) * float(point[path]):.4g}")})
+            for path in axis.ranges
+            for by in (-_MOVED, _MOVED)
+        ]
+    now = {path: point.get(path) for path in axis.paths}
+    return [
+        (VALVE if any(axis.names) else axis.paths[0], dict(each))
+        for each in axis.choices
+        if any(now[path] != value for path, value in each.items())
+    ]
+
+
+def _front(found: Hunt, asked: float) -> tuple[Candidate, ...]:
+    """The smallest first; of those that are nearly alike the first."""
+
+    def of(each: Candidate) -> tuple[float, float, float]:
+        return each.size, each.race.time(asked), each.race.gas
+
+    kept: list[Candidate] = []
+    for each in found.passing:
+        beaten = any(
+            all(b <= a for a, b in zip(of(each), of(other), strict=True)) and of(other) != of(each)
+            for other in found.passing
+        )
+        alike = any(
+            all(abs(a - b) <= _APART * b for a, b in zip(of(each), of(other), strict=True)) for other in kept
+        )
+        if not beaten and not alike:
+            kept.append(each)
+    places = {round(i * (len(kept) - 1) / max(_FRONT - 1, 1)) for i in range(_FRONT)} if kept else set()
+    return tuple(each for i, each in enumerate(kept) if i in places)

@@ -1,0 +1,208 @@
+"""One design in closed loop: few drawn devices race its controllers' settings.
+
+Settings stand in units of a design's own loop and dead time, so that what served one design is a good start
+for another.  A design that serves few of the first devices is left; only good ones run on all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Any, Final
+
+import numpy as np
+
+from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Settings, balancer_of
+from ringbalance.controller.judging.judge import Judgement, judged_all
+from ringbalance.controller.judging.search import searched
+from ringbalance.controller.trials import Trials
+from ringbalance.design.axes import Point
+from ringbalance.design.static import FAULTS, point_scene
+from ringbalance.scene.arrays import BoolArray, FloatArray
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.origins import SceneFile
+
+Place = tuple[int, tuple[int, ...]]
+"""Kind of controller, by its number among the balancer's trials, and levels on its axes."""
+HEATS: Final = (4, 8, 24, 64)
+"""Devices after each heat of a race; at last a whole block of draws, whose inputs are spread evenly."""
+DEVICES: Final = HEATS[-1]
+"""Of a design that stays in the race."""
+SURE: Final = 256
+"""Devices on which the smallest design must hold before others are measured by it: the best of many that ran
+as few is often one that was lucky with them."""
+_WATCHED: Final = 10.0
+"""s, for which a race watches a device that has held its limit; a verdict watches longer."""
+_KEPT: Final = (39, 8, 1)
+"""Settings at most that go on after each heat but the last."""
+_BEHIND: Final = 2
+"""Devices by which settings may be behind the best after a heat."""
+_LEFT: Final = 0.2
+"""By so much below the fraction asked for after a heat, a design is left: three of four devices must do."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Race:
+    """What a design comes to under the best settings that raced."""
+
+    place: Place | None
+    """None: under the scene's own settings."""
+    settings: Settings
+    """By path, SI."""
+    meets: BoolArray
+    """Of each device that ran, by number."""
+    times: FloatArray
+    """s; infinite where not settled."""
+    energy: FloatArray
+    """J, of the gas that was let in."""
+
+    @property
+    def fraction(self) -> float:
+        """Of the devices that meet every demand."""
+        return float(np.mean(self.meets)) if self.meets.size else 0.0
+
+    @cached_property
+    def gas(self) -> float:
+        """Median over the devices, J."""
+        return float(np.median(self.energy)) if self.energy.size else math.inf
+
+    def time(self, fraction: float) -> float:
+        """By which a fraction of the devices has settled, s."""
+        if not self.times.size:
+            return math.inf
+        return float(np.sort(self.times)[max(math.ceil(fraction * self.times.size), 1) - 1])
+
+    @property
+    def order(self) -> tuple[float, ...]:
+        """Most devices first, then soonest."""
+        return (-float(np.count_nonzero(self.meets)), self.time(0.9), self.gas)
+
+    def joined(self, other: Race) -> Race:
+        """With the outcomes of further devices."""
+        return replace(
+            self,
+            meets=np.concatenate([self.meets, other.meets]),
+            times=np.concatenate([self.times, other.times]),
+            energy=np.concatenate([self.energy, other.energy]),
+        )
+
+
+def race(
+    scene: SceneFile, point: Point, *, places: Sequence[Place] | None, asked: float, settings: bool
+) -> Race | None:
+    """The best settings of a design; None: its scene is refused, or it breaks down.
+
+    Args: `places`: settings that race, such as those that raced best on another design; None: all that are
+        tried at first. `asked`: fraction of devices. `settings`: whether any are raced but the scene's own.
+    """
+    try:
+        balancer = balancer_of(point_scene(scene, point))
+        field = _field(balancer.trials(), places) if settings else [(None, {})]
+        return _raced(balancer, field, asked) if field else None
+    except (SceneError, *FAULTS):
+        return None
+
+
+def raced_longer(scene: SceneFile, point: Point, *, before: Race) -> Race:
+    """The same on `SURE` devices; as it was where it breaks down."""
+    try:
+        balancer = balancer_of(point_scene(scene, point))
+        return _heat(balancer, [before], before.meets.size, SURE, further=FURTHER)[0]
+    except (SceneError, *FAULTS):
+        return before
+
+
+def _field(trials: Sequence[Trials], places: Sequence[Place] | None) -> list[tuple[Place | None, Settings]]:
+    """Settings to race; those of the scene where it offers none."""
+    wanted = _all_first(trials) if places is None else places
+    found = [(place, _settings(trials[place[0]], place[1])) for place in wanted]
+    return [(place, each) for place, each in found if each is not None] if trials else [(None, {})]
+
+
+def _all_first(trials: Sequence[Trials]) -> list[Place]:
+    return [
+        (kind, levels)
+        for kind, each in enumerate(trials)
+        for levels in product(*(axis.first for axis in each.axes))
+    ]
+
+
+def near(trials: Sequence[Trials], place: Place) -> list[Place]:
+    """Settings one level away on one axis."""
+    kind, levels = place
+    return [
+        (kind, (*levels[:axis], level, *levels[axis + 1 :]))
+        for axis, at in enumerate(levels)
+        for level in (at - 1, at + 1)
+        if 0 <= level < len(trials[kind].axes[axis].levels)
+    ]
+
+
+def _settings(trials: Trials, levels: tuple[int, ...]) -> Settings | None:
+    return trials.settings({axis.name: axis.levels[at] for axis, at in zip(trials.axes, levels, strict=True)})
+
+
+def _raced(balancer: Balancer, field: Sequence[tuple[Place | None, Settings]], asked: float) -> Race:
+    running = [Race(place=place, settings=settings, **_NOBODY) for place, settings in field]
+    first = 0
+    for heat, last in enumerate(HEATS):
+        running = sorted(_heat(balancer, running, first, last), key=lambda each: each.order)
+        if running[0].fraction < asked - _LEFT:
+            break
+        best = np.count_nonzero(running[0].meets)
+        running = [each for each in running if np.count_nonzero(each.meets) > best - _BEHIND]
+        first, running = last, running[: _KEPT[heat]] if heat < len(_KEPT) else running
+    return running[0]
+
+
+def _heat(
+    balancer: Balancer, races: Sequence[Race], first: int, last: int, *, further: float = _WATCHED
+) -> list[Race]:
+    draws, demands = Draws.block(first, last - first, whole=False), balancer.demands()
+    ran = balancer.run_all([each.settings for each in races], draws, further=further)
+    return [
+        each.joined(
+            replace(
+                each,
+                meets=np.asarray(np.all([demand.met(outcomes) for demand in demands], axis=0)),
+                times=outcomes.settling_time,
+                energy=outcomes.energy,
+            )
+        )
+        for each, outcomes in zip(races, ran, strict=True)
+    ]
+
+
+_NOBODY: Final[dict[str, Any]] = {
+    "meets": np.zeros(0, dtype=np.bool_),
+    "times": np.zeros(0),
+    "energy": np.zeros(0),
+}
+
+
+def judged_design(scene: SceneFile, point: Point, *, settings: Settings, search: bool) -> Judgement | None:
+    """The settings that serve most devices of a design; None: it breaks down.
+
+    Judged on devices on which nothing was chosen.
+    Args: `settings`: those that raced best. `search`: whether others are looked for as `tune` does.
+    """
+    try:
+        balancer = balancer_of(point_scene(scene, point))
+        tried = [settings, searched(balancer)] if search else [settings]
+        judged = judged_all(balancer, [each for i, each in enumerate(tried) if each not in tried[:i]])
+    except (SceneError, *FAULTS):
+        return None
+    return max(judged, key=lambda each: each.fraction.value)
+
+
+def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Draws) -> int | None:
+    """How many of some devices meet what is required; None: the point is refused or breaks down."""
+    try:
+        balancer = balancer_of(point_scene(scene, point))
+        (outcomes,) = balancer.run_all([settings], draws)
+        return int(np.count_nonzero(np.all([each.met(outcomes) for each in balancer.demands()], axis=0)))
+    except (SceneError, *FAULTS):
+        return None

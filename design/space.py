@@ -1,0 +1,219 @@
+"""What a design may be: axes from the scene's table [design], and what follows where they move the disc."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+from ringbalance.controller.judging.tuning_rows import setting_text
+from ringbalance.design.axes import Axis, Point, Range, plan_of, plan_of_texts
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.keys.derivations import shortest_path
+from ringbalance.scene.models import Scene
+from ringbalance.scene.origins import SceneFile
+from ringbalance.scene.toml import toml_text
+
+BORES: Final = (0.3e-3, 3e-3)
+"""m, where the scene gives no range of its own: tubes that can be bought drawn, and cleaned."""
+_LEAST: Final = 0.1
+"""Of the width or the pressure that there is, where the scene gives no range; of R2 - R1 twice as much."""
+_DIGITS: Final = 3
+"""Of a value that is tried, so that it can stand in a drawing."""
+_HASTY: Final = 2.0
+"""Times the settling time asked for: what has not settled by then need not be seen to settle."""
+_VALVE: Final = ("gas.conductance", "gas.critical_ratio", "gas.valve_lag")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Space:
+    """Designs that may be tried: points of a unit cube."""
+
+    scene: Scene
+    axes: tuple[Axis, ...]
+
+    @classmethod
+    def of(cls, scene: Scene) -> Space:
+        """From [design]. Raises: SceneError: nothing may vary, or something there cannot be used."""
+        wanted = scene.design
+        axes = [*_listed(scene), *_valves(scene)]
+        taken = {path for axis in axes for path in axis.paths}
+        for path, (low, high, log) in _ranges(scene).items():
+            if path not in taken:
+                axes.append(Axis(ranges={path: Range(low=low, high=high, log=log)}))
+        if not any((wanted.outer_radius, wanted.axial_width, wanted.pressure, taken)):
+            allowed = "outer_radius, axial_width, pressure, valves, valve_file or vary in the table [design]"
+            raise SceneError.of_file(scene.file, "[design] leaves nothing to choose", allowed)
+        return cls(scene=scene, axes=tuple(axes))
+
+    @cached_property
+    def hasty(self) -> SceneFile:
+        """The scene with runs that end soon after the settling time asked for, which is met by the same."""
+        asked = self.scene.requirement.settling_time
+        if asked is None or _HASTY * asked >= self.scene.run.time_limit:
+            return self.scene
+        return self.scene.with_values({"run.time_limit": _HASTY * asked})
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Of the keys that vary."""
+        return tuple(path for axis in self.axes for path in axis.paths)
+
+    @property
+    def sized(self) -> bool:
+        """Whether the disc's size varies."""
+        return any(path in ("disc.outer_radius", "disc.axial_width") for path in self.paths)
+
+    @property
+    def sets_controller(self) -> bool:
+        """Whether keys of the controller vary, which are not searched besides then."""
+        return any(path.startswith("controller.") for path in self.paths)
+
+    def points(self, shares: FloatArray) -> list[Point]:
+        """Changes of the scene at places in the unit cube, shape (n, axes), with what follows from them."""
+        columns = [axis.at(column) for axis, column in zip(self.axes, shares.T, strict=True)]
+        return [self.followed(_rounded(row)) for row in zip(*columns, strict=True)]
+
+    def followed(self, point: Point) -> Point:
+        """A point with the tube on its disc.
+
+        The port keeps its distance from the outer wall, the crest the fill at which a free surface would
+        reach it, the length its ratio to the shortest path; except what the point itself says.
+        """
+        disc, tube = self.scene.disc, self.scene.tube
+        outer = float(point.get("disc.outer_radius", disc.outer_radius))
+        inner = float(point.get("disc.inner_radius", disc.inner_radius))
+        if (outer, inner) == (disc.outer_radius, disc.inner_radius) or disc.geometry is not None:
+            return point
+        port = outer - (disc.outer_radius - tube.port_radius)
+        found: dict[str, Any] = {"tube.port_radius": _up(port)}
+        crest = tube.hump_radius
+        if crest is not None:
+            share = (crest**2 - disc.inner_radius**2) / (disc.outer_radius**2 - disc.inner_radius**2)
+            crest = math.sqrt(max(inner**2 + share * (outer**2 - inner**2), inner**2))
+            found["tube.hump_radius"] = round(crest, 5)
+        crest = point.get("tube.hump_radius", found.get("tube.hump_radius"))
+        stretch = _path(found["tube.port_radius"], crest) / _path(tube.port_radius, tube.hump_radius)
+        found["tube.length"] = _up(max(stretch, 0.0) * tube.length)
+        return {**found, **point}
+
+    def size(self, point: Point) -> float:
+        """Volume of the cylinder around the chambers, pi R2^2 B, m^3."""
+        disc = self.scene.disc
+        outer = float(point.get("disc.outer_radius", disc.outer_radius))
+        return math.pi * outer**2 * float(point.get("disc.axial_width", disc.axial_width))
+
+    @property
+    def valves(self) -> tuple[str, ...]:
+        """Names of those at hand."""
+        return tuple(name for axis in self.axes for name in axis.names if name)
+
+    @property
+    def valve_paths(self) -> tuple[str, ...]:
+        """Keys that a valve with a name sets."""
+        return tuple(path for axis in self.axes if any(axis.names) for path in axis.paths)
+
+    def valve(self, point: Point) -> str:
+        """Name of a point's valve; empty where none is chosen."""
+        for axis in self.axes:
+            for name, choice in zip(axis.names, axis.choices, strict=False):
+                if all(point.get(path) == value for path, value in choice.items()):
+                    return name
+        return ""
+
+    def range_text(self, path: str) -> str:
+        """What a key may be, in its usual unit."""
+        (axis,) = (each for each in self.axes if path in each.paths)
+        if path in axis.ranges:
+            ends = axis.ranges[path]
+            return f"{setting_text(path, ends.low)} to {setting_text(path, ends.high)}"
+        return ", ".join(dict.fromkeys(setting_text(path, each.get(path)) for each in axis.choices))
+
+
+def _path(port: float, crest: float | None) -> float:
+    if crest is not None and crest >= port:
+        return 2 * port
+    return shortest_path(port_radius=port, hump_radius=crest, separation=math.pi)
+
+
+def _up(length: float) -> float:
+    """To a hundredth of a millimetre, upwards: no tube is shorter than its path."""
+    return math.ceil(length * 1e5 - 1e-6) / 1e5
+
+
+def _rounded(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """One point, numbers of ranges as they can stand in a drawing; a valve's as they are."""
+    return {
+        path: float(f"{value:.{_DIGITS}g}") if isinstance(value, float) and path not in _VALVE else value
+        for part in parts
+        for path, value in part.items()
+    }
+
+
+def _listed(scene: Scene) -> tuple[Axis, ...]:
+    """Axes of `vary`."""
+    folder = scene.checked.folder if scene.checked is not None else None
+    try:
+        return plan_of_texts(scene, scene.design.vary, folder=folder).axes
+    except SceneError as error:
+        raise SceneError([_placed(scene, "vary", each) for each in error.faults]) from error
+
+
+def _valves(scene: Scene) -> tuple[Axis, ...]:
+    """One axis of all valves at hand; none where there are none."""
+    wanted = scene.design
+    if wanted.valve_file is not None:
+        folder = scene.checked.folder if scene.checked is not None else Path()
+        try:
+            return plan_of(scene, {"gas": folder / wanted.valve_file}).axes
+        except SceneError as error:
+            raise SceneError([_placed(scene, "valve_file", each) for each in error.faults]) from error
+    if not wanted.valves:
+        return ()
+    choices = tuple(
+        {path: getattr(valve, path.partition(".")[2]) for path in _VALVE} for valve in wanted.valves
+    )
+    return (Axis(ranges={}, choices=choices, names=tuple(valve.name for valve in wanted.valves)),)
+
+
+def _placed(scene: Scene, key: str, fault: Fault) -> Fault:
+    """An error of an axis as one of the scene's key that has it."""
+    return Fault(
+        file=scene.file,
+        table="design",
+        key=key,
+        value=fault.value or toml_text(fault.file),
+        problem=fault.problem,
+        allowed=fault.allowed,
+    )
+
+
+def _ranges(scene: Scene) -> dict[str, tuple[float, float, bool]]:
+    """Lower and upper end by path, and whether small values are tried as often as large ones."""
+    wanted, disc = scene.design, scene.disc
+    found: dict[str, tuple[float, float, bool]] = {"tube.bore": (*BORES, True)}
+    if wanted.outer_radius is not None:
+        low = disc.inner_radius + 2 * _LEAST * (wanted.outer_radius - disc.inner_radius)
+        if low <= disc.inner_radius:
+            value = toml_text(f"{1e3 * wanted.outer_radius:g} mm")
+            allowed = f"above inner_radius of [disc], {1e3 * disc.inner_radius:g} mm"
+            problem = "no chamber has room there"
+            fault = Fault(
+                file=scene.file,
+                table="design",
+                key="outer_radius",
+                value=value,
+                problem=problem,
+                allowed=allowed,
+            )
+            raise SceneError([fault])
+        found["disc.outer_radius"] = (low, wanted.outer_radius, False)
+    if wanted.axial_width is not None:
+        found["disc.axial_width"] = (_LEAST * wanted.axial_width, wanted.axial_width, True)
+    if wanted.pressure is not None:
+        found["gas.pressure"] = (_LEAST * wanted.pressure, wanted.pressure, True)
+    return found

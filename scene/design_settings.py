@@ -1,0 +1,69 @@
+"""What a design may be: the keys of the table [design] of a liquid ring."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
+from ringbalance.scene.keys.fields import (
+    POSITIVE,
+    OneLine,
+    PositiveLength,
+    PositivePressure,
+    ProperFraction,
+    Time,
+    quantity,
+    texts,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValveAtHand:
+    """A valve with its line."""
+
+    name: Annotated[OneLine, needed("as it is ordered")]
+    conductance: Annotated[float, quantity("conductance", POSITIVE), needed("sonic conductance C (ISO 6358)")]
+    critical_ratio: Annotated[ProperFraction, needed("critical pressure ratio b (ISO 6358)")]
+    valve_lag: Annotated[Time, needed("time from the command to the valve's motion")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignSettings:
+    """What `ringbalance design` may choose; nothing else depends on it."""
+
+    outer_radius: Annotated[
+        PositiveLength | None,
+        unused("the disc keeps its outer radius", "largest outer radius of the chambers that space leaves"),
+        Shown("largest outer radius", "mm"),
+    ] = None
+    axial_width: Annotated[
+        PositiveLength | None,
+        unused("the disc keeps its width", "largest width of the chambers that space leaves"),
+        Shown("largest axial width", "mm"),
+    ] = None
+    pressure: Annotated[
+        PositivePressure | None,
+        unused("the gas keeps its pressure", "highest gauge pressure that is available"),
+        Shown("gas pressure available", "MPa", note="gauge"),
+    ] = None
+    valves: Annotated[
+        tuple[ValveAtHand, ...],
+        standard([], "valves at hand; without any, and without `valve_file`, the scene's own stays"),
+        Listed(
+            '[{ name = "V1", conductance = "0.4 l/(s*bar)", critical_ratio = 0.3, valve_lag = "2 ms" }, ...]'
+        ),
+        Shown("valves at hand"),
+    ] = ()
+    valve_file: Annotated[
+        OneLine | None,
+        unused(
+            "those of `valves`",
+            "a CSV file with name and further keys of [gas] in its columns, beside the scene",
+        ),
+        Shown("file of valves"),
+    ] = None
+    vary: Annotated[
+        tuple[str, ...],
+        texts(example='["tube.bore=0.5mm:2mm", "disc.chambers=4,6"]'),
+        standard([], "further keys with their ranges or lists, as `ringbalance sweep --vary` takes them"),
+        Shown("further keys that vary"),
+    ] = ()

@@ -1,0 +1,126 @@
+"""Designs: against the whole of small spaces, with what stands against a design where there is none."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import ringbalance as rb
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.search import searched
+from ringbalance.design.hunt import _MOST, threshold
+from ringbalance.design.space import Space
+from ringbalance.results.proportion import Proportion
+from ringbalance.results.requirements import MET, OPEN
+from ringbalance.scene.models import Scene
+
+WIDTHS = ("disc.axial_width=14mm,26mm,38mm", "tube.bore=0.9mm", "gas.pressure=0.4MPa")
+
+
+def open_scene(vary: tuple[str, ...] = WIDTHS, **changes: Any) -> Scene:
+    """The bundled spindle that looks for its balancer, with other things to choose from."""
+    scene = rb.load_scene(rb.bundled_scene("spindle_design"))
+    large = {"conductance": "1.5 l/(s*bar)", "critical_ratio": 0.36, "valve_lag": "20 ms"}
+    space = {"outer_radius": None, "axial_width": None, "pressure": None, "valves": None, "vary": list(vary)}
+    changed = scene.with_values(
+        {
+            **{f"design.{key}": value for key, value in space.items()},
+            **{f"gas.{key}": value for key, value in large.items()},
+            **{key.replace("__", "."): value for key, value in changes.items()},
+        }
+    )
+    assert isinstance(changed, Scene)
+    return changed
+
+
+@pytest.fixture(scope="module")
+def found() -> rb.Design:
+    return rb.find_design(open_scene(requirement__fraction=0.7))
+
+
+def test_the_smallest_of_a_whole_space_that_meets_what_is_required(found: rb.Design) -> None:
+    """Against every width, each with settings that are searched for and judged as `tune` does."""
+    verdicts = {}
+    for width in (14e-3, 26e-3, 38e-3):
+        balancer = balancer_of(found.given.with_values({**found.point, "disc.axial_width": width}))
+        verdicts[width] = judged(balancer, searched(balancer)).verdict
+    smallest = min(width for width, verdict in verdicts.items() if verdict == MET)
+    assert found.succeeded
+    assert found.point["disc.axial_width"] == smallest > 14e-3
+
+
+def test_the_scene_as_designed_is_judged_alike(found: rb.Design) -> None:
+    scene = found.recommended_scene
+    again = judged(balancer_of(scene), {})
+    assert found.judgement is not None
+    assert again.fraction == found.judgement.fraction
+
+
+def test_executors_make_no_difference(found: rb.Design) -> None:
+    with ThreadPoolExecutor(2) as pool:
+        other = rb.find_design(open_scene(requirement__fraction=0.7), executor=pool)
+    assert other.to_dict() == found.to_dict()
+
+
+def test_an_unbalance_that_no_design_cancels_is_named() -> None:
+    none = rb.find_design(open_scene(rotor__initial_vibration={"amplitude": "80 um", "phase": "0 deg"}))
+    document = none.to_dict()
+    assert not none.succeeded
+    assert document["findings"][0]["code"] == "design_none_able"
+    assert document["largest_reach_kg_m"] < document["needed_unbalance_kg_m"]
+    with pytest.raises(rb.SceneError, match="no design can work"):
+        _ = none.recommended_scene
+
+
+def test_the_demand_that_stands_against_every_design_is_named() -> None:
+    late = rb.find_design(open_scene(requirement__settling_time="0.2 s"))
+    (demand,) = (each for each in late.rows().findings if each.code.startswith("design_demand"))
+    assert not late.succeeded
+    assert demand.values["what"] == "settling time"
+    assert demand.values["share"] == pytest.approx(0.0)
+
+
+def test_the_tube_follows_the_disc() -> None:
+    """Port at the wall, crest at the same fill, length in the same proportion to the shortest path."""
+    scene = open_scene(("disc.outer_radius=50mm:60mm",))
+    point = Space.of(scene).followed({"disc.outer_radius": 0.05})
+    fill = (scene.tube.hump_radius or 0.0) ** 2 - scene.disc.inner_radius**2
+    share = fill / (scene.disc.outer_radius**2 - scene.disc.inner_radius**2)
+    assert point["tube.port_radius"] == pytest.approx(0.05, abs=1e-5)
+    assert (point["tube.hump_radius"] ** 2 - 0.03**2) / (0.05**2 - 0.03**2) == pytest.approx(share, abs=2e-3)
+    scene.with_values(point)
+
+
+@pytest.mark.parametrize("asked", [0.5, 0.9, 0.99])
+def test_the_threshold_is_the_least_fraction_that_is_surely_enough(asked: float) -> None:
+    count = round(threshold(asked) * _MOST)
+    assert Proportion(count=count, of=_MOST).verdict(asked) == MET
+    assert Proportion(count=count - 1, of=_MOST).verdict(asked) == OPEN
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ('pressure = "0.8 MPa"\nvary = ["tube.bor=1mm:2mm"]', "did you mean"),
+        ('outer_radius = "20 mm"', "no chamber has room there"),
+        ('valve_file = "none.csv"', "cannot be read"),
+        ("", "leaves nothing to choose"),
+    ],
+)
+def test_what_cannot_be_chosen_from_is_named(tmp_path: Path, change: str, message: str) -> None:
+    text = rb.bundled_scene("spindle_design").read_text(encoding="utf-8")
+    head, _, tail = text.partition("[design]")
+    file = tmp_path / "scene.toml"
+    file.write_text(f"{head}[design]\n{change}\n[uncertainty]{tail.partition('[uncertainty]')[2]}", "utf-8")
+    with pytest.raises(rb.SceneError, match=message) as caught:
+        rb.find_design(rb.load_scene(file))
+    assert str(file) in str(caught.value)
+
+
+def test_only_a_disc_with_liquid_is_designed() -> None:
+    with pytest.raises(rb.SceneError, match="only a disc with liquid"):
+        rb.find_design(rb.load_scene(rb.bundled_scene("eccentric_mass_paper")))

@@ -33,7 +33,9 @@ VALVE: Final = "valve"
 """Stands for the keys of a thing with a name."""
 _TOGETHER, _MOST = 2, 8
 """Designs that are judged at a time, and at the most."""
-_NEAR: Final = 4
+_FEW: Final = 512
+"""Devices at the most that choose between them; the verdict takes as many as `tune` does."""
+_NEAR: Final = 2
 """Smaller ones that nearly pass, for which settings are searched as `tune` does."""
 _MOVED: Final = 0.05
 """By which a key is moved to either side, relative."""
@@ -122,7 +124,7 @@ def run_design(
         effects: tuple[Effect, ...] = ()
         if best is not None and judgement is not None:
             told("the verdict, and what changes of it would do")
-            whole = partial(judged_design, scene, best.point, settings=judgement.settings, search=False)
+            whole = partial(judged_design, scene, best.point, settings=judgement.settings)
             effects, judgement = _effects(space, best, judgement.settings, crew, whole)
     ranking, reach = Ranking(), None
     if best is not None and judgement is not None:
@@ -174,6 +176,7 @@ def _best(
                 each.point,
                 settings=each.race.settings,
                 search=search and not space.sets_controller,
+                most=_FEW,
             )
             for each, search in together
         ]

@@ -40,8 +40,8 @@ _WHOLE: Final = 256
 _TOGETHER: Final = 256
 _SMALLEST, _SPREAD = 18, 18
 """Of the points that can work: the smallest, and as many over all sizes, that race at first."""
-_ROUNDS: Final = 13
-_CHILDREN: Final = 16
+_ROUNDS: Final = 9
+_CHILDREN: Final = 17
 """Points that race in a round."""
 _TRIED: Final = 8
 """Times as many are drawn for them; what cannot work does not race."""
@@ -56,6 +56,10 @@ _SHRINK: Final = 0.85
 """Times the smallest size: that of the first points about the best ones."""
 _SLOWER, _FASTER = 0.6, 1.3
 """Factors of the steps and of the shrinking after a round without a better design, and with one."""
+_HARD: Final = 12
+"""Devices that run first in a round."""
+_LIKE: Final = 16
+"""Designs that say which these are."""
 _BESIDE: Final = 1
 """Settings that race beside those of the parent."""
 _SWITCH: Final = 0.2
@@ -106,6 +110,8 @@ class Hunt:
 
     static: Static
     candidates: tuple[Candidate, ...]
+    whole: bool
+    """Whether every design that can work did."""
     threshold: float
     """Fraction of few devices from which on a design counts as one that meets what is required."""
 
@@ -115,7 +121,12 @@ class Hunt:
         return _passing(self.candidates, self.threshold)
 
     def near_misses(self, count: int) -> list[Candidate]:
-        """Smaller than all that pass, those that serve most devices; smallest first."""
+        """Smaller than all that pass, those that serve most devices; smallest first.
+
+        None where rounds have looked about the smallest that passes.
+        """
+        if self.passing and not self.whole:
+            return []
         limit = min((each.size for each in self.passing), default=math.inf)
         near = _nearest(each for each in self.candidates if each.size < limit)[:count]
         return sorted(near, key=lambda each: each.size)
@@ -136,8 +147,8 @@ def _nearest(candidates: Iterable[Candidate]) -> list[Candidate]:
 def _served(candidate: Candidate) -> float:
     """Fraction of the devices that meet every demand; one of them is taken for failed: 4 of 4 are worth less
     than 60 of 64."""
-    meets = candidate.race.meets
-    return (float(np.count_nonzero(meets)) - 1.0) / max(meets.size, 1)
+    race = candidate.race
+    return race.fraction - 1.0 / max(race.meets.size + race.unseen, 1)
 
 
 def threshold(asked: float) -> float:
@@ -187,6 +198,7 @@ class _State:
         keys = [repr(sorted(point.items())) for point in points]
         fresh = [i for i, key in enumerate(keys) if key not in self.raced and key not in keys[:i]]
         self.raced |= set(keys)
+        hard = self.hard()
         calls = [
             partial(
                 race,
@@ -195,6 +207,7 @@ class _State:
                 places=places[i],
                 asked=self.asked,
                 settings=not self.space.sets_controller,
+                hard=hard if places[i] else (),
             )
             for i in fresh
         ]
@@ -202,6 +215,18 @@ class _State:
             if found is not None:
                 size = self.space.size(points[i])
                 self.candidates.append(Candidate(shares=shares[i], point=points[i], size=size, race=found))
+
+    def hard(self) -> tuple[int, ...]:
+        """Numbers of the devices that fail most often in the best designs, or else settle last."""
+        whole = [each.race for each in _nearest(self.candidates) if each.race.meets.size >= DEVICES][:_LIKE]
+        if not whole:
+            return ()
+        fails, times = np.zeros(DEVICES), np.zeros(DEVICES)
+        for each in whole:
+            first = np.argsort(each.numbers)[:DEVICES]
+            fails += ~each.meets[first]
+            times += np.argsort(np.argsort(each.times[first]))
+        return tuple(sorted(np.lexsort((-times, -fails))[:_HARD].tolist()))
 
     def places(self, parent: Candidate) -> list[Place] | None:
         """The settings of a parent, and others beside them."""
@@ -267,7 +292,7 @@ def hunt(space: Space, *, asked: float, needed: float, executor: Executor | None
         step, shrink = min(factor * step, _STEP), 1 - min(factor * (1 - shrink), 1 - _SHRINK)
         if 1 - shrink < AS_SMALL:
             break
-    return Hunt(static=static, candidates=tuple(state.candidates), threshold=threshold(asked))
+    return Hunt(static=static, whole=whole, candidates=tuple(state.candidates), threshold=threshold(asked))
 
 
 def _best_text(state: _State) -> str:

@@ -1,7 +1,8 @@
 """One design in closed loop: few drawn devices race its controllers' settings.
 
 Settings stand in units of a design's own loop and dead time, so that what served one design is a good start
-for another.  A design that serves few of the first devices is left; only good ones run on all.
+for another.  A design that serves few of the first devices is left; only good ones run on all.  The first are
+those that fail most often in other designs, once these are known.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ _BEHIND: Final = 2
 """Devices by which settings may be behind the best after a heat."""
 _LEFT: Final = 0.2
 """By so much below the fraction asked for after a heat, a design is left: three of four devices must do."""
+_MISS: Final = 0.03
+"""The same after the hard devices, if all others did."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,8 +55,12 @@ class Race:
     """None: under the scene's own settings."""
     settings: Settings
     """By path, SI."""
+    numbers: tuple[int, ...] = ()
+    """Of the devices that ran."""
+    unseen: int = 0
+    """Devices that have not run and are taken to meet what is asked: those of which few fail elsewhere."""
     meets: BoolArray
-    """Of each device that ran, by number."""
+    """Of each device that ran."""
     times: FloatArray
     """s; infinite where not settled."""
     energy: FloatArray
@@ -62,7 +69,7 @@ class Race:
     @property
     def fraction(self) -> float:
         """Of the devices that meet every demand."""
-        return float(np.mean(self.meets)) if self.meets.size else 0.0
+        return (np.count_nonzero(self.meets) + self.unseen) / max(self.meets.size + self.unseen, 1)
 
     @cached_property
     def gas(self) -> float:
@@ -84,6 +91,7 @@ class Race:
         """With the outcomes of further devices."""
         return replace(
             self,
+            numbers=self.numbers + other.numbers,
             meets=np.concatenate([self.meets, other.meets]),
             times=np.concatenate([self.times, other.times]),
             energy=np.concatenate([self.energy, other.energy]),
@@ -91,17 +99,26 @@ class Race:
 
 
 def race(
-    scene: SceneFile, point: Point, *, places: Sequence[Place] | None, asked: float, settings: bool
+    scene: SceneFile,
+    point: Point,
+    *,
+    places: Sequence[Place] | None,
+    asked: float,
+    settings: bool,
+    hard: tuple[int, ...] = (),
 ) -> Race | None:
     """The best settings of a design; None: its scene is refused, or it breaks down.
 
     Args: `places`: settings that race, such as those that raced best on another design; None: all that are
         tried at first. `asked`: fraction of devices. `settings`: whether any are raced but the scene's own.
+        `hard`: numbers of the devices that run first; none: in their order.
     """
     try:
         balancer = balancer_of(point_scene(scene, point))
         field = _field(balancer.trials(), places) if settings else [(None, {})]
-        return _raced(balancer, field, asked) if field else None
+        if not field:
+            return None
+        return _raced(balancer, field, asked) if not hard else _hard_first(balancer, field, asked, hard)
     except (SceneError, *FAULTS):
         return None
 
@@ -110,7 +127,7 @@ def raced_longer(scene: SceneFile, point: Point, *, before: Race) -> Race:
     """The same on `SURE` devices; as it was where it breaks down."""
     try:
         balancer = balancer_of(point_scene(scene, point))
-        return _heat(balancer, [before], before.meets.size, SURE, further=FURTHER)[0]
+        return _heat(balancer, [before], range(before.meets.size, SURE), further=FURTHER)[0]
     except (SceneError, *FAULTS):
         return before
 
@@ -149,7 +166,7 @@ def _raced(balancer: Balancer, field: Sequence[tuple[Place | None, Settings]], a
     running = [Race(place=place, settings=settings, **_NOBODY) for place, settings in field]
     first = 0
     for heat, last in enumerate(HEATS):
-        running = sorted(_heat(balancer, running, first, last), key=lambda each: each.order)
+        running = sorted(_heat(balancer, running, range(first, last)), key=lambda each: each.order)
         if running[0].fraction < asked - _LEFT:
             break
         best = np.count_nonzero(running[0].meets)
@@ -158,15 +175,31 @@ def _raced(balancer: Balancer, field: Sequence[tuple[Place | None, Settings]], a
     return running[0]
 
 
+def _hard_first(
+    balancer: Balancer,
+    field: Sequence[tuple[Place | None, Settings]],
+    asked: float,
+    hard: tuple[int, ...],
+) -> Race:
+    """The settings that serve most of the hard devices, and then the others where enough of these do."""
+    rest = sorted(set(range(DEVICES)) - set(hard))
+    races = [Race(place=place, settings=settings, unseen=len(rest), **_NOBODY) for place, settings in field]
+    best = min(_heat(balancer, races, hard), key=lambda each: each.order)
+    if best.fraction < asked - _MISS:
+        return best
+    return _heat(balancer, [replace(best, unseen=0)], rest)[0]
+
+
 def _heat(
-    balancer: Balancer, races: Sequence[Race], first: int, last: int, *, further: float = _WATCHED
+    balancer: Balancer, races: Sequence[Race], numbers: Sequence[int], *, further: float = _WATCHED
 ) -> list[Race]:
-    draws, demands = Draws.block(first, last - first, whole=False), balancer.demands()
+    draws, demands = Draws(numbers=tuple(numbers), whole=False), balancer.demands()
     ran = balancer.run_all([each.settings for each in races], draws, further=further)
     return [
         each.joined(
             replace(
                 each,
+                numbers=draws.numbers,
                 meets=np.asarray(np.all([demand.met(outcomes) for demand in demands], axis=0)),
                 times=outcomes.settling_time,
                 energy=outcomes.energy,
@@ -183,16 +216,20 @@ _NOBODY: Final[dict[str, Any]] = {
 }
 
 
-def judged_design(scene: SceneFile, point: Point, *, settings: Settings, search: bool) -> Judgement | None:
+def judged_design(
+    scene: SceneFile, point: Point, *, settings: Settings, search: bool = False, most: int | None = None
+) -> Judgement | None:
     """The settings that serve most devices of a design; None: it breaks down.
 
     Judged on devices on which nothing was chosen.
     Args: `settings`: those that raced best. `search`: whether others are looked for as `tune` does.
+        `most`: devices; default as many as `tune` takes.
     """
     try:
         balancer = balancer_of(point_scene(scene, point))
         tried = [settings, searched(balancer)] if search else [settings]
-        judged = judged_all(balancer, [each for i, each in enumerate(tried) if each not in tried[:i]])
+        fresh = [each for i, each in enumerate(tried) if each not in tried[:i]]
+        judged = judged_all(balancer, fresh, most=most)
     except (SceneError, *FAULTS):
         return None
     return max(judged, key=lambda each: each.fraction.value)

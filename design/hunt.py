@@ -342,15 +342,15 @@ def _static(points: Sequence[Point], rows: Sequence[Record], able: int) -> Stati
 
 
 def _round(state: _State, step: float, shrink: float) -> None:
-    """Points about the best ones; smaller by a factor than the smallest that passes."""
+    """Points about the best ones; on average smaller by a factor than the smallest that passes."""
     space, parents = state.space, state.parents()
-    target = shrink * state.best[0] if space.sized and state.passing else None
+    most = state.best[0] if space.sized else math.inf
     drawn = state.random.integers(0, len(parents), _CHILDREN * _TRIED).tolist()
     shares = [_stepped(state, parents[at].shares, step) for at in drawn]
-    if target is not None:
-        shares = [_sized(space, each, target) for each in shares]
+    if math.isfinite(most):
+        sizes = most * (1 - 2 * (1 - shrink) * state.random.random(len(shares)))
+        shares = [_sized(space, each, size) for each, size in zip(shares, sizes.tolist(), strict=True)]
     points = space.points(np.array(shares))
-    most = math.inf if target is None else state.best[0]
     able = [i for i, row in enumerate(state.static(points)) if state.able(row)]
     chosen = [i for i in able if space.size(points[i]) < most][:_CHILDREN]
     if chosen:

@@ -84,6 +84,8 @@ def _collect(work: Work) -> Record:
         "limit_m": balancer.limit,
         "valve_given": scene.gas.conductance is not None,
         **tuning_record(balancer, tuning),
+        "noise_open": not scene.sensor.amplitude_noise
+        and scene.origin_of("sensor.amplitude_noise") == "default",
         "choices": choice_records(balancer.on_scene(tuning.recommended_scene)),
         "settings": list(settings_rows(chosen, SETTINGS)),
         "gas_pressure_Pa": scene.gas.pressure,

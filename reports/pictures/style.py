@@ -162,8 +162,10 @@ def _draw_label(pen: ImageDraw.ImageDraw, label: Label, ink: str, ground: str, s
         # The leader ends at the text, above or below it.
         anchor = "md" if dy < 0 else "ma"
     face = _font(label.size * scale, bold=label.size > _FONT_SIZE)
+    # No label is cut by the edge of the picture.
+    half = pen.textlength(label.text, font=face) / 2 + 5 * scale
     pen.text(
-        (x + dx, y + dy),
+        (min(max(x + dx, half), pen.im.size[0] - half), y + dy),
         label.text,
         font=face,
         fill=ink,

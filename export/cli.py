@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from ringbalance.export.compact import CompactLaw, compact_law
+from ringbalance.export.fmu import fmu_bytes
 from ringbalance.export.grid import csv_files
 from ringbalance.export.hosts import c_files, identifier, python_files, st_files
 from ringbalance.reduced_model.calibration import calibrate
@@ -15,7 +16,7 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 
-Host = Literal["c", "st", "csv", "python"]
+Host = Literal["c", "fmi2", "st", "csv", "python"]
 POINTS: Final = 41
 MOST_POINTS: Final = 1001
 _BEYOND: Final = 1.5
@@ -31,8 +32,8 @@ def export(
 
     Args:
         scene: the scene file.
-        to: c (C99), st (IEC 61131-3 structured text), python (a module that imports nothing of others), or
-            csv (a grid).
+        to: c (C99), fmi2 (a unit for co-simulation, FMI 2.0), st (IEC 61131-3 structured text), python (a
+            module that imports nothing of others), or csv (a grid).
         out: folder for the files.
         name: of files and functions; default that of the scene.
         points: of each axis of the grid of csv, 2 to 1001; default 41.
@@ -52,8 +53,8 @@ def export(
             law = compact_law(scene=told, law=calibrate(told).flow_law)
         highest = _BEYOND * told.gas.pressure if told.gas.pressure > 0 else _WITHOUT_PRESSURE
         files = _files(law, called, to, points or POINTS, highest)
-        for file, text in files.items():
-            (folder / file).write_text(text, encoding="utf-8", newline="\n")
+        for file, content in files.items():
+            (folder / file).write_bytes(content)
     for file in files:
         results_console().print(str(out / file), highlight=False)
     size = f"{8 * len(law.constants)} bytes of constants"
@@ -62,10 +63,17 @@ def export(
     return 0
 
 
-def _files(law: CompactLaw, name: str, to: Host, points: int, highest: float) -> dict[str, str]:
+def _files(law: CompactLaw, name: str, to: Host, points: int, highest: float) -> dict[str, bytes]:
+    if to == "fmi2":
+        unit, runs = fmu_bytes(law, name)
+        if not runs:
+            messages_console().print("no C compiler here: the unit holds its source alone", highlight=False)
+        return {f"{name}.fmu": unit}
     if to == "csv":
-        return csv_files(law, name, points=points, highest=highest)
-    return {"c": c_files, "st": st_files, "python": python_files}[to](law, name)
+        texts = csv_files(law, name, points=points, highest=highest)
+    else:
+        texts = {"c": c_files, "st": st_files, "python": python_files}[to](law, name)
+    return {file: text.encode() for file, text in texts.items()}
 
 
 def _check_points(to: Host, points: int | None) -> None:

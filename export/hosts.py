@@ -26,8 +26,8 @@ def c_files(law: CompactLaw, name: str) -> dict[str, str]:
     """Text of the source and of the header by file name; `name`: of file and functions."""
     functions = c_functions(Source.of(point))
     return {
-        f"{name}.h": _filled("h", law, name),
-        f"{name}.c": _filled("c", law, name, functions=functions),
+        f"{name}.h": filled("h", law, name),
+        f"{name}.c": filled("c", law, name, functions=functions),
     }
 
 
@@ -35,13 +35,13 @@ def st_files(law: CompactLaw, name: str) -> dict[str, str]:
     """Structured text: functions, and a function block `FB_name`."""
     sizes = {"Law": len(law.constants), "Query": point.PLACES_OF_QUERY}
     functions = st_functions(Source.of(point), prefix=name, sizes=sizes)
-    return {f"{name}.st": _filled("st", law, name, functions=functions)}
+    return {f"{name}.st": filled("st", law, name, functions=functions)}
 
 
 def python_files(law: CompactLaw, name: str) -> dict[str, str]:
     """A module that needs nothing but Python."""
     source = inspect.getsource(point).split('"""\n', 1)[1]
-    return {f"{name}.py": _filled("python", law, name, source=source.strip())}
+    return {f"{name}.py": filled("python", law, name, source=source.strip())}
 
 
 def facts(law: CompactLaw) -> str:
@@ -53,7 +53,8 @@ def facts(law: CompactLaw) -> str:
     )
 
 
-def _filled(template: str, law: CompactLaw, name: str, **parts: str) -> str:
+def filled(template: str, law: CompactLaw, name: str, **parts: str) -> str:
+    """A template with a law in it. Args: `parts`: further words of that template."""
     text = files("ringbalance.export").joinpath(f"templates/{template}.txt").read_text(encoding="utf-8")
     return Template(text).substitute(
         title=f"Flow law of a liquid-ring balancer, calibrated by ringbalance from {_named(law)}.",

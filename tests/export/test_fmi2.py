@@ -1,0 +1,101 @@
+"""The unit for co-simulation: its parts agree, and hosts that share no code with it run it."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+from io import BytesIO
+from pathlib import Path
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+from law_queries import answers, queries
+
+from ringbalance.export.compact import CompactLaw
+from ringbalance.export.fmu import fmu_bytes, guid_of
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.scene.arrays import FloatArray
+
+Both = tuple[CalibratedLaw, CompactLaw]
+HOST = Path(__file__).with_name("fmi2_host.c")
+MOST = 60_000
+SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
+needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+
+
+@pytest.fixture(scope="module")
+def unit(six: Both) -> ZipFile:
+    content, _ = fmu_bytes(six[1], "disc")
+    assert len(content) <= MOST
+    return ZipFile(BytesIO(content))
+
+
+def test_two_exports_of_a_law_are_equal(six: Both) -> None:
+    assert fmu_bytes(six[1], "disc") == fmu_bytes(six[1], "disc")
+
+
+def test_every_variable_has_what_a_host_shows(unit: ZipFile, six: Both) -> None:
+    model = ET.fromstring(unit.read("modelDescription.xml"))
+    units = {each.get("name") for each in model.iter("Unit")}
+    places = {}
+    for number, each in enumerate(model.iter("ScalarVariable"), 1):
+        (kind,) = each
+        places[number] = each.get("causality")
+        assert each.get("description")
+        assert (each.get("causality") == "input") == (kind.get("start") is not None)
+        if kind.tag == "Real":
+            assert kind.get("unit") in units
+            assert float(kind.get("min", "")) < float(kind.get("nominal", "")) <= float(kind.get("max", ""))
+    outputs = [int(each.get("index", "0")) for each in model.iter("Unknown")]
+    assert sorted(set(outputs)) == [number for number, kind in places.items() if kind == "output"]
+    assert model.get("guid") == guid_of(six[1])
+    assert [f"sources/{each.get('name')}" in unit.namelist() for each in model.iter("File")] == [True, True]
+
+
+@needs_compiler
+def test_an_importer_in_c_has_the_bits_of_python(tmp_path: Path, unit: ZipFile, six: Both) -> None:
+    """Under sanitizers; with wrong references, NaN, reset, two instances and states freed in any order."""
+    law, compact = six
+    unit.extractall(tmp_path)
+    sources = [str(path) for path in sorted((tmp_path / "sources").glob("*.c"))]
+    command = ["gcc", *WARNINGS, *SANITIZERS, *sources, str(HOST), "-o", "host", "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    asked = queries(law, 4000, outside=True)
+    asked = asked[:, np.isfinite(asked).all(axis=0)]
+    found = ran(tmp_path / "host", compact, asked)
+    right = np.array(list(answers(compact.constants, asked)))
+    assert found[:, :2].tobytes() == np.ascontiguousarray(right[:, :2]).tobytes()
+    assert np.array_equal(found[:, 2:], right[:, 2:])
+
+
+def ran(host: Path, law: CompactLaw, asked: FloatArray) -> FloatArray:
+    lines = "".join(f"{x!r},{y!r},{p!r},{int(on)}\n" for x, y, p, on in asked.T.tolist())
+    done = subprocess.run([host, guid_of(law)], input=lines, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-500:] + done.stderr[-2000:]
+    return np.array([[float(cell) for cell in line.split(",")] for line in done.stdout.splitlines()])
+
+
+@needs_compiler
+def test_the_reference_results_are_what_the_unit_answers(tmp_path: Path, unit: ZipFile, six: Both) -> None:
+    unit.extractall(tmp_path)
+    sources = [str(path) for path in sorted((tmp_path / "sources").glob("*.c"))]
+    subprocess.run(["gcc", "-std=c99", *sources, str(HOST), "-o", "host", "-lm"], cwd=tmp_path, check=True)
+    table = np.loadtxt(unit.open("documentation/reference.csv"), delimiter=",", skiprows=1)
+    assert np.array_equal(ran(tmp_path / "host", six[1], table[:, :4].T), table[:, 4:])
+    assert len(set(table[:, 6])) >= 3
+
+
+@needs_compiler
+def test_fmpy_finds_no_fault_and_simulates_it(tmp_path: Path, six: Both) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    validation = pytest.importorskip("fmpy.validation")
+    file = tmp_path / "disc.fmu"
+    file.write_bytes(fmu_bytes(six[1], "disc")[0])
+    assert validation.validate_fmu(str(file)) == []
+    start = {"fill_ratio": 0.3, "opposite_fill_ratio": 0.2, "gas_pressure": 4e5, "primed": True}
+    rows = fmpy.simulate_fmu(str(file), start_values=start, stop_time=0.1)
+    right = six[1].answer(fill_ratio=0.3, opposite_fill_ratio=0.2, gas_pressure=4e5, primed=True)
+    assert rows["velocity"][-1] == right.velocity

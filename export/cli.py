@@ -16,7 +16,7 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 
-Host = Literal["c", "fmi2", "st", "csv", "python"]
+Host = Literal["c", "fmi2", "fmi3", "st", "csv", "python"]
 POINTS: Final = 41
 MOST_POINTS: Final = 1001
 _BEYOND: Final = 1.5
@@ -32,8 +32,8 @@ def export(
 
     Args:
         scene: the scene file.
-        to: c (C99), fmi2 (a unit for co-simulation, FMI 2.0), st (IEC 61131-3 structured text), python (a
-            module that imports nothing of others), or csv (a grid).
+        to: c (C99), fmi2 or fmi3 (a unit for co-simulation, FMI 2.0 or 3.0), st (IEC 61131-3 structured
+            text), python (a module that imports nothing of others), or csv (a grid).
         out: folder for the files.
         name: of files and functions; default that of the scene.
         points: of each axis of the grid of csv, 2 to 1001; default 41.
@@ -64,8 +64,8 @@ def export(
 
 
 def _files(law: CompactLaw, name: str, to: Host, points: int, highest: float) -> dict[str, bytes]:
-    if to == "fmi2":
-        unit, runs = fmu_bytes(law, name)
+    if to in ("fmi2", "fmi3"):
+        unit, runs = fmu_bytes(law, name, to)
         if not runs:
             messages_console().print("no C compiler here: the unit holds its source alone", highlight=False)
         return {f"{name}.fmu": unit}

@@ -1,4 +1,4 @@
-"""The compact law as a functional mock-up unit (FMI 2.0, co-simulation): one file with the source inside.
+"""The compact law as a functional mock-up unit (FMI 2.0 or 3.0, co-simulation), with the source inside.
 
 A host that has a compiler builds it from `sources/`; where this machine has one, the unit also runs as it is
 on machines like this one.  Two exports of one law are equal to the byte but for what the compiler makes.
@@ -7,13 +7,17 @@ on machines like this one.  Two exports of one law are equal to the byte but for
 from __future__ import annotations
 
 import hashlib
+import platform
 import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
+from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, Literal
+from xml.etree import ElementTree as ET
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from ringbalance.export.compact import CompactLaw
@@ -21,37 +25,129 @@ from ringbalance.export.hosts import c_files, filled
 from ringbalance.export.translate import number_text
 from ringbalance.results.result import csv_text
 
+Version = Literal["fmi2", "fmi3"]
 _OPTIONS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
-_PLATFORMS: Final = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib")}
+_SUFFIXES: Final = {"linux": ".so", "darwin": ".dylib"}
+_MACHINES: Final = {"AMD64": "x86_64", "arm64": "aarch64"}
 _DATE: Final = (1980, 1, 1, 0, 0, 0)
 """Of every file inside, so that two exports are equal."""
-_OUTPUTS: Final = range(5, 12)
-"""Places of the outputs among the variables of the model description, from 1 on."""
 _PRESSURES: Final = (0.0, 1e5, 2e5, 4e5, 8e5)
 """Pa, of the reference results."""
+_KINDS: Final = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+"""Names of types in FMI 3.0 by those in FMI 2.0."""
+_ABLE: Final = ("canHandleVariableCommunicationStepSize", "canGetAndSetFMU{}tate", "canSerializeFMU{}tate")
 
 
-def fmu_bytes(law: CompactLaw, name: str) -> tuple[bytes, bool]:
+def fmu_bytes(law: CompactLaw, name: str, version: Version) -> tuple[bytes, bool]:
     """The unit, and whether it has a library for machines like this one.
 
     It holds the model description, the sources, reference results, and the library where a compiler is.
     """
-    guid = guid_of(law)
     words = {
         "flow": f"{name}_flow",
         "answer": f"{name}_answer",
-        "guid": guid,
+        "guid": guid_of(law),
         "start_fill": number_text(law.max_fill_ratio / 2),
-        "outputs": "\n".join(f'      <Unknown index="{place}"/>' for place in _OUTPUTS),
     }
-    sources = {**c_files(law, name), "fmi2.c": filled("fmi2", law, name, **words)}
+    core = filled("unit", law, name, **words)
+    sources = {**c_files(law, name), f"{version}.c": filled(version, law, name, core=core, **words)}
+    described = _model_2(law, name) if version == "fmi2" else _model_3(law, name)
     parts = {
-        "modelDescription.xml": filled("fmi2_model", law, name, **words).encode(),
+        "modelDescription.xml": described,
         **{f"sources/{file}": text.encode() for file, text in sources.items()},
         "documentation/reference.csv": _reference(law).encode(),
     }
-    library = _library(sources, name)
+    if version == "fmi3":
+        parts["sources/buildDescription.xml"] = _build(name)
+    library = _library(sources, name, version)
     return _zipped({**parts, **library}), bool(library)
+
+
+def _declared(law: CompactLaw) -> dict[str, Any]:
+    """Variables and units, with the law's largest fill ratio."""
+    most = law.max_fill_ratio
+    text = files("ringbalance.export").joinpath("templates/unit.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text.replace("MOST", number_text(most)).replace("HALF", number_text(most / 2)))
+
+
+def _model_2(law: CompactLaw, name: str) -> bytes:
+    declared = _declared(law)
+    root = _root("2.0", law, name, guid=guid_of(law), variableNamingConvention="flat")
+    able = {each.format("s"): "true" for each in (*_ABLE, "canNotUseMemoryManagementFunctions")}
+    unit = ET.SubElement(root, "CoSimulation", {"modelIdentifier": name, **able})
+    listed = ET.SubElement(unit, "SourceFiles")
+    for file in (f"{name}.c", "fmi2.c"):
+        ET.SubElement(listed, "File", name=file)
+    _add_units(root, declared)
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.01")
+    variables = ET.SubElement(root, "ModelVariables")
+    structure = ET.SubElement(root, "ModelStructure")
+    groups = [ET.SubElement(structure, group) for group in ("Outputs", "InitialUnknowns")]
+    for place, each in enumerate(declared["variable"]):
+        variable = ET.SubElement(variables, "ScalarVariable", _heads(each, place))
+        ET.SubElement(variable, each["kind"], each["range"])
+        for group in groups if each["causality"] == "output" else ():
+            ET.SubElement(group, "Unknown", index=str(place + 1))
+    return _xml(root)
+
+
+def _model_3(law: CompactLaw, name: str) -> bytes:
+    declared = _declared(law)
+    root = _root("3.0", law, name, instantiationToken=guid_of(law))
+    able = {each.format("S"): "true" for each in _ABLE}
+    ET.SubElement(root, "CoSimulation", {"modelIdentifier": name, **able})
+    _add_units(root, declared)
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.01")
+    variables = ET.SubElement(root, "ModelVariables")
+    structure = ET.SubElement(root, "ModelStructure")
+    for place, each in enumerate(declared["variable"]):
+        ET.SubElement(variables, _KINDS[each["kind"]], {**_heads(each, place), **each["range"]})
+    heads = {"name": "time", "valueReference": str(len(declared["variable"])), "description": "of the host"}
+    ET.SubElement(variables, "Float64", {**heads, "causality": "independent", "variability": "continuous"})
+    for group in ("Output", "InitialUnknown"):
+        for place, each in enumerate(declared["variable"]):
+            if each["causality"] == "output":
+                ET.SubElement(structure, group, valueReference=str(place))
+    return _xml(root)
+
+
+def _root(version: str, law: CompactLaw, name: str, **further: str) -> ET.Element:
+    heads = {"fmiVersion": version, "modelName": name, **further}
+    words = {"license": "BSD-3-Clause", "generationTool": "ringbalance"}
+    title = f"Flow law of a liquid-ring balancer, calibrated from {law.scene.rpartition('/')[2]}"
+    return ET.Element("fmiModelDescription", {**heads, "description": title, **words})
+
+
+def _heads(variable: dict[str, Any], place: int) -> dict[str, str]:
+    return {
+        "name": variable["name"],
+        "valueReference": str(place),
+        "causality": variable["causality"],
+        "variability": "continuous" if variable["kind"] == "Real" else "discrete",
+        "description": variable["description"],
+    }
+
+
+def _add_units(root: ET.Element, declared: dict[str, Any]) -> None:
+    units = ET.SubElement(root, "UnitDefinitions")
+    for name, base in declared["units"].items():
+        ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", base)
+
+
+def _build(name: str) -> bytes:
+    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+    sources = ET.SubElement(
+        ET.SubElement(root, "BuildConfiguration", modelIdentifier=name), "SourceFileSet", language="C99"
+    )
+    for file in (f"{name}.c", "fmi3.c"):
+        ET.SubElement(sources, "SourceFile", name=file)
+    return _xml(root)
+
+
+def _xml(root: ET.Element) -> bytes:
+    ET.indent(root)
+    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text
 
 
 def guid_of(law: CompactLaw) -> str:
@@ -89,20 +185,31 @@ def _reference(law: CompactLaw) -> str:
     )
 
 
-def _library(sources: dict[str, str], name: str) -> dict[str, bytes]:
+def _library(sources: dict[str, str], name: str, version: Version) -> dict[str, bytes]:
     """By place in the unit; nothing where no compiler is, or it fails."""
     compiler = next((path for each in ("cc", "gcc", "clang") if (path := shutil.which(each))), None)
-    if compiler is None or sys.platform not in _PLATFORMS or sys.maxsize < 2**32:
+    folder = _folder(version)
+    if compiler is None or folder is None:
         return {}
-    folder, suffix = _PLATFORMS[sys.platform]
+    library = f"{name}{_SUFFIXES[sys.platform]}"
     with tempfile.TemporaryDirectory() as made:
         for file, text in sources.items():
             Path(made, file).write_text(text, encoding="utf-8")
-        files = [file for file in sources if file.endswith(".c")]
-        command = [compiler, *_OPTIONS, *files, "-lm", "-o", f"{name}{suffix}"]
+        compiled = [file for file in sources if file.endswith(".c")]
+        command = [compiler, *_OPTIONS, *compiled, "-lm", "-o", library]
         if subprocess.run(command, cwd=made, capture_output=True, check=False).returncode:
             return {}
-        return {f"binaries/{folder}/{name}{suffix}": Path(made, f"{name}{suffix}").read_bytes()}
+        return {f"binaries/{folder}/{library}": Path(made, library).read_bytes()}
+
+
+def _folder(version: Version) -> str | None:
+    """Of libraries for machines like this one; None: the standard, or this program, names none."""
+    machine = _MACHINES.get(platform.machine(), platform.machine())
+    if sys.platform not in _SUFFIXES:
+        return None
+    if version == "fmi3":
+        return f"{machine}-{sys.platform}"
+    return f"{sys.platform}64" if machine == "x86_64" else None
 
 
 def _zipped(parts: dict[str, bytes]) -> bytes:

@@ -45,7 +45,7 @@ COMMANDS = {
     ),
     "export": (
         "ringbalance.export.cli:export",
-        "The flow law for another program: C, structured text, a Python module, a table.",
+        "The flow law for another program: C, FMI, structured text, a Python module, a table.",
     ),
     "sweep": (
         "ringbalance.design.cli:sweep",

@@ -28,11 +28,11 @@ int fmi2GetStatus(void *, int, int *);
 
 #define CHECK(holds) if (!(holds)) { printf("line %d: %s\n", __LINE__, #holds); return 1; }
 
-static const unsigned inputs[] = {0, 1, 2}, outputs[] = {3, 4}, codes[] = {0, 1}, primed[] = {0}, after[] = {1};
+static const unsigned inputs[] = {0, 1, 2}, outputs[] = {3, 4}, codes[] = {7, 8}, primed[] = {9}, after[] = {10};
 
 static int misuse(const char *guid)
 {
-    const unsigned wrong[] = {7}, output[] = {3}, fill[] = {0};
+    const unsigned wrong[] = {11}, output[] = {3}, fill[] = {0};
     const double bad = NAN, other = 0.123;
     double value = 0.0;
     int code[2], on = 1;
@@ -45,7 +45,8 @@ static int misuse(const char *guid)
     b = fmi2Instantiate("b", 1, guid, NULL, NULL, 0, 0);
     CHECK(a && b && a != b)
     CHECK(fmi2GetReal(a, wrong, 1, &value) == 3 && fmi2SetReal(a, wrong, 1, &other) == 3)
-    CHECK(fmi2SetReal(a, output, 1, &other) == 3 && fmi2SetInteger(a, fill, 1, &on) == 3)
+    CHECK(fmi2SetReal(a, output, 1, &other) == 3 && fmi2SetInteger(a, codes, 1, &on) == 3)
+    CHECK(fmi2GetReal(a, codes, 1, &value) == 3 && fmi2GetBoolean(a, fill, 1, &on) == 3)
     CHECK(fmi2SetBoolean(a, after, 1, &on) == 3 && fmi2GetString(a, fill, 1, NULL) == 3)
     CHECK(fmi2GetReal(NULL, fill, 1, &value) == 3 && fmi2GetReal(a, NULL, 1, &value) == 3)
     CHECK(fmi2GetReal(a, NULL, 0, NULL) == 0 && fmi2DoStep(a, 0.0, -1.0, 0) == 3 && fmi2GetStatus(a, 0, &on) == 2)

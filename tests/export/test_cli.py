@@ -14,7 +14,14 @@ OIL = str(rb.bundled_scene("silicone_oil_100cst"))
 
 @pytest.mark.parametrize(
     ("to", "files"),
-    [("c", ["a.c", "a.h"]), ("st", ["a.st"]), ("python", ["a.py"]), ("csv", ["a.csv"]), ("fmi2", ["a.fmu"])],
+    [
+        ("c", ["a.c", "a.h"]),
+        ("st", ["a.st"]),
+        ("python", ["a.py"]),
+        ("csv", ["a.csv"]),
+        ("fmi2", ["a.fmu"]),
+        ("fmi3", ["a.fmu"]),
+    ],
 )
 def test_it_writes_the_files_it_names(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], to: str, files: list[str]

@@ -14,54 +14,69 @@ import pytest
 from law_queries import answers, queries
 
 from ringbalance.export.compact import CompactLaw
-from ringbalance.export.fmu import fmu_bytes, guid_of
+from ringbalance.export.fmu import Version, fmu_bytes, guid_of
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.scene.arrays import FloatArray
 
 Both = tuple[CalibratedLaw, CompactLaw]
-HOST = Path(__file__).with_name("fmi2_host.c")
+HERE = Path(__file__).parent
 MOST = 60_000
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
 
 
+@pytest.fixture(scope="module", params=["fmi2", "fmi3"])
+def version(request: pytest.FixtureRequest) -> Version:
+    chosen: Version = request.param
+    return chosen
+
+
 @pytest.fixture(scope="module")
-def unit(six: Both) -> ZipFile:
-    content, _ = fmu_bytes(six[1], "disc")
+def unit(six: Both, version: Version) -> ZipFile:
+    content, _ = fmu_bytes(six[1], "disc", version)
     assert len(content) <= MOST
     return ZipFile(BytesIO(content))
 
 
-def test_two_exports_of_a_law_are_equal(six: Both) -> None:
-    assert fmu_bytes(six[1], "disc") == fmu_bytes(six[1], "disc")
+def test_two_exports_of_a_law_are_equal(six: Both, version: Version) -> None:
+    assert fmu_bytes(six[1], "disc", version) == fmu_bytes(six[1], "disc", version)
 
 
-def test_every_variable_has_what_a_host_shows(unit: ZipFile, six: Both) -> None:
+def test_every_variable_has_what_a_host_shows(unit: ZipFile, six: Both, version: Version) -> None:
     model = ET.fromstring(unit.read("modelDescription.xml"))
     units = {each.get("name") for each in model.iter("Unit")}
-    places = {}
-    for number, each in enumerate(model.iter("ScalarVariable"), 1):
-        (kind,) = each
-        places[number] = each.get("causality")
+    variables = list(model.iter("ScalarVariable")) or list(model.find("ModelVariables") or ())
+    causes = {}
+    for each in variables:
+        kind = each[0] if len(each) else each
+        causes[each.get("valueReference", "")] = each.get("causality")
         assert each.get("description")
         assert (each.get("causality") == "input") == (kind.get("start") is not None)
-        if kind.tag == "Real":
+        if kind.tag in ("Real", "Float64") and each.get("causality") != "independent":
             assert kind.get("unit") in units
             assert float(kind.get("min", "")) < float(kind.get("nominal", "")) <= float(kind.get("max", ""))
-    outputs = [int(each.get("index", "0")) for each in model.iter("Unknown")]
-    assert sorted(set(outputs)) == [number for number, kind in places.items() if kind == "output"]
-    assert model.get("guid") == guid_of(six[1])
-    assert [f"sources/{each.get('name')}" in unit.namelist() for each in model.iter("File")] == [True, True]
+    outputs = {place for place, cause in causes.items() if cause == "output"}
+    if version == "fmi2":
+        told = {str(int(each.get("index", "0")) - 1) for each in model.iter("Unknown")}
+    else:
+        told = {each.get("valueReference", "") for each in model.iter("Output")}
+    assert told == outputs
+    assert guid_of(six[1]) in (model.get("guid"), model.get("instantiationToken"))
+    described = model if version == "fmi2" else ET.fromstring(unit.read("sources/buildDescription.xml"))
+    sources = [each.get("name") for tag in ("File", "SourceFile") for each in described.iter(tag)]
+    assert [f"sources/{name}" in unit.namelist() for name in sources] == [True, True]
 
 
 @needs_compiler
-def test_an_importer_in_c_has_the_bits_of_python(tmp_path: Path, unit: ZipFile, six: Both) -> None:
+def test_an_importer_in_c_has_the_bits_of_python(
+    tmp_path: Path, unit: ZipFile, six: Both, version: Version
+) -> None:
     """Under sanitizers; with wrong references, NaN, reset, two instances and states freed in any order."""
     law, compact = six
     unit.extractall(tmp_path)
     sources = [str(path) for path in sorted((tmp_path / "sources").glob("*.c"))]
-    command = ["gcc", *WARNINGS, *SANITIZERS, *sources, str(HOST), "-o", "host", "-lm"]
+    command = ["gcc", *WARNINGS, *SANITIZERS, *sources, str(HERE / f"{version}_host.c"), "-o", "host", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
     asked = queries(law, 4000, outside=True)
     asked = asked[:, np.isfinite(asked).all(axis=0)]
@@ -79,21 +94,27 @@ def ran(host: Path, law: CompactLaw, asked: FloatArray) -> FloatArray:
 
 
 @needs_compiler
-def test_the_reference_results_are_what_the_unit_answers(tmp_path: Path, unit: ZipFile, six: Both) -> None:
+def test_the_reference_results_are_what_the_unit_answers(
+    tmp_path: Path, unit: ZipFile, six: Both, version: Version
+) -> None:
     unit.extractall(tmp_path)
     sources = [str(path) for path in sorted((tmp_path / "sources").glob("*.c"))]
-    subprocess.run(["gcc", "-std=c99", *sources, str(HOST), "-o", "host", "-lm"], cwd=tmp_path, check=True)
+    subprocess.run(
+        ["gcc", "-std=c99", *sources, str(HERE / f"{version}_host.c"), "-o", "host", "-lm"],
+        cwd=tmp_path,
+        check=True,
+    )
     table = np.loadtxt(unit.open("documentation/reference.csv"), delimiter=",", skiprows=1)
     assert np.array_equal(ran(tmp_path / "host", six[1], table[:, :4].T), table[:, 4:])
     assert len(set(table[:, 6])) >= 3
 
 
 @needs_compiler
-def test_fmpy_finds_no_fault_and_simulates_it(tmp_path: Path, six: Both) -> None:
+def test_fmpy_finds_no_fault_and_simulates_it(tmp_path: Path, six: Both, version: Version) -> None:
     fmpy = pytest.importorskip("fmpy")
     validation = pytest.importorskip("fmpy.validation")
     file = tmp_path / "disc.fmu"
-    file.write_bytes(fmu_bytes(six[1], "disc")[0])
+    file.write_bytes(fmu_bytes(six[1], "disc", version)[0])
     assert validation.validate_fmu(str(file)) == []
     start = {"fill_ratio": 0.3, "opposite_fill_ratio": 0.2, "gas_pressure": 4e5, "primed": True}
     rows = fmpy.simulate_fmu(str(file), start_values=start, stop_time=0.1)

@@ -17,6 +17,7 @@ from ringbalance.results.result import Presentation
 from ringbalance.scene.changes import file_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
+from ringbalance.scene.narrowing import read_tolerance
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.processes import checked_workers
@@ -39,6 +40,7 @@ def sweep(
     workers: int | None = None,
     no_figures: bool = False,
     write: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
+    tolerance: str | None = None,
     json: bool = False,
 ) -> int:
     """Answer every point of a grid or a sample of designs; an interrupted sweep goes on where it was.
@@ -56,6 +58,7 @@ def sweep(
         workers: processes; default one for each processor.
         no_figures: draw none.
         write: rows whose scenes to write.
+        tolerance: in place of the scene's, such as "0.5 %" or 0.005: rows that err by more are named.
         json: print one JSON document instead of tables.
 
     Returns:
@@ -69,6 +72,8 @@ def sweep(
     _check_count("--check", check)
     workers = checked_workers(workers or os.cpu_count() or 1)
     told = load_scene(scene)
+    if tolerance is not None:
+        told = told.with_values({"accuracy.tolerance": read_tolerance(tolerance)})
     planned = _plan(told, vary or [], plan, sample)
     check_file(out / TABLE)
     with activity("sweep", "points ...") as shown:

@@ -237,7 +237,10 @@ class Sweep(Result):
             found.append(Finding(code="sweep_best", values={"row": best, "changes": self._change_text(best)}))
         if failed := [text for text in self.failures if text]:
             found.append(Finding(code="sweep_refused", values={"count": len(failed), "text": failed[0]}))
-        found += [Finding(code="sweep_left_out", values=each) for each in self.errors]
+        tolerance = float(getattr(self.scene, "tolerance", math.inf))
+        for each in self.errors:
+            code = "sweep_left_out" if each["error"] <= tolerance else "sweep_too_coarse"
+            found.append(Finding(code=code, values={**each, "tolerance": tolerance}))
         return found
 
     def _change_text(self, row: int) -> str:

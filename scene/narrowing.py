@@ -53,10 +53,10 @@ def with_tolerance(scene: Kind, *, tolerance: str | None = None, models: Models 
                 "one of the two options",
             )
         return replace(scene, tolerance=FINEST)
-    return scene if tolerance is None else replace(scene, tolerance=_read_tolerance(tolerance))
+    return scene if tolerance is None else replace(scene, tolerance=read_tolerance(tolerance))
 
 
-def _read_tolerance(text: str) -> float:
+def read_tolerance(text: str) -> float:
     """Relative tolerance of an option's text. Raises: SceneError: no fraction above 0 and below 1."""
     try:
         value = float(text)

@@ -203,3 +203,10 @@ def test_devices_out_of_reach_are_not_run_and_count_all_the_same(paper_scene: Sc
     assert row["fraction"] == whole.fraction.value
     assert row["ended"] == dict(Counter(whole.outcomes.ended))
     assert row["ended"]["capacity_exceeded"] > 0
+
+
+def test_rows_that_err_by_more_than_the_tolerance_are_named(paper_scene: Scene) -> None:
+    strict = paper_scene.with_values({"accuracy.tolerance": 1e-10})
+    for scene, code in ((paper_scene, "sweep_left_out"), (strict, "sweep_too_coarse")):
+        found = rb.sweep(scene, {"tube.bore": [1e-3]}, intervals=False, check=1).rows().findings
+        assert code in {each.code for each in found if each.values.get("quantity") == "velocity"}

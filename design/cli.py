@@ -70,7 +70,7 @@ def sweep(
     """
     _check_count("--runs", runs)
     _check_count("--check", check)
-    workers = checked_workers(workers or os.cpu_count() or 1)
+    workers = checked_workers((os.cpu_count() or 1) if workers is None else workers)
     told = load_scene(scene)
     if tolerance is not None:
         told = told.with_values({"accuracy.tolerance": read_tolerance(tolerance)})
@@ -118,7 +118,7 @@ def design(scene: Path, *, save: Path | None = None, workers: int | None = None,
         if save.resolve() == scene.resolve():
             raise OSError(f"{save} is the scene itself; choose another file")
         check_file(save)
-    workers = checked_workers(workers or os.cpu_count() or 1)
+    workers = checked_workers((os.cpu_count() or 1) if workers is None else workers)
     presentation = Presentation(document=design_document, rows=design_rows)
     with activity("design", "designs ...") as shown:
         found = run_design(load_scene(scene), presentation=presentation, workers=workers, progress=shown.show)

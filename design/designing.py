@@ -140,7 +140,7 @@ def run_design(
         reach=reach,
         point=found.static.reach_point if best is None else best.point,
         judgement=judgement,
-        front=_front(found, asked),
+        front=_front(found, asked, least=0.0 if best is None else best.size),
         effects=effects,
         ranking=ranking,
     )
@@ -229,17 +229,21 @@ def _moves(axis: Axis, point: Point) -> Sequence[tuple[str, dict[str, Any]]]:
     ]
 
 
-def _front(found: Hunt, asked: float) -> tuple[Candidate, ...]:
-    """The smallest first; of those that are nearly alike the first."""
+def _front(found: Hunt, asked: float, *, least: float) -> tuple[Candidate, ...]:
+    """The smallest first; of those that are nearly alike the first.
+
+    Args: `least`: size of the design, m^3: smaller ones met what is required on few devices alone.
+    """
+    passing = [each for each in found.passing if each.size >= least]
 
     def of(each: Candidate) -> tuple[float, float, float]:
         return each.size, each.race.time(asked), each.race.gas
 
     kept: list[Candidate] = []
-    for each in found.passing:
+    for each in passing:
         beaten = any(
             all(b <= a for a, b in zip(of(each), of(other), strict=True)) and of(other) != of(each)
-            for other in found.passing
+            for other in passing
         )
         alike = any(
             all(abs(a - b) <= _APART * b for a, b in zip(of(each), of(other), strict=True)) for other in kept

@@ -50,6 +50,7 @@ def test_the_smallest_of_a_whole_space_that_meets_what_is_required(found: rb.Des
         verdicts[width] = judged(balancer, searched(balancer)).verdict
     smallest = min(width for width, verdict in verdicts.items() if verdict == MET)
     assert found.succeeded
+    assert all(each.size >= found.size for each in found.front)
     assert found.point["disc.axial_width"] == smallest > 14e-3
 
 

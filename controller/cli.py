@@ -49,9 +49,7 @@ def tune(
         OSError: a file that cannot be written.
     """
     if save is not None:
-        if save.resolve() == scene.resolve():
-            raise OSError(f"{save} is the scene itself; choose another file")
-        check_file(save)
+        check_file(save, apart_from=scene)
     balancer = balancer_under(law, with_tolerance(load_scene(scene), tolerance=tolerance, models=models))
     with activity("tune", "runs ...") as shown:
         found = balancer.recommend(pressure=pressure, remedies=remedies or None, progress=shown.show)

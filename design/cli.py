@@ -115,9 +115,7 @@ def design(scene: Path, *, save: Path | None = None, workers: int | None = None,
         OSError: a file that cannot be written.
     """
     if save is not None:
-        if save.resolve() == scene.resolve():
-            raise OSError(f"{save} is the scene itself; choose another file")
-        check_file(save)
+        check_file(save, apart_from=scene)
     workers = checked_workers((os.cpu_count() or 1) if workers is None else workers)
     presentation = Presentation(document=design_document, rows=design_rows)
     with activity("design", "designs ...") as shown:

@@ -25,7 +25,7 @@ from ringbalance.results.proportion import Proportion
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Presentation, PresentedResult
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.models import Scene
+from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.processes import beside
 
@@ -112,7 +112,7 @@ def run_design(
     Args: `executor`: who computes; default `workers` processes, default one for each processor.
     Raises: SceneError: a scene without [design], or one that leaves nothing to choose.
     """
-    space, told = _space(scene), progress or (lambda _: None)
+    space, told = Space.of(liquid_ring_scene(scene)), progress or (lambda _: None)
     balancer = balancer_of(space.scene)
     needed = abs(balancer.rotor().unbalance)
     workers = workers or os.cpu_count() or 1
@@ -144,13 +144,6 @@ def run_design(
         effects=effects,
         ranking=ranking,
     )
-
-
-def _space(scene: SceneFile) -> Space:
-    if not isinstance(scene, Scene):
-        allowed = "a liquid ring"
-        raise SceneError.of_file(scene.file, "only a disc with liquid is designed", allowed)
-    return Space.of(scene)
 
 
 def _reach(space: Space, point: Point) -> float | None:

@@ -55,11 +55,14 @@ def write_whole(path: Path, data: str | bytes, *, private: bool = False) -> Path
     return path
 
 
-def check_file(path: Path) -> None:
+def check_file(path: Path, *, apart_from: Path | None = None) -> None:
     """Refuse now what `write_whole` would refuse after the work; nothing is left behind.
 
-    Raises: OSError: it is a folder, or its folder cannot be made or written.
+    Args: `apart_from`: the scene, which must not be written over.
+    Raises: OSError: it is that scene or a folder, or its folder cannot be made or written.
     """
+    if apart_from is not None and path.resolve() == apart_from.resolve():
+        raise OSError(f"{path} is the scene itself; choose another file")
     with _refused(path):
         if path.is_dir():
             raise IsADirectoryError(f"{path} is a folder, not a file; name a file")

@@ -123,5 +123,5 @@ def test_what_cannot_be_chosen_from_is_named(tmp_path: Path, change: str, messag
 
 
 def test_only_a_disc_with_liquid_is_designed() -> None:
-    with pytest.raises(rb.SceneError, match="only a disc with liquid"):
+    with pytest.raises(rb.SceneError, match="eccentric_mass"):
         rb.find_design(rb.load_scene(rb.bundled_scene("eccentric_mass_paper")))

@@ -125,3 +125,15 @@ def test_what_cannot_be_chosen_from_is_named(tmp_path: Path, change: str, messag
 def test_only_a_disc_with_liquid_is_designed() -> None:
     with pytest.raises(rb.SceneError, match="eccentric_mass"):
         rb.find_design(rb.load_scene(rb.bundled_scene("eccentric_mass_paper")))
+
+
+@pytest.mark.heavy
+def test_rounds_come_close_to_the_smallest_of_a_range() -> None:
+    """A tenth smaller, no settings that `tune` looks for meet what is required any more."""
+    vary = ("disc.axial_width=10mm:40mm", "tube.bore=0.9mm", "gas.pressure=0.4MPa")
+    found = rb.find_design(open_scene(vary, requirement__fraction=0.7))
+    width = found.point["disc.axial_width"]
+    balancer = balancer_of(found.given.with_values({**found.point, "disc.axial_width": 0.9 * width}))
+    assert found.succeeded
+    assert 0.9 * width > 10e-3
+    assert judged(balancer, searched(balancer)).verdict != MET

@@ -46,7 +46,7 @@ def test_two_exports_of_a_law_are_equal(six: Both, version: Version) -> None:
 def test_every_variable_has_what_a_host_shows(unit: ZipFile, six: Both, version: Version) -> None:
     model = ET.fromstring(unit.read("modelDescription.xml"))
     units = {each.get("name") for each in model.iter("Unit")}
-    variables = list(model.iter("ScalarVariable")) or list(model.find("ModelVariables") or ())
+    variables = list(model.iter("ScalarVariable")) or list(model.iterfind("ModelVariables/*"))
     causes = {}
     for each in variables:
         kind = each[0] if len(each) else each

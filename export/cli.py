@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, Literal
 
@@ -9,6 +10,7 @@ from ringbalance.export.compact import CompactLaw, compact_law
 from ringbalance.export.fmu import fmu_bytes
 from ringbalance.export.grid import csv_files
 from ringbalance.export.hosts import c_files, identifier, python_files, st_files
+from ringbalance.export.libraries import EXTRA, Version
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
@@ -16,7 +18,8 @@ from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.terminal import activity, messages_console, results_console
 
-Host = Literal["c", "fmi2", "fmi3", "st", "csv", "python"]
+Text = Literal["c", "st", "csv", "python"]
+Host = Literal[Text, Version]
 POINTS: Final = 41
 MOST_POINTS: Final = 1001
 _BEYOND: Final = 1.5
@@ -26,7 +29,13 @@ _WITHOUT_PRESSURE: Final = 1e6
 
 
 def export(
-    scene: Path, *, to: Host, out: Path = Path("out"), name: str = "", points: int | None = None
+    scene: Path,
+    *,
+    to: Host,
+    out: Path = Path("out"),
+    name: str = "",
+    points: int | None = None,
+    all_systems: bool = False,
 ) -> int:
     """Write the calibrated flow law for another program, the same bits in each.
 
@@ -37,6 +46,7 @@ def export(
         out: folder for the files.
         name: of files and functions; default that of the scene.
         points: of each axis of the grid of csv, 2 to 1001; default 41.
+        all_systems: units with libraries for Linux, macOS and Windows; needs the extra export-all.
 
     Returns:
         Exit code 0.
@@ -46,13 +56,18 @@ def export(
         OSError: a file that cannot be written.
     """
     _check_points(to, points)
+    _check_systems(to, all_systems)
     called = _checked_name(name) if name else identifier(scene.stem)
     told = liquid_ring_scene(load_scene(scene))
     with staged(out) as folder:
         with activity("export", "calibrating ..."):
             law = compact_law(scene=told, law=calibrate(told).flow_law)
-        highest = _BEYOND * told.gas.pressure if told.gas.pressure > 0 else _WITHOUT_PRESSURE
-        files = _files(law, called, to, points or POINTS, highest)
+        if to == "fmi2" or to == "fmi3":
+            with activity("export", "compiling ..."):
+                files = _unit(law, called, to, all_systems)
+        else:
+            highest = _BEYOND * told.gas.pressure if told.gas.pressure > 0 else _WITHOUT_PRESSURE
+            files = _texts(law, called, to, points=points or POINTS, highest=highest)
         for file, content in files.items():
             (folder / file).write_bytes(content)
     for file in files:
@@ -63,17 +78,31 @@ def export(
     return 0
 
 
-def _files(law: CompactLaw, name: str, to: Host, points: int, highest: float) -> dict[str, bytes]:
-    if to in ("fmi2", "fmi3"):
-        unit, runs = fmu_bytes(law, name, to)
-        if not runs:
-            messages_console().print("no C compiler here: the unit holds its source alone", highlight=False)
-        return {f"{name}.fmu": unit}
+def _unit(law: CompactLaw, name: str, version: Version, all_systems: bool) -> dict[str, bytes]:
+    unit, runs = fmu_bytes(law, name, version, all_systems=all_systems)
+    if not runs:
+        messages_console().print("no C compiler here: the unit holds its source alone", highlight=False)
+    return {f"{name}.fmu": unit}
+
+
+def _texts(law: CompactLaw, name: str, to: Text, *, points: int, highest: float) -> dict[str, bytes]:
     if to == "csv":
         texts = csv_files(law, name, points=points, highest=highest)
     else:
         texts = {"c": c_files, "st": st_files, "python": python_files}[to](law, name)
     return {file: text.encode() for file, text in texts.items()}
+
+
+def _check_systems(to: Host, all_systems: bool) -> None:
+    if not all_systems:
+        return
+    option, value = "--all-systems", True
+    if to not in ("fmi2", "fmi3"):
+        problem = f"{to} has no libraries"
+        raise SceneError.of_option(option=option, value=value, problem=problem, allowed="--to fmi2 or fmi3")
+    if find_spec("ziglang") is None:
+        problem, allowed = "the cross-compiler is not installed", f'pip install "ringbalance[{EXTRA}]"'
+        raise SceneError.of_option(option=option, value=value, problem=problem, allowed=allowed)
 
 
 def _check_points(to: Host, points: int | None) -> None:

@@ -1,34 +1,26 @@
 """The compact law as a functional mock-up unit (FMI 2.0 or 3.0, co-simulation), with the source inside.
 
 A host that has a compiler builds it from `sources/`; where this machine has one, the unit also runs as it is
-on machines like this one.  Two exports of one law are equal to the byte but for what the compiler makes.
+on machines like this one, and with a cross-compiler on all.  Two exports of one law are equal to the byte but
+for what the compiler makes.
 """
 
 from __future__ import annotations
 
 import hashlib
-import platform
-import shutil
-import subprocess
-import sys
-import tempfile
 import tomllib
 from importlib.resources import files
 from io import BytesIO
-from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 from xml.etree import ElementTree as ET
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from ringbalance.export.compact import CompactLaw
 from ringbalance.export.hosts import c_files, filled
+from ringbalance.export.libraries import Version, every_library, local_library
 from ringbalance.export.translate import number_text
 from ringbalance.results.result import csv_text
 
-Version = Literal["fmi2", "fmi3"]
-_OPTIONS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
-_SUFFIXES: Final = {"linux": ".so", "darwin": ".dylib"}
-_MACHINES: Final = {"AMD64": "x86_64", "arm64": "aarch64"}
 _DATE: Final = (1980, 1, 1, 0, 0, 0)
 """Of every file inside, so that two exports are equal."""
 _PRESSURES: Final = (0.0, 1e5, 2e5, 4e5, 8e5)
@@ -38,10 +30,15 @@ _KINDS: Final = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
 _ABLE: Final = ("canHandleVariableCommunicationStepSize", "canGetAndSetFMU{}tate", "canSerializeFMU{}tate")
 
 
-def fmu_bytes(law: CompactLaw, name: str, version: Version) -> tuple[bytes, bool]:
-    """The unit, and whether it has a library for machines like this one.
+def fmu_bytes(
+    law: CompactLaw, name: str, version: Version, *, all_systems: bool = False
+) -> tuple[bytes, bool]:
+    """The unit, and whether it has a library.
 
-    It holds the model description, the sources, reference results, and the library where a compiler is.
+    It holds the model description, the sources, reference results, and the library for machines like this one
+    where a compiler is, or, with `all_systems`, those for all that the standard names.
+
+    Raises: OSError: no cross-compiler for all systems.
     """
     words = {
         "flow": f"{name}_flow",
@@ -59,8 +56,8 @@ def fmu_bytes(law: CompactLaw, name: str, version: Version) -> tuple[bytes, bool
     }
     if version == "fmi3":
         parts["sources/buildDescription.xml"] = _build(name)
-    library = _library(sources, name, version)
-    return _zipped({**parts, **library}), bool(library)
+    libraries = (every_library if all_systems else local_library)(sources, name, version)
+    return _zipped({**parts, **libraries}), bool(libraries)
 
 
 def _declared(law: CompactLaw) -> dict[str, Any]:
@@ -183,33 +180,6 @@ def _reference(law: CompactLaw) -> str:
             "primed_after": [int(each.primed) for each in answers],
         }
     )
-
-
-def _library(sources: dict[str, str], name: str, version: Version) -> dict[str, bytes]:
-    """By place in the unit; nothing where no compiler is, or it fails."""
-    compiler = next((path for each in ("cc", "gcc", "clang") if (path := shutil.which(each))), None)
-    folder = _folder(version)
-    if compiler is None or folder is None:
-        return {}
-    library = f"{name}{_SUFFIXES[sys.platform]}"
-    with tempfile.TemporaryDirectory() as made:
-        for file, text in sources.items():
-            Path(made, file).write_text(text, encoding="utf-8")
-        compiled = [file for file in sources if file.endswith(".c")]
-        command = [compiler, *_OPTIONS, *compiled, "-lm", "-o", library]
-        if subprocess.run(command, cwd=made, capture_output=True, check=False).returncode:
-            return {}
-        return {f"binaries/{folder}/{library}": Path(made, library).read_bytes()}
-
-
-def _folder(version: Version) -> str | None:
-    """Of libraries for machines like this one; None: the standard, or this program, names none."""
-    machine = _MACHINES.get(platform.machine(), platform.machine())
-    if sys.platform not in _SUFFIXES:
-        return None
-    if version == "fmi3":
-        return f"{machine}-{sys.platform}"
-    return f"{sys.platform}64" if machine == "x86_64" else None
 
 
 def _zipped(parts: dict[str, bytes]) -> bytes:

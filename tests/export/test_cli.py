@@ -39,6 +39,7 @@ def test_it_writes_the_files_it_names(
         ([OIL, "--to", "csv", "--points", "1"], "--points = 1"),
         ([OIL, "--to", "c", "--name", "2 b"], '--name = "2 b"'),
         ([OIL, "--to", "rust"], "rust"),
+        ([OIL, "--to", "c", "--all-systems"], "--all-systems = true"),
         ([str(rb.bundled_scene("driven_masses_small")), "--to", "c"], "eccentric_mass"),
         (["none.toml", "--to", "c"], "none.toml"),
     ],

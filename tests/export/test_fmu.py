@@ -14,7 +14,8 @@ import pytest
 from law_queries import answers, queries
 
 from ringbalance.export.compact import CompactLaw
-from ringbalance.export.fmu import Version, fmu_bytes, guid_of
+from ringbalance.export.fmu import fmu_bytes, guid_of
+from ringbalance.export.libraries import Version
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.scene.arrays import FloatArray
 
@@ -120,3 +121,13 @@ def test_fmpy_finds_no_fault_and_simulates_it(tmp_path: Path, six: Both, version
     rows = fmpy.simulate_fmu(str(file), start_values=start, stop_time=0.1)
     right = six[1].answer(fill_ratio=0.3, opposite_fill_ratio=0.2, gas_pressure=4e5, primed=True)
     assert rows["velocity"][-1] == right.velocity
+
+
+def test_with_a_cross_compiler_it_has_libraries_for_all_systems(six: Both, version: Version) -> None:
+    """Where `ziglang` is installed: each begins as its system's libraries do."""
+    pytest.importorskip("ziglang")
+    unit = ZipFile(BytesIO(fmu_bytes(six[1], "disc", version, all_systems=True)[0]))
+    heads = {name: unit.read(name)[:4] for name in unit.namelist() if name.startswith("binaries/")}
+    begins = {".so": b"\x7fELF", ".dll": b"MZ", ".dylib": b"\xcf\xfa\xed\xfe"}
+    assert len(heads) == (3 if version == "fmi2" else 6)
+    assert all(head.startswith(begins[Path(name).suffix]) for name, head in heads.items())

@@ -1,0 +1,79 @@
+"""The libraries inside a unit for co-simulation, compiled from its source.
+
+By the machine's compiler for machines like it, or by the cross-compiler of the package `ziglang` for all.
+"""
+
+from __future__ import annotations
+
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final, Literal
+
+Version = Literal["fmi2", "fmi3"]
+EXTRA: Final = "export-all"
+"""Of the project, with the cross-compiler."""
+_OPTIONS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
+_SUFFIXES: Final = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
+_SYSTEMS: Final = {"linux": "linux-gnu.2.17", "darwin": "macos", "windows": "windows-gnu"}
+"""As the cross-compiler calls them; the oldest C library that it links for is that of 2012."""
+_PROCESSORS: Final = ("x86_64", "aarch64")
+_PYTHON_NAMES: Final = {"AMD64": "x86_64", "arm64": "aarch64"}
+_FOLDERS_2: Final = {"linux": "linux64", "darwin": "darwin64", "windows": "win64"}
+"""Of FMI 2.0, which names no processor but x86."""
+
+
+def local_library(sources: Mapping[str, str], name: str, version: Version) -> dict[str, bytes]:
+    """For machines like this one, by place in the unit; nothing where no compiler is, or it fails."""
+    compiler = next((path for each in ("cc", "gcc", "clang") if (path := shutil.which(each))), None)
+    processor = _PYTHON_NAMES.get(platform.machine(), platform.machine())
+    place = _place(version, name, sys.platform, processor)
+    if compiler is None or place is None:
+        return {}
+    try:
+        return {place: _compiled([compiler], sources, Path(place).name)}
+    except OSError:
+        return {}
+
+
+def every_library(sources: Mapping[str, str], name: str, version: Version) -> dict[str, bytes]:
+    """For Linux, macOS and Windows on both processors, as far as the standard names them.
+
+    Raises: OSError: the cross-compiler fails.
+    """
+    made = {}
+    for system in _SYSTEMS:
+        for processor in _PROCESSORS:
+            if place := _place(version, name, system, processor):
+                target = f"{processor}-{_SYSTEMS[system]}"
+                compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s"]
+                made[place] = _compiled(compiler, sources, Path(place).name)
+    return made
+
+
+def _compiled(compiler: Sequence[str], sources: Mapping[str, str], library: str) -> bytes:
+    """Raises: OSError: the compiler fails."""
+    with tempfile.TemporaryDirectory() as folder:
+        for file, text in sources.items():
+            Path(folder, file).write_text(text, encoding="utf-8")
+        compiled = [file for file in sources if file.endswith(".c")]
+        command = [*compiler, *_OPTIONS, *compiled, "-lm", "-o", library]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        if done.returncode:
+            told = (done.stderr.strip() or "no message").splitlines()[-1]
+            raise OSError(f"{Path(compiler[0]).name} does not compile {library}: {told}")
+        return Path(folder, library).read_bytes()
+
+
+def _place(version: Version, name: str, system: str, processor: str) -> str | None:
+    """In the unit; None: the standard, or this program, names no such machine."""
+    if system not in _SUFFIXES or processor not in _PROCESSORS:
+        return None
+    if version == "fmi2" and processor != "x86_64":
+        return None
+    folder = _FOLDERS_2[system] if version == "fmi2" else f"{processor}-{system}"
+    return f"binaries/{folder}/{name}{_SUFFIXES[system]}"

@@ -294,9 +294,7 @@ def test_a_log_has_command_lines_messages_and_errors_with_their_times(here: Run,
     assert all(re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} (INFO|ERROR) ", line) for line in lines)
     assert [line for line in lines if f"law written to {law}" in line]
     assert [line for line in lines if " ERROR absent.toml" in line]
-    assert (
-        len([line for line in lines if f"ringbalance {cli.ringbalance.__version__} calibrate" in line]) == 2
-    )
+    assert len([line for line in lines if re.search(r"INFO ringbalance [\d.]+ calibrate ", line)]) == 2
 
 
 def test_a_log_that_cannot_be_written_is_refused(here: Run, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.results.numbers import number
-from ringbalance.results.result import Cells, Result, Rows, Table
+from ringbalance.results.result import Cells, Result, Rows, Table, print_rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import document_of
@@ -27,7 +27,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.processes import checked_workers
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.scene.toml import toml_text
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.design import AXES, Axis, Base, Point, design
@@ -377,7 +377,6 @@ def extremes(
         OSError: the folder cannot be written.
     """
     base = base_of(liquid_ring_scene(load_scene(scene)))
-    console = messages_console()
     with nullcontext() if out is None else staged(out, files=(_KEPT, _FILE)) as stage:
         with activity("extremes", "axes") as shown:
             found = find_extremes(
@@ -393,11 +392,11 @@ def extremes(
         if stage is not None:
             write_whole(stage / _FILE, text + "\n")
     if out is not None:
-        console.print(f"written to {out}", highlight=False)
+        print_message(f"written to {out}")
     if json:
         print(text)
     else:
-        results_console().print(found.rows().view(headline=False))
+        print_rows(found.rows(), headline=False)
     return _BROKEN if found.broken() else _DONE
 
 

@@ -3,9 +3,10 @@
 python tools/page_programs.py PAGE ...            exit code 1 where a page prints something else than it shows
 python tools/page_programs.py --write PAGE ...    writes what it prints
 
-A block of `python` or `sh` is run in an empty folder with the bundled `scenes`. A block after a line that ends in
-a file's name in code type and a colon becomes that file. A block of `text` straight after a block that was run is
-what that one printed; in it a line `...` stands for lines left out. A block after `<!-- not run: REASON -->` is not.
+A block of `python` or `sh` is run in an empty folder with the bundled `scenes`. A block after a line that
+ends in a file's name in code type and a colon becomes that file. A block of `text` straight after a block
+that was run is what that one printed; in it a line `...` stands for lines left out. A block after
+`<!-- not run: REASON -->` is not run.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class Session:
             text=True,
             check=False,
             cwd=self.folder,
-            env={**os.environ, "PATH": path},
+            env={**os.environ, "PATH": path, "COLUMNS": "100"},
         )
         if done.returncode:
             raise PageError(f"{code}ends with {done.returncode}:\n{done.stdout}{done.stderr}")

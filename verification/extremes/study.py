@@ -22,7 +22,7 @@ from ringbalance.design.static import content_of
 from ringbalance.design.store import Store
 from ringbalance.design.work import answers, tasks_of
 from ringbalance.results.numbers import number
-from ringbalance.results.result import Cells, Result, Rows, Table
+from ringbalance.results.result import Cells, Result, Rows, Table, print_rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import Fault, SceneError
@@ -31,7 +31,7 @@ from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.processes import checked_workers
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.scene.toml import toml_text
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.extremes.axes import AXES, Axis, Point, designed_set
@@ -377,9 +377,9 @@ def extremes(
         if stage is not None:
             write_whole(stage / _FILE, text + "\n")
     if out is not None:
-        messages_console().print(f"written to {out}", highlight=False)
+        print_message(f"written to {out}")
     if json:
         print(text)
     else:
-        results_console().print(result.rows().view(headline=False))
+        print_rows(result.rows(), headline=False)
     return 1 if result.broken() else 0

@@ -23,7 +23,6 @@ import numpy.typing as npt
 from scipy.stats.qmc import Sobol
 
 from ringbalance.mesh.geometry import liquid_first_moment, surface_radius
-from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import scene_from
@@ -109,11 +108,7 @@ def _closing(scene: Scene, angle: float) -> float:
 def _column(scene: Scene, speed: float) -> float:
     """Pressure of a column from the siphon crest to the wall, Pa."""
     hump = scene.tube.hump_radius or scene.disc.inner_radius
-    return float(
-        hydrostatic_pressure(
-            density=scene.liquid.density, angular_velocity=speed, inner=hump, outer=scene.disc.outer_radius
-        )
-    )
+    return scene.liquid.density * speed**2 * (scene.disc.outer_radius**2 - hump**2) / 2
 
 
 def varied(document: Mapping[str, Any], *, scene: Scene, values: Mapping[str, float]) -> Document:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import TracedRun
+from ringbalance.controller.balancer import RunResult
 from ringbalance.controller.document import amplitude_line
 from ringbalance.controller.eccentric_mass.findings import ended, warnings_of
 from ringbalance.controller.eccentric_mass.run_facts import RunFacts
@@ -203,7 +203,7 @@ def _quantities(run: EccentricRun) -> Iterator[Quantity]:
 _INSTANTS = 600
 
 
-def amplitude_band(runs: Sequence[TracedRun], *, end: float) -> dict[str, Any]:
+def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
     """Least, middle and largest amplitude of runs at equally spaced times, each the largest since the last
     one, so that no peak is lost.
 
@@ -218,7 +218,7 @@ def amplitude_band(runs: Sequence[TracedRun], *, end: float) -> dict[str, Any]:
         "middle_m": middle,
         "high_m": high,
         "runs": len(runs),
-        "settled": sum(each.settling_time is not None for each in runs),
+        "settled": sum(each.settled for each in runs),
     }
 
 

@@ -33,6 +33,7 @@ def display() -> Display:
     """What holds for the command line that is running; all is shown outside one."""
     return _DISPLAY.get(Display())
 
+
 class Progress(Protocol):
     """What a command does at present, as it is shown."""
 

@@ -205,22 +205,7 @@ def controller_block(scene: Scene) -> Block:
     if kind != "target_vector":
         problem = f"the controller {kind!r} is not exported"
         raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')
-    settings = target_vector_of(scene)
-    chambers = settings.chambers
-    sectors = zip(chamber_directions(chambers).tolist(), settings.offsets, strict=True)
-    constants = (
-        float(chambers),
-        settings.limit,
-        settings.proportional,
-        0.0 if settings.integral_time is None else 1.0 / settings.integral_time,
-        settings.derivative_time,
-        settings.minimum_gas_time,
-        settings.maximum_gas_time,
-        scene.controller.period,
-        float(settings.on_reversal == "reset"),
-        *_parts(cmath.rect(1.0, settings.lag_angle)),
-        *(number for axis, offset in sectors for number in (*_parts(axis), offset)),
-    )
+    chambers = scene.disc.chambers
 
     def place(offset: str, chamber: int | None) -> int:
         value = int(getattr(controller, offset))
@@ -233,12 +218,32 @@ def controller_block(scene: Scene) -> Block:
         title="Target-vector controller of a liquid-ring balancer",
         scene=scene.file,
         facts="Settings of the scene; the vibration enters by its components.",
-        constants=constants,
+        constants=_settings(scene),
         start=(0.0,) * (controller.FIRST_CHAMBER + controller.PER_CHAMBER * chambers),
         modules=(point, controller),
         steps="step",
         timed=True,
         variables=_variables("controller", place, chambers=chambers),
+    )
+
+
+def _settings(scene: Scene) -> Numbers:
+    """What `controller` finds in its constants."""
+    settings = target_vector_of(scene)
+    chambers = settings.chambers
+    sectors = zip(chamber_directions(chambers).tolist(), settings.offsets, strict=True)
+    return (
+        float(chambers),
+        settings.limit,
+        settings.proportional,
+        0.0 if settings.integral_time is None else 1.0 / settings.integral_time,
+        settings.derivative_time,
+        settings.minimum_gas_time,
+        settings.maximum_gas_time,
+        scene.controller.period,
+        float(settings.on_reversal == "reset"),
+        *_parts(cmath.rect(1.0, settings.lag_angle)),
+        *(number for axis, offset in sectors for number in (*_parts(axis), offset)),
     )
 
 

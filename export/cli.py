@@ -18,7 +18,7 @@ from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_message, results_console
 
 Text = Literal["c", "st", "csv", "python"]
 Host = Literal[Text, Version]
@@ -83,7 +83,7 @@ def export(
         results_console().print(str(out / file), highlight=False)
     size = f"{8 * len(made.constants)} bytes of constants"
     exact = f", velocities within {compact.departure:.1e} of the calibrated law's" if compact else ""
-    messages_console().print(size + exact, highlight=False)
+    print_message(size + exact)
     return 0
 
 
@@ -108,7 +108,7 @@ def _encoded(texts: dict[str, str]) -> dict[str, bytes]:
 def _unit(block: Block, name: str, version: Version, all_systems: bool) -> dict[str, bytes]:
     unit, runs = fmu_bytes(block, name, version, all_systems=all_systems)
     if not runs:
-        messages_console().print("no C compiler here: the unit holds its source alone", highlight=False)
+        print_message("no C compiler here: the unit holds its source alone")
     return {f"{name}.fmu": unit}
 
 

@@ -144,7 +144,8 @@ def fresh_page(page: str, folder: Path) -> str:
 def fresh(path: Path) -> str:
     """A page run in a folder of its own. Raises: PageError: as of `fresh_page`."""
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "scenes").symlink_to(ROOT / "scenes", target_is_directory=True)
+        for name in ("scenes", "benchmarks"):
+            (Path(folder) / name).symlink_to(ROOT / name, target_is_directory=True)
         return fresh_page(path.read_text(encoding="utf-8"), Path(folder))
 
 

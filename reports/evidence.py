@@ -30,7 +30,7 @@ from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.pages.plain import decision
-from ringbalance.reports.pictures.fields import shown_field
+from ringbalance.reports.pictures.fields import chamber_field
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene, provenance, versions
 from ringbalance.reports.section import Record, Work
 from ringbalance.reports.sections import begun, collected, completed
@@ -147,8 +147,8 @@ def _paper() -> Record:
 
 
 def _pressure(scene: Scene) -> Record:
-    field = shown_field(scene, fill_ratio=scene.disc.max_fill_ratio)
-    return {"profile": field.pressure_profile(scene=scene), "mesh": field.record()}
+    field = chamber_field(scene, fill_ratio=scene.disc.max_fill_ratio)
+    return {"profile": field.pressure_profile(scene=scene), "mesh": field.record}
 
 
 def _closed_loop(scene: Scene, calibration: Calibration) -> Record:

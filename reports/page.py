@@ -206,7 +206,7 @@ def _data_address(content: bytes) -> str:
 
 def _pictures(record: Record, contents: Mapping[str, bytes]) -> Record:
     """Pictures by name, with their bytes; one that lacks a variant is left out."""
-    shown_pictures: Record = {"text": record["text"], "disc": None, "pressure": None, "tube": None}
+    shown_pictures: Record = {"text": record["text"], "disc": None, "pressure": None}
     for item in record["files"]:
         if item["light"] in contents and item["dark"] in contents:
             variants = {key: _data_address(contents[item[key]]) for key in ("light", "dark")}

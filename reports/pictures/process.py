@@ -13,9 +13,8 @@ from typing import Any, Final
 
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.mesh.export import write_cells
-from ringbalance.reports.pictures.fields import shown_field, shown_fill, tube_field
+from ringbalance.reports.pictures.fields import chamber_field, shown_fill
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
-from ringbalance.reports.pictures.style import PICTURE
 from ringbalance.results.numbers import given, shown
 from ringbalance.results.rows import Finding, Value
 from ringbalance.scene import Scene
@@ -29,6 +28,8 @@ FOLDERS: Final = (_FIGURES, _FIELDS)
 """Of the files, in an output folder."""
 _WHOLE: Final = "chamber"
 """Among the fields of a job: the space of an imported chamber, on which there is no field."""
+_SIZE: Final = (1200, 800)
+"""Of a picture, pixels, as it is drawn; what draws it is not loaded here."""
 _JOB: Final = "drawing.json"
 _LOG: Final = "drawing.txt"
 
@@ -57,8 +58,8 @@ class _Drawing3D:
                 "name": name,
                 "light": f"{name}-light.png",
                 "dark": f"{name}-dark.png",
-                "width": PICTURE[0],
-                "height": PICTURE[1],
+                "width": _SIZE[0],
+                "height": _SIZE[1],
                 "alt": alt,
                 "caption": caption,
             }
@@ -82,7 +83,7 @@ def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
     fills = {"pressure": scene.disc.max_fill_ratio, "disc": shown_fill(scene)}
     names = {"pressure": "chamber_largest_fill.vtu", "disc": "chamber_at_start.vtu"}
     written = {
-        key: shown_field(scene, fill_ratio=fill).write(path=folder / _FIELDS / names[key])
+        key: chamber_field(scene, fill_ratio=fill).write(path=folder / _FIELDS / names[key])
         for key, fill in fills.items()
     }
     geometry = scene.disc.geometry
@@ -103,12 +104,11 @@ def start_drawing(
     found = find_opengl() if opengl is None else opengl
     figures = folder / _FIGURES
     figures.mkdir(parents=True, exist_ok=True)
-    tube = tube_field(scene)
-    captions = _captions(scene, tube)
+    captions = _captions(scene)
     if not found.available:
         return _Drawing3D(process=None, text=found.text, folder=figures, captions=captions)
     job = folder / _JOB
-    job.write_text(json.dumps({**_job(scene, fields, figures), "tube": tube}), encoding="utf-8")
+    job.write_text(json.dumps(_job(scene, fields, figures)), encoding="utf-8")
     with open(folder / _LOG, "wb") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", "ringbalance.reports.pictures.draw", str(job)],
@@ -154,25 +154,20 @@ def _job(scene: Scene, fields: Mapping[str, Path], folder: Path) -> Record:
     }
 
 
-def _captions(scene: Scene, tube: Record | None) -> dict[str, tuple[str, str]]:
+def _captions(scene: Scene) -> dict[str, tuple[str, str]]:
+    """Alternative text and caption by picture."""
     letters = chamber_letters(scene.disc.chambers)
     fill, most = given(shown_fill(scene), "1"), given(scene.disc.max_fill_ratio, "1")
     speed = shown(scene.rotor.speed, "rad/s", digits=5)
-    hump = scene.tube.hump_radius
-    path = _sentence("tube_straight") if hump is None else _sentence("tube_over_crest", radius=hump)
-    of_tube = {} if tube is None else {"tube": _tube_caption(tube)}
-    return of_tube | {
+    crest = scene.tube.hump_radius
+    path = _sentence("tube_straight") if crest is None else _sentence("tube_over_crest", radius=crest)
+    return {
         "disc": (
             _sentence("disc_shown", first=letters[0], last=letters[-1], path=path),
             _sentence("disc_caption", fill=fill, path=path),
         ),
         "pressure": (_sentence("pressure_shown"), _sentence("pressure_caption", fill=most, speed=speed)),
     }
-
-
-def _tube_caption(tube: Record) -> tuple[str, str]:
-    answer = tube["text"]
-    return _sentence("tube_shown", answer=answer), _sentence("tube_caption", gas=tube["gas"], answer=answer)
 
 
 def _sentence(code: str, **values: Value) -> str:

@@ -16,7 +16,6 @@ from PIL import Image
 
 from ringbalance.reports.figure import DARK, LIGHT
 from ringbalance.reports.page import render
-from ringbalance.reports.pictures.style import THEMES
 
 Record = dict[str, Any]
 VOID = {"meta", "link", "img", "br", "source", "col", "input", "hr"}
@@ -343,4 +342,4 @@ def test_lines_are_told_apart_by_every_eye(palette: dict[str, str], eyes: str) -
 
 
 def test_pictures_have_the_ground_of_the_page() -> None:
-    assert [theme.background for theme in THEMES] == [scheme["--bg"] for scheme in schemes()]
+    assert [colours["--fig-surface"] for colours in (LIGHT, DARK)] == [scheme["--bg"] for scheme in schemes()]

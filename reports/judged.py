@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import product
 from typing import Any, Final
 
@@ -204,22 +204,15 @@ def _remedy(row: Record) -> str:
     return f"{text[0].upper()}{text[1:]}"
 
 
-def settings_text(rows: Iterable[Record]) -> str:
-    """Settings as a block to put into a scene file."""
+def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:
+    """Values of a scene as lines of its file, by table; what it leaves out is left out."""
     tables: dict[str, list[str]] = {}
-    for row in rows:
-        table, _, key = row["path"].partition(".")
-        tables.setdefault(table, []).append(f"{key} = {row['text']}")
-    return "\n\n".join("\n".join([f"[{table}]", *lines]) for table, lines in tables.items())
-
-
-def settings_rows(scene: SceneFile, paths: Iterable[str]) -> Iterator[Record]:
-    """Values of a scene as its file would have them, by path; what it leaves out is left out."""
     for path in paths:
         table, _, key = path.partition(".")
         value = getattr(getattr(scene, table), key)
         if value not in (None, ()):
-            yield {"path": path, "text": toml_text(_written(value, path))}
+            tables.setdefault(table, []).append(f"{key} = {toml_text(_written(value, path))}")
+    return [{"table": table, "lines": lines} for table, lines in tables.items()]
 
 
 def _written(value: Any, path: str) -> Any:

@@ -6,7 +6,7 @@ import base64
 import io
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.resources import files
@@ -21,7 +21,6 @@ from PIL import Image
 from ringbalance.reduced_model.calibration_record import UNSTATED
 from ringbalance.reports import summary
 from ringbalance.reports.figure import DARK, LIGHT, Drawing
-from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.prose import (
     GLYPHS,
     equation_svg,
@@ -34,7 +33,7 @@ from ringbalance.reports.prose import (
     share_glyphs,
 )
 from ringbalance.reports.section import Record
-from ringbalance.reports.sections import PREFIXES, drawings_in, section_views, viewed
+from ringbalance.reports.sections import CASES_VIEW, PREFIXES, drawings_in, numbered, views_of
 from ringbalance.reports.traced import (
     FILTERS,
     finished,
@@ -101,55 +100,45 @@ class _PageContent:
     """Every figure on the page, for files of their own."""
 
 
-def case_views(cases: list[Record]) -> Record:
-    """What the page shows of the cases but the second balancer's, by id."""
-    evidence = {"verification": cases}
-    return {case["id"]: case_view(case) for case in (*summary.claims(evidence), *summary.checks(evidence))}
-
-
 def page_content(
     evidence: Record,
     *,
     pictures: Mapping[str, bytes] | None = None,
-    views_of: Callable[[list[Record]], Record] = case_views,
-    sections_by: Callable[[Record], Mapping[str, Record | None]] = section_views,
+    views: Mapping[str, Record | None] | None = None,
 ) -> _PageContent:
     """Turn the evidence into texts, tables and figures.
 
     Args: `pictures`: PNG bytes by the file names that the evidence lists; a picture that is missing is left
-    out. `views_of`, `sections_by`: what `case_views` and `section_views` answer, perhaps made by another
-    process while this one draws the rest.
+    out. `views`: what `views_of` answers, perhaps made by another process.
     Raises: KeyError: an evidence document that lacks a part.
     """
-    if balancer := evidence.get("balancer"):
-        sections = viewed(evidence, sections_by(evidence))
-        cases = summary.claims(evidence, paper=balancer)
-        claims = [{**case_view(case), "elsewhere": False} for case in cases]
-        context = {**_frame(evidence, sections), "claims": claims}
-        return _PageContent(context=context, drawings=tuple(drawings_in([sections, claims])))
-    sections = viewed(evidence, sections_by(evidence))
-    views = views_of(evidence["verification"])
-    claims = [
-        {**views[case["id"]], "elsewhere": summary.elsewhere(case, evidence)}
-        for case in summary.claims(evidence)
-    ]
-    checks = [views[case["id"]] for case in summary.checks(evidence)]
+    views = views_of(evidence) if views is None else views
+    sections, of_cases = numbered(evidence, views), views[CASES_VIEW] or {}
+    by_paper = {
+        paper: [
+            {**of_cases[case["id"]], "elsewhere": foreign and summary.elsewhere(case, evidence)}
+            for case in summary.claims(evidence, paper=paper)
+        ]
+        # Claims on eccentric masses are all judged on a rotor of their own.
+        for paper, foreign in (("liquid_ring", True), ("eccentric_mass", False))
+    }
+    balancer = evidence["balancer"]
     context = {
-        **_frame(evidence, sections),
+        **_frame(evidence),
+        "sections": sections,
+        "claims_by_paper": by_paper,
+        "claims": by_paper.get(balancer, []),
+        "checks": [of_cases[case["id"]] for case in summary.checks(evidence)],
         "tallies": _tallies(evidence),
-        "causes": summary.common_causes(summary.claims(evidence)),
+        "causes": summary.common_causes(summary.claims(evidence, paper=balancer)),
         "equations": _equations(),
         "pictures": _pictures(evidence["pictures"], pictures or {}),
-        "claims": claims,
-        "checks": checks,
     }
-    own = [[case["order_plot"], *case["drawings"]] for case in (*claims, *checks)]
-    drawings = drawings_in([sections, *own])
-    return _PageContent(context=context, drawings=tuple(drawings))
+    return _PageContent(context=context, drawings=tuple(drawings_in([sections, of_cases])))
 
 
-def _frame(evidence: Record, sections: list[Record]) -> Record:
-    """What the page of any scene has."""
+def _frame(evidence: Record) -> Record:
+    """What every template looks at."""
     return {
         "e": placed(evidence),
         "known": partial(known_width, stated=states_uncertainty(evidence)),
@@ -157,7 +146,6 @@ def _frame(evidence: Record, sections: list[Record]) -> Record:
         "unstated": UNSTATED,
         "scene": evidence["scene"],
         "papers": summary.is_papers(evidence),
-        "sections": sections,
         "stamp": _stamp(evidence),
         "running_head": _running_head(evidence),
         "scene_groups": _scene_groups(evidence["scene"]["table"]),

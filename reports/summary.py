@@ -108,7 +108,7 @@ def elsewhere(case: Record, evidence: Record) -> bool:
 
 def is_papers(evidence: Record) -> bool:
     """Whether the scene is the one that its paper's claims are judged on."""
-    cases = claims(evidence, paper=evidence.get("balancer", "liquid_ring"))
+    cases = claims(evidence, paper=evidence["balancer"])
     return bool(cases) and not any(elsewhere(case, evidence) for case in cases)
 
 

@@ -25,7 +25,7 @@ def document_tables() -> dict[str, str]:
     """The generated parts of the page, for the liquid-ring paper's disc with its assumed tube."""
     scene = paper_scene()
     calibration = calibrate(scene)
-    found = SECTION.collect(Work(scene=scene, calibration=calibration, level="light"))
+    found = SECTION.collect(Work(scene=scene, level="light"))
     assert found is not None
     return {
         "liquids": _liquids_table(found["liquids"]),

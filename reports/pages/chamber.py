@@ -105,7 +105,7 @@ def _moment(_own: Record, evidence: Record) -> Record:
 
 def _collect(work: Work) -> Record | None:
     """Frequencies and swings over the fills, as plain numbers."""
-    scene = work.scene
+    scene = work.ring
     if scene.environment.shaft == "vertical" or scene.environment.gravity == 0:
         return None
     try:

@@ -47,7 +47,7 @@ _ROOM: Final = 0.35
 
 
 def _collect(work: Work) -> Record:
-    scene, calibration = work.scene, work.calibration
+    scene, calibration = work.ring, work.calibration
     drag = DragMap.of(calibration=calibration)
     point = drag.point
     liquids = _with_budget(liquids_in_tube(calibration), calibration)

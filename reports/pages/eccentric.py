@@ -25,8 +25,7 @@ from ringbalance.reports.mass_figures import (
     run_up,
 )
 from ringbalance.reports.pages import measured
-from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.plain import decision_view
+from ringbalance.reports.pages.plain import decision, decision_view
 from ringbalance.reports.pages.standing import CASES, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
@@ -122,7 +121,12 @@ def _claims(_own: Record, evidence: Record) -> Record:
 
 SECTIONS: Final = (
     Section(
-        name="summary", title="Decision", place="report", show=decision_view, template="masses_summary.html"
+        name="summary",
+        title="Decision",
+        place="report",
+        collect=decision,
+        show=decision_view,
+        template="masses_summary.html",
     ),
     Section(name="run", title="Run-up and stages", place="report", show=_run, template="masses_run.html"),
     Section(
@@ -169,7 +173,7 @@ def _compared(work: Work) -> Record | None:
         return None
     rival = _shortened(load_scene(bundled_scene(RIVAL)))
     try:
-        ring = balancer_of(_shortened(work.scene))
+        ring = balancer_of(_shortened(work.ring))
         found = compare(ring, balancer_of(rival))
     except SceneError as error:
         # Without folders: the evidence is the same wherever the files stand.
@@ -182,8 +186,7 @@ def _second(_own: Record, evidence: Record) -> Record | None:
     cases = summary.claims(evidence, paper=BALANCER)
     if not cases:
         return None
-    views = [{**case_view(case), "elsewhere": False} for case in cases]
-    return {"claims": views, "counts": summary.counted(cases)}
+    return {"counts": summary.counted(cases)}
 
 
 SECOND_BALANCER: Final = Section(

@@ -15,15 +15,12 @@ from ringbalance.reports.judged import (
     advice_view,
     choice_records,
     judgement_record,
-    settings_rows,
-    settings_text,
+    settings_lines,
     tuning_record,
 )
 from ringbalance.reports.pages.pressure_figure import pressure_figure
-from ringbalance.reports.prose import key_words, named_with_origin, resting
+from ringbalance.reports.prose import resting
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.traced import read, states_uncertainty, traced
-from ringbalance.results.numbers import given, percent
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.draws import BLOCK
 from ringbalance.verification.loops import calibration_of
@@ -72,12 +69,10 @@ _RUN: Final = (
 )
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _DOMINANT: Final = 3
-_SHARES: Final = {True: "{}: {}, merely not known", False: "{}: {}, varies between devices"}
-"""An input and its share, by whether all devices have it in common."""
 
 
 def _collect(work: Work) -> Record:
-    scene, balancer = work.scene, LiquidRingBalancer(work.scene)
+    scene, balancer = work.ring, LiquidRingBalancer(work.ring)
     tuning = balancer.recommend(pressure=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
     return {
@@ -87,7 +82,7 @@ def _collect(work: Work) -> Record:
         "noise_open": not scene.sensor.amplitude_noise
         and scene.origin_of("sensor.amplitude_noise") == "default",
         "choices": choice_records(balancer.on_scene(tuning.recommended_scene)),
-        "settings": list(settings_rows(chosen, SETTINGS)),
+        "settings": settings_lines(chosen, SETTINGS),
         "gas_pressure_Pa": scene.gas.pressure,
         "recommended_pressure_Pa": chosen.gas.pressure,
         "run": _run_record(chosen, work.calibration.model) if tuning.recommended.settings else None,
@@ -139,15 +134,18 @@ def _other_reading(scene: Scene) -> Record | None:
 
 
 def _view(found: Record, evidence: Record) -> Record:
+    origins = evidence["scene"]["origins"]
+    rows = {row["path"]: row["origin"] for row in evidence["scene"]["table"]}
     return {
         "question": _question(evidence),
-        "settings": settings_text(found.get("settings", ())),
         "rests_on": {code: resting(evidence, *paths) for code, paths in _RESTS.items()},
         "pressure": _pressure(found),
         **advice_view(found),
-        "alerts": [*_dry(evidence), *_chamber(evidence)],
-        "dominant": _dominant(found, evidence),
-        "rests": [*_bore(found, evidence), *_exact(evidence), *_borrowed(evidence)],
+        # Inputs that decide most of what the drawn devices differ in.
+        "dominant": [
+            place for place, each in enumerate(found["ranking"][:_DOMINANT]) if each["index"] > each["noise"]
+        ],
+        "borrowed": [path for path in _ROTOR if "default" in (rows.get(path), origins.get(path))],
     }
 
 
@@ -169,87 +167,6 @@ def _question(evidence: Record) -> Record:
     if not summary.is_papers(evidence) or not cases.keys() >= set(_QUESTION):
         return {}
     return {name: cases[name]["verdict"] for name in _QUESTION}
-
-
-def _dry(evidence: Record) -> list[str]:
-    run = evidence["closed_loop"].get("calibrated") or {"injections": []}
-    warning = (run.get("gas") or {}).get("warning")
-    dry = [i for i in run["injections"] if i.get("event") == "empty"]
-    if not dry and not warning:
-        return []
-    chambers = " and ".join(sorted({item["chamber"] for item in dry}))
-    if warning:
-        return [_sentence(warning)]
-    many = "1 injection runs its" if len(dry) == 1 else f"{len(dry)} injections run their"
-    return [f"{many} chamber dry ({chambers}): gas then passes through the tube into the opposite one."]
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:].rstrip('.')}."
-
-
-def _chamber(evidence: Record) -> list[str]:
-    status = evidence["calibration"].get("status") or {"code": "ok"}
-    return [] if status["code"] == "ok" else [_sentence(status["text"])]
-
-
-def _dominant(found: Record, evidence: Record) -> list[str]:
-    """The inputs that decide most of what the drawn devices differ in."""
-    return [
-        _SHARES[each["common"]].format(
-            _input(evidence, each), traced(percent(each["index"]), f"summary.ranking.{place}.index")
-        )
-        for place, each in enumerate(found.get("ranking", ())[:_DOMINANT])
-        if each["index"] > each["noise"]
-    ]
-
-
-def _input(evidence: Record, ranked: Record) -> str:
-    path = ranked["path"]
-    label: str = named_with_origin(evidence, path) if path else ranked["name"].removeprefix("model: ")
-    return f"{label[0].upper()}{label[1:]}"
-
-
-def _exact(evidence: Record) -> list[str]:
-    """That results hold for exactly the scene's values, where it states no uncertainty."""
-    if states_uncertainty(evidence):
-        return []
-    return [
-        "The scene states no uncertainty of its inputs: devices differ by what is assumed of them and by the "
-        "models alone, and tolerances of the parts are likely to matter more. [uncertainty] in the scene "
-        "file states them."
-    ]
-
-
-def _borrowed(evidence: Record) -> list[str]:
-    """Values of the paper's rotor that stand in for those of the user's."""
-    origins = evidence["scene"].get("origins") or {}
-    rows = {row.get("path"): row.get("origin") for row in evidence["scene"].get("table") or []}
-    names = [key_words(p) for p in _ROTOR if "default" in (rows.get(p), origins.get(p))]
-    if not names:
-        return []
-    return [
-        f"Not in the scene, so those of the paper’s rotor: {', '.join(names)}. Unbalance, gain and settling "
-        "time hold for that rotor only."
-    ]
-
-
-def _bore(found: Record, evidence: Record) -> list[str]:
-    if not found:
-        return []
-    bore, other = given(found["bore_m"], "m"), found["other_reading"]
-    if other is None:
-        exact = f"The bore of {bore}, on which k and every velocity rest, is taken as exact."
-        return [] if found["bore_uncertainty_stated"] else [exact]
-    k = read(evidence, "operating_point.k", "1", digits=2)
-    place = "summary.other_reading"
-    settled = traced(percent(other["fraction"]["value"]), f"{place}.fraction.value")
-    return [
-        f"The paper gives no bore. This scene assumes {bore}, from Fig. 7 under k = 50, and k is then {k}. "
-        f"Under the calibrated law Fig. 7 gives {read(evidence, f'{place}.bore_m', 'm', digits=3)} and k = "
-        f"{read(evidence, f'{place}.k', '1', digits=2)}; there, with the same gain, {settled} of the devices "
-        "settle. Which of the two the paper’s machine had is not known."
-    ]
 
 
 SECTION: Final = Section(

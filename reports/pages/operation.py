@@ -91,7 +91,7 @@ def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.
 
 
 def _collect(work: Work) -> Record:
-    scene, calibration = work.scene, work.calibration
+    scene, calibration = work.ring, work.calibration
     law, point, rest = calibration.flow_law, calibration.operating_point, calibration.residual
     top = _HIGHEST * max(scene.gas.pressure, point.priming_vented or 0.0)
     fill, pressure = np.linspace(0, law.max_fill_ratio, _FILLS), np.linspace(0, top, _PRESSURES)
@@ -116,7 +116,7 @@ def _crest(work: Work, fill: FloatArray) -> Record | None:
     """Range of the siphon crest's radius, assumed or stated, and the gas pressure that lifts the liquid of
     each fill over either end of it; None without a crest, or where it is known.
     """
-    scene, calibration = work.scene, work.calibration
+    scene, calibration = work.ring, work.calibration
     ends = _crest_range(scene)
     if ends is None:
         return None
@@ -141,7 +141,7 @@ def _crest_range(scene: Scene) -> tuple[float, float] | None:
 
 def _disc(work: Work) -> Record:
     """The disc's dimensions and first fill; of an imported chamber its sections too."""
-    disc, tube = work.scene.disc, work.scene.tube
+    disc, tube = work.ring.disc, work.ring.tube
     imported = {} if disc.geometry is None else {"outlines": _outlines(disc.geometry)}
     return imported | {
         "chambers": disc.chambers,
@@ -155,7 +155,7 @@ def _disc(work: Work) -> Record:
         "crest_radius_m": tube.hump_radius,
         "bore_m": tube.bore,
         "length_m": tube.length,
-        "origins": {key: work.scene.origin_of(f"tube.{key}") for key in ("bore", "length", "hump_radius")},
+        "origins": {key: work.ring.origin_of(f"tube.{key}") for key in ("bore", "length", "hump_radius")},
     }
 
 

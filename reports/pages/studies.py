@@ -45,7 +45,7 @@ _LEAST: Final = 1e-12
 
 def _collect(work: Work) -> Record | None:
     """The trade of the scene, light: without meshes in three dimensions."""
-    return _study(work.scene).to_dict()
+    return _study(work.ring).to_dict()
 
 
 @lru_cache(maxsize=4)

@@ -181,11 +181,11 @@ _ORDER: Final = (Regime.SIPHON, Regime.SEPARATED, Regime.BLOCKED, Regime.REVERSE
 def _collect(work: Work) -> Record | None:
     """One operating state of every regime that this tube can be in, with its pressures along the path."""
     law = work.calibration.flow_law
-    if work.scene.tube.hump_radius is None:
+    if work.ring.tube.hump_radius is None:
         return None
-    found = [(regime, _state_in(regime, work.scene, law)) for regime in _ORDER]
+    found = [(regime, _state_in(regime, work.ring, law)) for regime in _ORDER]
     return {
-        "hump_radius_m": work.scene.tube.hump_radius,
+        "hump_radius_m": work.ring.tube.hump_radius,
         "states": [_record(work.calibration.scene, law, *state) for _, state in found if state is not None],
         "absent": [regime.label for regime, state in found if state is None],
     }

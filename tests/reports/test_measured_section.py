@@ -85,9 +85,9 @@ def test_without_measurements_there_is_no_section(evidence: dict[str, Any]) -> N
 
 
 def test_the_evidence_has_what_the_scene_says(paper_scene: Scene) -> None:
-    assert scene_record(paper_scene, "", [])["measured"] is None
+    assert scene_record(paper_scene, "")["measured"] is None
     scene = replace(paper_scene, measured=MEASURED)
-    assert scene_record(scene, "", [])["measured"]["files"][0]["rows"] == 31
+    assert scene_record(scene, "")["measured"]["files"][0]["rows"] == 31
 
 
 def test_both_balancers_show_it() -> None:

@@ -16,7 +16,6 @@ from ringbalance.reports.pages.standing import CONDITIONS
 from ringbalance.reports.run_figures import _clearest, _reachable, residual_polar
 from ringbalance.reports.section import Work
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
-from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
 COLUMN = 238.0
@@ -30,7 +29,7 @@ def texts(drawing: Drawing) -> list[str]:
 @pytest.fixture(scope="module")
 def work() -> Work:
     scene = liquid_ring_scene(load_scene(bundled_scene("liquid_ring_paper")))
-    return Work(scene=scene, calibration=calibration_of(scene), level="light")
+    return Work(scene=scene, level="light")
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +138,7 @@ def test_the_loop_s_reach_is_a_vibration(work: Work) -> None:
     reach = LOOP.collect(work)
     assert reach is not None
     moment = work.calibration.residual.usable_pair_moment
-    assert reach["vibration_m"] == pytest.approx(moment * work.scene.rotor.influence_coefficient)
+    assert reach["vibration_m"] == pytest.approx(moment * work.ring.rotor.influence_coefficient)
 
 
 @pytest.mark.parametrize("crest", [None, 15.0, 22.0, 31.5, 38.0, 43.0])

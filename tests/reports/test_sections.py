@@ -11,17 +11,15 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reports.figure import Drawing
 from ringbalance.reports.page import render
 from ringbalance.reports.pages import drag_coefficient as fifty
 from ringbalance.reports.pages import eccentric, plain, tube
 from ringbalance.reports.pages import tube_flow as inside
 from ringbalance.reports.section import Section, Work
-from ringbalance.reports.sections import SECTIONS, collected, completed, drawings_in, section_views, viewed
+from ringbalance.reports.sections import SECTIONS, collected, completed, drawings_in, numbered, views_of
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers
-from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.runner import paper_scene
 
 Record = dict[str, Any]
@@ -40,7 +38,7 @@ def test_every_section_has_its_template_and_nothing_else_lies_there() -> None:
 @pytest.mark.parametrize("name", ["report.html", "annex.html"])
 def test_the_contents_follow_the_list(pages: dict[str, str], whole: Record, name: str) -> None:
     links = re.findall(r'<li><a href="#(\w+)">', pages[name])
-    assert links == [e["name"] for e in viewed(whole, section_views(whole)) if f"{e['place']}.html" == name]
+    assert links == [e["name"] for e in numbered(whole, views_of(whole)) if f"{e['place']}.html" == name]
     assert links[0] == {"report.html": "summary", "annex.html": "disc"}[name]
     places = [pages[name].index(f'<section id="{link}"') for link in links]
     assert places == sorted(places)
@@ -63,7 +61,7 @@ def test_a_plain_section_needs_no_functions() -> None:
 
 @pytest.fixture(scope="module")
 def work(paper_scene: Scene) -> Work:
-    return Work(scene=paper_scene, calibration=calibrate(paper_scene), level="light")
+    return Work(scene=paper_scene, level="light")
 
 
 def with_section(evidence: Record, name: str, record: Record | None) -> Record:
@@ -136,7 +134,7 @@ def test_a_margin_within_its_half_width_decides_nothing() -> None:
 
 
 def test_a_tube_without_a_hump_has_no_such_section(evidence: Record, work: Work) -> None:
-    straight = replace(work, scene=replace(work.scene, tube=replace(work.scene.tube, hump_radius=None)))
+    straight = replace(work, scene=replace(work.ring, tube=replace(work.ring.tube, hump_radius=None)))
     assert tube.CREST.collect(straight) is None
     assert tube.CREST.view(evidence) is None
 
@@ -166,13 +164,12 @@ def test_a_field_is_packed_to_four_digits() -> None:
 
 def test_evidence_is_in_the_page_s_order_whoever_collected_it() -> None:
     scene = paper_scene()
-    work = Work(scene=scene, calibration=calibration_of(scene), level="light")
-    found = {"trade": {"a": 1}, "summary": {"b": 2}}
-    alone = completed(dict(found), {}, work, None)
+    work = Work(scene=scene, level="light")
+    records = {"trade": {"a": 1}, "summary": {"b": 2}}
+    alone = completed(dict(records), {}, work, None)
     assert list(alone) == ["summary", "trade"]
     with Workers(1) as pool:
         # No worker has begun it.
-        shared = completed(dict(found), {"sloshing": Future()}, work, pool)
+        shared = completed(dict(records), {"sloshing": Future()}, work, pool)
     assert list(shared) == ["summary", "sloshing", "trade"]
-    whole = collected(work, without=[s.name for s in SECTIONS if s.name != "sloshing"])
-    assert shared["sloshing"] == whole["sloshing"]
+    assert shared["sloshing"] == collected("sloshing", work)

@@ -376,10 +376,13 @@ def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], shown: Axis) -> N
     axis.set_major_formatter(FuncFormatter(lambda value, place: text(value * display.factor, place)))
 
 
-def panels(axes: Axes, *boxes: tuple[float, float, float, float]) -> list[Axes]:
-    """Axes of their own in place of a figure's, each by left, bottom, width and height over the figure's."""
+def panels(axes: Axes, *boxes: tuple[float, float, float, float], **kind: Any) -> list[Axes]:
+    """Axes of their own in place of a figure's, each by left, bottom, width and height over the figure's.
+
+    Args: `kind`: of the axes, such as their `projection`.
+    """
     axes.set_axis_off()
-    return [figure_of(axes).add_axes(box) for box in boxes]
+    return [figure_of(axes).add_axes(box, **kind) for box in boxes]
 
 
 def nice_span(span: float) -> list[float]:

@@ -129,7 +129,7 @@ def page_content(
         "claims_by_paper": by_paper,
         "claims": by_paper.get(balancer, []),
         "checks": [of_cases[case["id"]] for case in summary.checks(evidence)],
-        "tallies": _tallies(evidence),
+        "tallies": summary.tallies(evidence),
         "causes": summary.common_causes(summary.claims(evidence, paper=balancer)),
         "equations": _equations(),
         "pictures": _pictures(evidence["pictures"], pictures or {}),
@@ -166,14 +166,6 @@ def _stamp(evidence: Record) -> Facts:
 def _running_head(evidence: Record) -> str:
     scene = evidence["scene"]
     return f"{scene['name']}, scene {scene['sha256'][:12]}, {evidence['times']['date']}"
-
-
-def _tallies(evidence: Record) -> Record:
-    return {
-        "lead": summary.lead_sentence(evidence),
-        "claims": summary.verdict_counts(summary.claims(evidence), summary.CLAIM_VERDICTS),
-        "checks": summary.verdict_counts(summary.checks(evidence), summary.CHECK_VERDICTS),
-    }
 
 
 def _equations() -> Record:
@@ -234,6 +226,13 @@ def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> 
 def render_pages(content: _PageContent, *, documents: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
     """Fills the template, once for each document."""
     return {file: _page(content, file) for file in documents}
+
+
+def terminal_lines(evidence: Record) -> list[str]:
+    """What to say of a report in a few sentences, for a terminal."""
+    context = {"e": placed(evidence), "tallies": summary.tallies(evidence)}
+    text = _environment().get_template("terminal.txt").render(context)
+    return [str(Markup(line).striptags()) for line in text.splitlines() if line.strip()]
 
 
 @cache

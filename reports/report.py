@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from ringbalance.reports.evidence import Progress, collect_evidence
-from ringbalance.reports.page import DOCUMENTS, page_content, render_pages
+from ringbalance.reports.page import DOCUMENTS, page_content, render_pages, terminal_lines
 from ringbalance.reports.pages.cases import TABLES, is_long, table_file
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
@@ -23,8 +23,6 @@ from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_f
 from ringbalance.reports.saved import saved_cases
 from ringbalance.reports.section import Record, ring_of
 from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of, views_of
-from ringbalance.reports.summary import judged_sentences, lead_sentence
-from ringbalance.reports.traced import untraced
 from ringbalance.results.result import csv_text
 from ringbalance.scene import AnyScene
 from ringbalance.scene.platform.files import staged
@@ -57,10 +55,8 @@ class Report:
     @property
     def summary(self) -> list[str]:
         """What to say of it in a few sentences, and why it has no pictures where it has none."""
-        pictures, lines = self.evidence["pictures"], judged_sentences(self.evidence)
-        if self.evidence["balancer"] == "liquid_ring":
-            lines.append(lead_sentence(self.evidence))
-        return [untraced(line) for line in lines] + ([] if pictures["drawn"] else [pictures["text"]])
+        pictures = self.evidence["pictures"]
+        return terminal_lines(self.evidence) + ([] if pictures["drawn"] else [pictures["text"]])
 
 
 def _views(path: Path, evidence: Record, pool: Workers | None) -> dict[str, Record | None]:

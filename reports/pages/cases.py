@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from itertools import count
 from typing import Any, Final
 
@@ -22,7 +23,7 @@ from ringbalance.reports.figure import (
 )
 from ringbalance.reports.prose import equation_svg, input_name, typeset
 from ringbalance.reports.section import Record
-from ringbalance.reports.traced import traced
+from ringbalance.reports.traced import marked, placed, printed
 from ringbalance.results.numbers import (
     MISSING,
     PLUS_MINUS,
@@ -36,6 +37,8 @@ from ringbalance.results.numbers import (
 )
 from ringbalance.results.result import Table
 
+Quantity = Mapping[str, Any]
+"""A judged quantity of a case, whose numbers know their place in the evidence."""
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
 _TOLD: Final = (
@@ -88,7 +91,7 @@ def anchor(case: Record) -> str:
     return f"case-{str(case['id']).replace('_', '-')}"
 
 
-def _criterion(quantity: Record) -> str:
+def _criterion(quantity: Quantity) -> str:
     metric, limit = quantity.get("metric") or "", quantity.get("limit")
     if limit is None:
         return MISSING
@@ -102,12 +105,8 @@ def _criterion(quantity: Record) -> str:
     return f"within {given(limit, unit)}"
 
 
-def _quantity_row(quantity: Record, path: str) -> Record:
+def _quantity_row(quantity: Quantity) -> Record:
     """One judged quantity, every number in the unit that suits its size."""
-
-    def marked(key: str, text: str) -> str:
-        return text if text == MISSING else traced(text, f"{path}.{key}")
-
     unit = quantity.get("unit") or "1"
     own, ends = quantity.get("value_uncertainty"), _range(quantity)
     half_width = quantity.get("uncertainty") if own is None else own
@@ -115,12 +114,9 @@ def _quantity_row(quantity: Record, path: str) -> Record:
     return {
         "name": quantity.get("title") or quantity["name"],
         "why": quantity.get("why") or "",
-        "value": marked("value", value) + (f" ({ends})" if ends else ""),
-        "reference": marked(
-            "reference",
-            shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
-        ),
-        "error": marked("error", _error(quantity, unit)),
+        "value": marked(value, quantity.get("value")) + (f" ({ends})" if ends else ""),
+        "reference": printed(quantity.get("reference"), quantity.get("reference_uncertainty"), unit=unit),
+        "error": marked(_error(quantity, unit), quantity.get("error")),
         "parts": [
             shown((quantity.get("validation") or {}).get(part), unit, digits=2)
             for part in ("u_num", "u_input", "u_D")
@@ -130,14 +126,14 @@ def _quantity_row(quantity: Record, path: str) -> Record:
     }
 
 
-def _error(quantity: Record, unit: str) -> str:
+def _error(quantity: Quantity, unit: str) -> str:
     """To the second digit of its half-width, or to two digits of its own where those are fewer."""
     error, width = quantity.get("error"), quantity.get("uncertainty")
     fine = error and width and (width < _FINE * abs(error) or _range(quantity))
     return shown(error, unit, None if fine else width, digits=2)
 
 
-def _value(quantity: Record, half_width: float | None) -> str:
+def _value(quantity: Quantity, half_width: float | None) -> str:
     """What was found; a count has no digits behind the point."""
     unit, value = quantity.get("unit") or "1", quantity.get("value")
     if value is None or quantity.get("basis") != "count":
@@ -176,40 +172,32 @@ def _column(name: str, values: list[Any], unit: str) -> tuple[str, list[str]]:
     return f"{name} in {display.symbol}" if display.symbol else name, texts
 
 
-def _deciding_quantity(case: Record) -> Record | None:
-    """The judged quantity that a case's verdict rests on: the first that has the case's own verdict.
-
-    Returns: The quantity; None when there is none.
-    """
-    quantities = case.get("quantities") or []
+def _deciding_quantity(case: Record, quantities: Sequence[Quantity]) -> Quantity | None:
+    """The judged quantity that a case's verdict rests on: the first that has the case's own verdict."""
     own = [quantity for quantity in quantities if quantity.get("verdict") == case["verdict"]]
     return next(iter([*own, *quantities]), None)
 
 
-def _in_brief(case: Record) -> Record:
+def _in_brief(case: Record, quantity: Quantity | None) -> Record:
     """The deciding quantity in one line: what the paper has, what was found, the comparison's half-width."""
-    quantity, path = _deciding_quantity(case), f"verification.{case['id']}.quantities"
     if quantity is None:
         empty = dict.fromkeys(("what", "against", "corrected"), "")
         return dict.fromkeys(("paper", "found", "half_width"), MISSING) | empty
-    unit, reference = quantity.get("unit") or "1", quantity.get("reference")
-    path = f"{path}.{case['quantities'].index(quantity)}"
-    value_text, corrected = _brief_value(quantity), quantity.get("corrected")
-    paper = MISSING if reference is None else traced(given(reference, unit, digits=4), f"{path}.reference")
-    if reference is None and quantity.get("value") is not None:
-        paper = _criterion(quantity)
-    departs = quantity.get("verdict") == "confirmed with correction" and corrected is not None
+    unit, reference, value = quantity.get("unit") or "1", quantity.get("reference"), quantity.get("value")
+    departs = quantity.get("verdict") == "confirmed with correction"
+    corrected = quantity.get("corrected") if departs else None
+    criterion = reference is None and value is not None
     return {
-        "paper": paper,
+        "paper": _criterion(quantity) if criterion else printed(reference, unit=unit, digits=4, form="given"),
         "against": _unprinted(case, quantity),
-        "corrected": traced(shown(corrected, unit), f"{path}.corrected") if departs else "",
-        "found": value_text if quantity.get("value") is None else traced(value_text, f"{path}.value"),
-        "half_width": _traced_width(quantity, path),
+        "corrected": "" if corrected is None else printed(corrected, unit=unit),
+        "found": marked(_brief_value(quantity), value),
+        "half_width": _width(quantity),
         "what": quantity.get("title") or "",
     }
 
 
-def _unprinted(case: Record, quantity: Record) -> str:
+def _unprinted(case: Record, quantity: Quantity) -> str:
     """What a claim is compared with where the paper does not print it; empty where it does."""
     kind = (case.get("reference") or {}).get("kind")
     if quantity.get("against") or kind == "printed number":
@@ -218,7 +206,7 @@ def _unprinted(case: Record, quantity: Record) -> str:
     return "criterion" if bound else {"printed formula": "by its formula"}.get(kind or "", kind or "")
 
 
-def _brief_value(quantity: Record) -> str:
+def _brief_value(quantity: Quantity) -> str:
     """A found number with the digits that the comparison leaves standing, at least two."""
     value = quantity.get("value")
     width = max(quantity.get("value_uncertainty") or 0.0, quantity.get("uncertainty") or 0.0)
@@ -229,25 +217,21 @@ def _brief_value(quantity: Record) -> str:
     return _without_half_width(_value(quantity, width or None))
 
 
-def _traced_width(quantity: Record, path: str) -> str:
-    text = _width(quantity)
-    plain = text == MISSING or text.startswith("<") or " to " in text
-    return text if plain else traced(text, f"{path}.uncertainty")
-
-
-def _width(quantity: Record) -> str:
+def _width(quantity: Quantity) -> str:
     """Half-width of the comparison; a range where assumed inputs move the number further one way than the
     other."""
     value, half_width = quantity.get("value"), quantity.get("uncertainty")
     if value and half_width and half_width < (place := _last_place(value)) / 2:
         return f"<{THIN_SPACE}{given(place, quantity.get('unit') or '1', digits=1)}"
+    if ends := _range(quantity):
+        return ends
+    if not half_width:
+        return MISSING
     display = display_unit(quantity.get("unit") or "1", value)
-    return _range(quantity) or with_unit(
-        number(None if not half_width else half_width * display.factor, digits=2), display.symbol
-    )
+    return marked(with_unit(number(half_width * display.factor, digits=2), display.symbol), half_width)
 
 
-def _range(quantity: Record) -> str:
+def _range(quantity: Quantity) -> str:
     """Both ends of a number's interval in its unit; empty where it is about as wide on both sides."""
     value, low, high = (quantity.get(key) for key in ("value", "value_low", "value_high"))
     if value is None or low is None or high is None:
@@ -350,6 +334,7 @@ def _few(limits: tuple[float, float]) -> tuple[float, float] | None:
 def case_view(case: Record) -> Record:
     """Everything that the page shows of one case."""
     studies, tables = case.get("convergence") or [], case.get("tables") or []
+    quantities = list(placed(case.get("quantities") or [], f"verification.{case['id']}.quantities"))
     sequences = [{**_NO_SEQUENCE, **each, "label": _sequence_label(each)} for each in studies]
     falling = [s for s in sequences if s["error"] and all(e is not None and e > 0 for e in s["error"])]
     return {
@@ -360,17 +345,14 @@ def case_view(case: Record) -> Record:
         "verdict": case["verdict"],
         "claim": case.get("claim") or "",
         "why_not_run": case.get("status") or "" if case["verdict"] == "not run" else "",
-        "brief": _in_brief(case),
+        "brief": _in_brief(case, _deciding_quantity(case, quantities)),
         "consequence": case.get("consequence") or "",
         "cause": case.get("cause") or "",
         "rests_on": _rests_on(case),
         "told": {key: case.get(key) for key in _TOLD},
         "mutations": {each["id"]: each for each in case.get("mutations") or []},
         "equations": _equations(case),
-        "rows": [
-            _quantity_row(quantity, f"verification.{case['id']}.quantities.{place}")
-            for place, quantity in enumerate(case.get("quantities") or [])
-        ],
+        "rows": [_quantity_row(quantity) for quantity in quantities],
         "order_plot": _order_plot(case, falling),
         # An error that changes its sign from mesh to mesh, or is rounding, falls at no order.
         "orders": [max(s["observed_order"][-1], 0.0) for s in falling if s["observed_order"]],

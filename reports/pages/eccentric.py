@@ -116,9 +116,11 @@ def _sampled_poles(loops: Sequence[Record]) -> Drawing:
 
 
 def _claims(_own: Record, evidence: Record) -> Record:
-    return {"counts": summary.counted(summary.claims(evidence, paper=evidence["balancer"]))}
+    cases = summary.claims(evidence, paper=BALANCER)
+    return {"counts": summary.verdict_counts(cases, summary.CLAIM_VERDICTS)}
 
 
+BALANCER: Final = "eccentric_mass"
 SECTIONS: Final = (
     Section(
         name="summary",
@@ -156,7 +158,6 @@ SECTIONS: Final = (
 )
 
 
-BALANCER: Final = "eccentric_mass"
 RIVAL: Final = "driven_masses_small"
 """Masses of a size for the liquid-ring paper's rotor."""
 _SPAN: Final = 20.0
@@ -182,11 +183,8 @@ def _compared(work: Work) -> Record | None:
     return {"compared": found.to_dict(), "text": ""}
 
 
-def _second(_own: Record, evidence: Record) -> Record | None:
-    cases = summary.claims(evidence, paper=BALANCER)
-    if not cases:
-        return None
-    return {"counts": summary.counted(cases)}
+def _second(own: Record, evidence: Record) -> Record | None:
+    return _claims(own, evidence) if summary.claims(evidence, paper=BALANCER) else None
 
 
 SECOND_BALANCER: Final = Section(

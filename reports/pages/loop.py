@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import PercentFormatter
 
 from ringbalance.reports.figure import (
-    AMPLITUDE,
     AS_PAPER,
     FOUND,
     MUTED,
-    REGIME_COLOURS,
     TIME,
-    Curve,
     Drawing,
-    amplitudes,
     draw,
 )
 from ringbalance.reports.ring_figures import ring_frames, run_with_injections
@@ -74,19 +70,12 @@ def _settling(found: Record) -> Drawing | None:
     def paint(axes: Axes) -> None:
         for name, each in judged.items():
             look = _SETTINGS[name]
-            time, low, high = each["time_s"], each["low"], each["high"]
-            axes.step(time, 100 * np.asarray(each["value"]), where="post", **look)
-            axes.fill_between(
-                time,
-                100 * np.asarray(low),
-                100 * np.asarray(high),
-                step="post",
-                color=look["color"],
-                alpha=0.2,
-                linewidth=0,
-            )
+            time, value, low, high = (np.array(each[key]) for key in ("time_s", "value", "low", "high"))
+            axes.step(time, value, where="post", **look)
+            axes.fill_between(time, low, high, step="post", color=look["color"], alpha=0.2, linewidth=0)
         asked = (found["recommended"] or found["own"])["asked"]
-        axes.axhline(100 * asked, color=MUTED, linewidth=1, linestyle=":", label="asked")
+        axes.axhline(asked, color=MUTED, linewidth=1, linestyle=":", label="asked")
+        axes.yaxis.set_major_formatter(PercentFormatter(1, symbol=""))
 
     return draw(
         "settling",
@@ -94,7 +83,7 @@ def _settling(found: Record) -> Drawing | None:
         x=TIME,
         y=("settled devices in %", "1"),
         xlim=(0, None),
-        ylim=(0, 105),
+        ylim=(0, 1.05),
         columns=3,
         wide=True,
     )
@@ -106,74 +95,8 @@ LOOP: Final = Section(
 
 
 def _injections(_own: Record, evidence: Record) -> Record:
-    runs = evidence["closed_loop"]
-    if not (run := runs.get("calibrated")):
-        return {"early": None}
-    until = early_time(next(iter(runs.values())))
-    return {
-        "early": _early_amplitude(runs, evidence["limit_m"], until),
-        "fills": fill_ratios(run, until),
-        "regimes": _regimes(run) if run["injections"] else None,
-    }
-
-
-def _early_amplitude(runs: Mapping[str, Record], limit: float, until: float) -> Drawing:
-    """Vibration amplitude within the first operations, m, liquid flowing, under the laws that were run."""
-
-    def of(run: Record, look: dict[str, Any]) -> Curve:
-        early = np.asarray(run["time_s"]) <= until
-        time, values = (np.asarray(run[key])[early] for key in ("time_s", "amplitude_m"))
-        return time, values, {**look, "linewidth": 1.3}
-
-    return draw(
-        "amplitude-early",
-        amplitudes([of(runs[name], look) for name, look in _LAWS.items() if name in runs], limit),
-        x=TIME,
-        y=AMPLITUDE,
-        xlim=(0, until),
-        columns=3,
-    )
-
-
-def _regimes(run: Record) -> Drawing:
-    """The regime of the tube in every gas operation of a run, by chamber and time."""
-    operations, letters = run["injections"], list(run["fill_ratio"])
-    last = max(item["time_s"] + item["duration_s"] for item in operations)
-    least = 0.006 * last
-    named: set[str] = set()
-
-    def bar(axes: Axes, item: Record, regime: str, share: tuple[float, float]) -> None:
-        width = max(item["duration_s"], least)
-        axes.barh(
-            letters.index(item["chamber"]),
-            width * (share[1] - share[0]),
-            left=item["time_s"] + width * share[0],
-            height=0.55,
-            color=REGIME_COLOURS[regime],
-            linewidth=0,
-            label=None if regime in named else regime,
-        )
-        named.add(regime)
-
-    def paint(axes: Axes) -> None:
-        for item in operations:
-            start, end = item["regime"], item.get("regime_end") or item["regime"]
-            parts = [(start, (0.0, 1.0))] if end == start else [(start, (0.0, 0.5)), (end, (0.5, 1.0))]
-            for regime, share in parts:
-                bar(axes, item, regime, share)
-        axes.set_yticks(range(len(letters)), letters)
-
-    return draw(
-        "loop-regimes",
-        paint,
-        x=TIME,
-        y=("gas into chamber", "1"),
-        xlim=(0, 1.02 * (last + least)),
-        ylim=(len(letters) - 0.5, -0.5),
-        columns=4,
-        wide=True,
-        height=1.5 + 0.2 * len(letters),
-    )
+    run = evidence["closed_loop"].get("calibrated")
+    return {"fills": fill_ratios(run, early_time(run)) if run else None}
 
 
 INJECTIONS: Final = Section(

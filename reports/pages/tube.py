@@ -27,7 +27,6 @@ from ringbalance.reports.figure import (
     decade,
     draw,
     level,
-    line,
     logarithmic,
     note,
     upright,
@@ -46,15 +45,12 @@ _REGIME_LINES: Final[dict[str, Record]] = {
     "reverse": {"linestyle": "-."},
     "undecided": {"linestyle": "-", "marker": "x", "markersize": 3.2, "markevery": 5},
 }
-_FAINT: Final = 1e-3
-"""Of the largest term of k, up to which a term is not drawn."""
 
 
 def _tube(_own: Record, evidence: Record) -> Record:
     tube, point = evidence["calibration"]["tube"], evidence["operating_point"]
     return {
         "drag": _drag(tube, point, evidence["paper"]["drag_coefficient"]),
-        "terms": _terms(tube),
         "at": _nearest(tube, point["k_at_velocity_m_s"]),
     }
 
@@ -113,27 +109,6 @@ def _reynolds_axis(per_velocity: float) -> Paint:
         top.xaxis.set_minor_locator(NullLocator())
 
     return paint
-
-
-def _terms(tube: Record) -> Drawing:
-    """What k is made of, term by term, over velocity."""
-    velocity = tube["velocity_m_s"]
-    terms = {name: np.asarray(values) for name, values in tube["terms"].items()}
-    least = _FAINT * max(np.abs(values).max() for values in terms.values())
-    seen = {name: values for name, values in terms.items() if np.abs(values).max() > least}
-    return draw(
-        "drag-terms",
-        logarithmic("x", ticks=_VELOCITY_TICKS),
-        *(
-            curve(velocity, np.where(values > 0, values, np.nan), name.replace("_", " "), **line(index))
-            for index, (name, values) in enumerate(seen.items())
-        ),
-        logarithmic("y"),
-        x=_VELOCITY,
-        y=("contribution to k", "1"),
-        xlim=(velocity[0], velocity[-1]),
-        columns=3,
-    )
 
 
 def _law(_own: Record, evidence: Record) -> Record:

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from ringbalance.reports.judged import settings_lines
+from ringbalance.reports.page import terminal_lines
 from ringbalance.reports.pages.first_page import SECTION, SETTINGS, requirement_record
-from ringbalance.reports.summary import judged_sentences
 from ringbalance.scene import Scene
 from ringbalance.scene.toml import read_toml
 
@@ -37,8 +37,9 @@ def test_the_fraction_of_devices_stands_first(evidence: Record, said: Said) -> N
     page = said(evidence, "summary")
     assert "107 of 128 drawn devices" in page
     assert "an ideal valve" in page
-    told = judged_sentences(recommended(evidence))
-    assert [sentence.rpartition(": ")[2] for sentence in told] == ["not met.", "met."]
+    lines = terminal_lines(recommended(evidence))
+    assert [line.rpartition(": ")[2] for line in lines[:2]] == ["not met.", "met."]
+    assert lines[0].startswith("With the scene’s settings 84\u202f% of 128 drawn devices")
     assert "64 of 64 drawn devices" in said(recommended(evidence), "summary")
 
 

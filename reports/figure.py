@@ -299,7 +299,8 @@ def amplitudes(curves: Iterable[Curve], limit: float) -> Paint:
 def _to_page(text: str, name: str) -> str:
     """Bare svg element: variables for colours and font, ids of its own, no fixed size."""
     body = text[text.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
+    # The page's style sheet has this rule once.
+    body = re.sub(r"<(metadata|style).*?</\1>\s*", "", body, flags=re.DOTALL)
     body = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", body, count=1)
     body = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", body, count=1)
     body = re.sub(r'\bid="', f'id="{name}-', body)

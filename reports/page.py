@@ -197,20 +197,6 @@ def _pictures(record: Record, contents: Mapping[str, bytes]) -> Record:
 _STYLED: Final = re.compile(r'(<(?:path|g|text|tspan|use|rect|line|polyline|image)\b[^>]*?) style="([^"]*)"')
 _PART_ID: Final = re.compile(r'(<(?:path|g|defs|text)\b[^>]*?)( id="([^"]*)")')
 _CLASSES: Final = "/* classes */"
-_SVG: Final = re.compile(r"<svg\b.*?</svg>", re.DOTALL)
-_PART: Final = re.compile(r"(?<=#)([a-z-]+-[a-z][0-9a-f]{10})(?=[\")])")
-_STEP: Final = re.compile(r" ?\b([CLMQz])\b ?")
-_SPARE: Final = (
-    # The page's style sheet has this rule once, and a line here or an unmarked group means nothing.
-    (re.compile(r'<style type="text/css">.*?</style>', re.DOTALL), ""),
-    (re.compile(r"\s*\n\s*"), " "),
-    (re.compile(r"> <"), "><"),
-    (re.compile(r' transform="rotate\(-0 [^"]*"| version="1.1"| xmlns(?::xlink)?="[^"]*"|(?<= )xlink:'), ""),
-    (re.compile(r'(?<= d=")[^"]*'), lambda match: _STEP.sub(r"\1", match[0])),
-    (re.compile(r"<defs></defs>|<g/>"), ""),
-    *((re.compile(r"<g>((?:(?!</?g\b).)*)</g>"), r"\1"),) * 5,
-)
-"""What drawings lose within a page."""
 
 
 def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> dict[str, str]:
@@ -277,7 +263,7 @@ def _page(content: _PageContent, file: str) -> str:
             glyphs=Markup(GLYPHS),
         )
     )
-    return _lean(_share_styles(share_glyphs(page))) + "\n"
+    return _share_styles(share_glyphs(page)) + "\n"
 
 
 class _Numbers:
@@ -308,20 +294,6 @@ def _share_styles(page: str) -> str:
     bare = _STYLED.sub(named, page)
     rules = "".join(f".{name}{{{style}}}" for style, name in names.items())
     return bare.replace(_CLASSES, rules, 1)
-
-
-def _lean(page: str) -> str:
-    """Drawings without what shows nothing, and short names of their parts."""
-    for place, part in enumerate(dict.fromkeys(_PART.findall(page))):
-        page = page.replace(f"#{part}", f"#k{place}").replace(f'id="{part}"', f'id="k{place}"')
-    return _SVG.sub(_spared, page)
-
-
-def _spared(drawing: re.Match[str]) -> str:
-    text = drawing[0]
-    for pattern, short in _SPARE:
-        text = pattern.sub(short, text)
-    return text
 
 
 def _template(name: str) -> str:

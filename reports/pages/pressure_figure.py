@@ -74,7 +74,10 @@ def _shares(panel: Axes, pressure: FloatArray, shares: Sequence[Record], asked: 
 
 
 def _moments(panel: Axes, pressure: FloatArray, levels: Sequence[Record], needed: float) -> None:
-    low, middle, high = _TO_G_MM * np.array([each["usable_moment_kg_m"] for each in levels]).T
+    low, middle, high = (
+        _TO_G_MM
+        * np.array([list(each["usable_moment_kg_m"].values()) for each in levels], dtype=np.float64).T
+    )
     panel.fill_between(pressure, low, high, color=FOUND, alpha=0.25, linewidth=0)
     panel.plot(pressure, middle, color=FOUND)
     panel.axhline(_TO_G_MM * needed, color=PAPER, linestyle="--", linewidth=1)
@@ -95,15 +98,15 @@ def _beside(panel: Axes, level: float, text: str) -> None:
 
 def _times(panel: Axes, pressure: FloatArray, levels: Sequence[Record]) -> None:
     looks: tuple[tuple[str, dict[str, Any]], ...] = (
-        ("half_s", {"color": FOUND, "marker": "o"}),
-        ("most_s", {"color": MUTED, "marker": "s"}),
+        ("p50", {"color": FOUND, "marker": "o"}),
+        ("p90", {"color": MUTED, "marker": "s"}),
     )
     for key, look in looks:
-        times = np.array([each[key][0] if each[key] else np.nan for each in levels])
+        times = np.array([each["settling_time_s"][key] for each in levels], dtype=np.float64)
         panel.plot(pressure, times, markersize=3, **look)
     panel.set(ylim=(0, None))
     _name(panel, "time to settle, in s")
-    if not any(each["half_s"] for each in levels):
+    if not any(each["settling_time_s"]["p50"] is not None for each in levels):
         panel.set_yticks([])
         panel.text(0.5, 0.5, "half of the devices nowhere settle", ha="center", transform=panel.transAxes)
 

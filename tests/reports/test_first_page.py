@@ -28,8 +28,8 @@ def recommended(evidence: Record) -> Record:
     """With other settings under which every drawn device settles."""
     own = evidence["summary"]["own"]
     every = {"value": 1.0, "low": 0.94, "high": 1.0, "count": 64, "of": 64}
-    demands = [{**each, "fraction": every, "verdict": "met"} for each in own["demands"]]
-    better = {**own, "fraction": every, "verdict": "met", "demands": demands}
+    required = [{**each, "fraction": every, "verdict": "met"} for each in own["required"]]
+    better = {**own, "fraction": every, "verdict": "met", "required": required}
     return {**evidence, "summary": {**evidence["summary"], "recommended": better}}
 
 
@@ -67,9 +67,8 @@ def test_the_gas_pressure_is_drawn_where_it_was_tried(evidence: Record) -> None:
     level = {
         "fraction": fraction,
         "verdict": "not met",
-        "half_s": [3.0, 3.1],
-        "most_s": None,
-        "usable_moment_kg_m": [7e-4, 9e-4, 1.1e-3],
+        "settling_time_s": {"p50": 3.0, "p90": None},
+        "usable_moment_kg_m": {"p10": 7e-4, "p50": 9e-4, "p90": 1.1e-3},
     }
     assert view(evidence)["pressure"] is None
     levels = [{**level, "value": pressure} for pressure in (5e5, 6e5, 7e5)]

@@ -60,8 +60,6 @@ def test_the_annex_of_a_fitted_scene_has_it(fitted: dict[str, Any]) -> None:
     assert "1.450 to 1.550" in text
     assert "1.460 to 1.480" in text
     assert "The data identify" in text
-    assert 'id="figure-fitted-intervals"' in section
-    assert 'id="figure-fitted-profiles"' in section
 
 
 @pytest.mark.usefixtures("unwritten")

@@ -11,7 +11,7 @@ import pytest
 
 from ringbalance.reports.figure import NARROW, Drawing
 from ringbalance.reports.pages.loop import LOOP
-from ringbalance.reports.pages.operation import SECTION, _disc_section, _letter_radius, _operating_map
+from ringbalance.reports.pages.operation import SECTION, _disc_section, _operating_map, letter_radius
 from ringbalance.reports.pages.standing import CONDITIONS
 from ringbalance.reports.run_figures import reachable, residual_polar
 from ringbalance.reports.section import Work
@@ -136,5 +136,5 @@ def test_the_loop_s_reach_is_a_vibration(work: Work) -> None:
 @pytest.mark.parametrize("crest", [None, 15.0, 22.0, 31.5, 38.0, 43.0])
 def test_a_chambers_letter_stands_in_its_gas_beside_the_tube(crest: float | None) -> None:
     size = {"inner_radius": 20.0, "free_surface_radius": 40.0}
-    found = _letter_radius(size if crest is None else {**size, "crest_radius": crest})
+    found = letter_radius(size if crest is None else {**size, "crest_radius": crest})
     assert min(found - 20.0, 40.0 - found, abs(found - (crest or 0.0))) >= 5.0

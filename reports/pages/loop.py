@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from itertools import groupby
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import PercentFormatter
+from matplotlib.patches import Wedge
+from matplotlib.ticker import FuncFormatter, PercentFormatter
 
 from ringbalance.reports.figure import (
     AS_PAPER,
     FOUND,
+    INK,
+    MAP,
     MUTED,
+    SURFACE,
     TIME,
     Drawing,
+    amplitudes,
     draw,
+    panels,
+    plain_number,
 )
-from ringbalance.reports.ring_figures import ring_frames, run_with_injections
+from ringbalance.reports.prose import series
 from ringbalance.reports.run_figures import early_time, fill_ratios, residual_polar
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import is_papers
+from ringbalance.results.numbers import shown
 
 _SETTINGS: Final[dict[str, dict[str, Any]]] = {
     "own": {**AS_PAPER, "label": "the scene’s settings"},
@@ -29,6 +40,12 @@ _LAWS: Final[dict[str, dict[str, Any]]] = {
     "calibrated": {"color": FOUND, "label": "the calibrated law"},
     "paper": {**AS_PAPER, "label": "the paper’s law"},
 }
+_REST: Final = 0.6
+"""Fraction of a run up to which its injections are drawn apart from the rest of it."""
+_LETTERED: Final = 14
+"""Most injections that are lettered."""
+_FRAMES: Final = 7
+"""Rings side by side at the most."""
 
 
 def _reach(work: Work) -> Record:
@@ -47,8 +64,8 @@ def _loop(own: Record, evidence: Record) -> Record:
     run = runs.get("calibrated")
     disc = (evidence.get("operation") or {}).get("disc")
     return {
-        "amplitude": run_with_injections(runs, _LAWS, limit) if runs else None,
-        "rings": ring_frames(run, disc) if run and disc else None,
+        "amplitude": _amplitude(runs, limit) if runs else None,
+        "rings": _rings(run, disc) if run and disc else None,
         "laws": list(runs),
         "polar": residual_polar(run, own) if run and own else None,
         "settling": _settling(evidence.get("summary") or {}),
@@ -59,6 +76,105 @@ def _drawn_runs(evidence: Record) -> dict[str, Record]:
     """By law, the calibrated one first; the paper's law is compared on the paper's own disc alone."""
     runs = evidence["closed_loop"]
     return {law: runs[law] for law in _LAWS if law in runs and (law != "paper" or is_papers(evidence))}
+
+
+def injections_until(run: Record) -> float:
+    """End of the last injection, s; of the run where there is none."""
+    ends = [item["time_s"] + item["duration_s"] for item in run["injections"]]
+    return float(max(ends, default=run["time_s"][-1]))
+
+
+def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
+    """Vibration amplitude over whole runs, with every injection of the first one.
+
+    Where a long rest follows the injections it has an axis of its own.
+    """
+    end = max(float(run["time_s"][-1]) for run in runs.values())
+    early = 1.15 * max(map(injections_until, runs.values()))
+    parts = {(0.0, end): (0.09, 0.15, 0.89, 0.68)}
+    if 0 < early < _REST * end:
+        parts = {(0.0, early): (0.09, 0.15, 0.6, 0.68), (early, end): (0.72, 0.15, 0.26, 0.68)}
+    curves = [(run["time_s"], 1e6 * np.asarray(run["amplitude_m"]), _LAWS[law]) for law, run in runs.items()]
+
+    def paint(axes: Axes) -> None:
+        first, *others = drawn = panels(axes, *parts.values())
+        for panel, span in zip(drawn, parts, strict=True):
+            amplitudes(curves, 1e6 * limit)(panel)
+            panel.set(xlim=span, xlabel="time in s")
+            panel.xaxis.set_major_formatter(FuncFormatter(plain_number))
+        for panel in others:
+            panel.tick_params(labelleft=False)
+        first.set_ylabel("amplitude, zero to peak, in µm")
+        _mark_injections(first, next(iter(runs.values()))["injections"])
+        for look in (*(_LAWS[law] for law in runs), {"color": MUTED, "linestyle": ":", "label": "limit"}):
+            axes.plot([], [], **look)
+
+    return draw("amplitude", paint, columns=3, wide=True, height=3.6)
+
+
+def _mark_injections(panel: Axes, injections: Sequence[Record]) -> None:
+    """A stroke at the top for the time that each keeps its valve open, and the chambers' letters."""
+    along, groups = panel.get_xaxis_transform(), _together(injections)
+    for start, end, letters in groups:
+        panel.plot((start, end), (1.0, 1.0), color=INK, linewidth=3, transform=along, clip_on=False)
+        panel.axvline(start, color=MUTED, linewidth=0.5, alpha=0.6)
+        if len(groups) <= _LETTERED:
+            panel.text(start, 1.02, "".join(letters), ha="center", va="bottom", transform=along)
+
+
+def _together(injections: Sequence[Record]) -> list[tuple[float, float, list[str]]]:
+    """When valves open together, when the last of them closes, s, and their chambers."""
+    groups = [list(items) for _, items in groupby(injections, key=lambda item: item["time_s"])]
+    return [
+        (
+            float(items[0]["time_s"]),
+            max(float(item["time_s"] + item["duration_s"]) for item in items),
+            sorted(item["chamber"] for item in items),
+        )
+        for items in groups
+    ]
+
+
+def frames_of(run: Record) -> list[tuple[str, float]]:
+    """Titles and times, s, of the start, the first injections and the end."""
+    last = float(run["time_s"][-1])
+    after = [
+        (f"{series(letters)}, {shown(start, 's', digits=2)}", min(end, last))
+        for start, end, letters in _together(run["injections"])[: _FRAMES - 2]
+    ]
+    return [("start", 0.0), *after, ("end", last)]
+
+
+def _rings(run: Record, disc: Record) -> Drawing:
+    """The ring at the start, after the first injections and at the end, as the shaft sees it: each chamber
+    with its liquid, drawn as a sector between the radii that its fill takes."""
+    frames = frames_of(run)
+    width = 1 / len(frames)
+
+    def at(time: float, values: Sequence[float]) -> float:
+        return float(np.interp(time, run["time_s"], values))
+
+    def paint(axes: Axes) -> None:
+        boxes = [(place * width + 0.004, 0.0, width - 0.008, 0.76) for place in range(len(frames))]
+        for panel, (title, time) in zip(panels(axes, *boxes), frames, strict=True):
+            _ring(panel, {letter: at(time, fills) for letter, fills in run["fill_ratio"].items()}, disc)
+            left = shown(at(time, run["amplitude_m"]), "m", digits=2)
+            panel.set_title(f"{title}\n{left}", color=INK, fontsize="small")
+
+    return draw("ring-frames", paint, columns=0, wide=True, height=1.15 + 6.6 / max(len(frames), 4) * 0.9)
+
+
+def _ring(panel: Axes, fills: dict[str, float], disc: Record) -> None:
+    outer, inner, half = disc["outer_radius_m"], disc["inner_radius_m"], 180 / disc["chambers"]
+    for place, (letter, fill) in enumerate(fills.items()):
+        ends = ((2 * place - 1) * half, (2 * place + 1) * half)
+        depth = outer - math.sqrt(outer**2 - fill * (outer**2 - inner**2))
+        for thick, colour in ((outer - inner, SURFACE), (depth, MAP[8])):
+            panel.add_patch(Wedge((0, 0), outer, *ends, width=thick, facecolor=colour, edgecolor=INK))
+        at = 0.55 * inner * np.exp(1j * math.radians(2 * half * place))
+        panel.text(at.real, at.imag, letter, ha="center", va="center", color=MUTED, fontsize="small")
+    panel.set(xlim=(-1.05 * outer, 1.05 * outer), ylim=(-1.05 * outer, 1.05 * outer), aspect="equal")
+    panel.set_axis_off()
 
 
 def _settling(found: Record) -> Drawing | None:

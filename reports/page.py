@@ -21,6 +21,8 @@ from PIL import Image
 from ringbalance.reduced_model.calibration_record import UNSTATED
 from ringbalance.reports import summary
 from ringbalance.reports.figure import DARK, LIGHT, Drawing
+from ringbalance.reports.pages.cases import FILTERS as QUANTITY_FILTERS
+from ringbalance.reports.pages.cases import deciding
 from ringbalance.reports.prose import (
     GLYPHS,
     equation_svg,
@@ -114,13 +116,18 @@ def page_content(
     """
     views = views_of(evidence) if views is None else views
     sections, of_cases = numbered(evidence, views), views[CASES_VIEW] or {}
+    cases = {
+        case["id"]: {
+            **of_cases[case["id"]],
+            "quantities": placed(case.get("quantities") or [], f"{CASES_VIEW}.{case['id']}.quantities"),
+            # Claims on eccentric masses are all judged on a rotor of their own.
+            "elsewhere": case.get("paper") != "eccentric_mass" and summary.elsewhere(case, evidence),
+        }
+        for case in evidence[CASES_VIEW]
+    }
     by_paper = {
-        paper: [
-            {**of_cases[case["id"]], "elsewhere": foreign and summary.elsewhere(case, evidence)}
-            for case in summary.claims(evidence, paper=paper)
-        ]
-        # Claims on eccentric masses are all judged on a rotor of their own.
-        for paper, foreign in (("liquid_ring", True), ("eccentric_mass", False))
+        paper: [cases[case["id"]] for case in summary.claims(evidence, paper=paper)]
+        for paper in ("liquid_ring", "eccentric_mass")
     }
     balancer = evidence["balancer"]
     context = {
@@ -128,7 +135,7 @@ def page_content(
         "sections": sections,
         "claims_by_paper": by_paper,
         "claims": by_paper.get(balancer, []),
-        "checks": [of_cases[case["id"]] for case in summary.checks(evidence)],
+        "checks": [cases[case["id"]] for case in summary.checks(evidence)],
         "tallies": summary.tallies(evidence),
         "causes": summary.common_causes(summary.claims(evidence, paper=balancer)),
         "equations": _equations(),
@@ -242,8 +249,9 @@ def _environment() -> jinja2.Environment:
         "paths_named": paths_named,
         "usual_name": usual_name,
         **FILTERS,
+        **QUANTITY_FILTERS,
     }
-    environment.globals |= {"table_of": table_of, "listing_of": listing_of}
+    environment.globals |= {"table_of": table_of, "listing_of": listing_of, "deciding": deciding}
     environment.tests |= {"verdict": summary.is_verdict}
     return environment
 

@@ -90,7 +90,7 @@ def test_the_settings_are_a_block_of_the_scene_file(paper_scene: Scene) -> None:
 def test_a_chamber_that_runs_dry_is_a_warning(evidence: Record, said: Said) -> None:
     assert "chamber dry" not in said(evidence, "summary")
     evidence["closed_loop"]["calibrated"]["injections"][0]["event"] = "empty"
-    assert "1 injection runs its chamber dry (A)" in said(evidence, "summary")
+    assert "One injection runs its chamber dry (A)" in said(evidence, "summary")
     evidence["closed_loop"]["calibrated"]["gas"] = {
         "warning": "3 injections ran their chamber dry: up to 2 normal litres",
         "normal_litres": 12.3,

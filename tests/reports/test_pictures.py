@@ -83,16 +83,6 @@ def test_without_opengl_nothing_is_started(tmp_path: Path, paper_scene: Scene) -
     drawing.stop()
 
 
-def test_captions_follow_the_scene(tmp_path: Path, paper_scene: Scene) -> None:
-    plain = dataclasses.replace(paper_scene, tube=dataclasses.replace(paper_scene.tube, hump_radius=None))
-    for scene, said in ((paper_scene, "radius of 31.5\u202fmm"), (plain, "straight across")):
-        drawing = start_drawing(scene=scene, fields={}, folder=tmp_path, opengl=NO_OPENGL)
-        alt, caption = drawing.captions["disc"]
-        assert said in alt
-        assert said in caption
-        assert "A to D" in alt
-
-
 def test_plot_without_opengl_writes_the_fields(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

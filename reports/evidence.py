@@ -47,7 +47,7 @@ from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult, merge_saved
-from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
+from ringbalance.verification.runner import cases_under_way, paper_scene
 
 Progress = Callable[[str], None]
 
@@ -157,13 +157,7 @@ def _cases_of_report(
     Yields: What waits for them, to be called in the body: records of all cases, and the date of each that an
     earlier report has kept.
     """
-    ring = ring_of(scene)
-    # A ring's report has the claims about the other balancer only where everything is asked for.
-    ids = [
-        case.id
-        for case in load_cases()
-        if (case.paper == scene.balancer if ring is None else level == "heavy" or case.paper != DRIVEN)
-    ]
+    ids = [case.id for case in load_cases() if case.paper == scene.balancer]
     kept = kept_cases() if level == "light" else {}
     wanted = [name for name in ids if name not in kept]
 
@@ -178,7 +172,7 @@ def _cases_of_report(
         yield partial(finished, iter(()))
         return
     options: Record = {"level": level, "mutations": level == "heavy", "workers": pool}
-    with cases_under_way(wanted, scene=ring or paper_scene(), **options) as under_way:
+    with cases_under_way(wanted, scene=ring_of(scene) or paper_scene(), **options) as under_way:
         yield partial(finished, under_way)
 
 

@@ -125,19 +125,14 @@ def page_content(
         }
         for case in evidence[CASES_VIEW]
     }
-    by_paper = {
-        paper: [cases[case["id"]] for case in summary.claims(evidence, paper=paper)]
-        for paper in ("liquid_ring", "eccentric_mass")
-    }
-    balancer = evidence["balancer"]
+    claims = summary.claims(evidence)
     context = {
         **_frame(evidence),
         "sections": sections,
-        "claims_by_paper": by_paper,
-        "claims": by_paper.get(balancer, []),
+        "claims": [cases[case["id"]] for case in claims],
         "checks": [cases[case["id"]] for case in summary.checks(evidence)],
         "tallies": summary.tallies(evidence),
-        "causes": summary.common_causes(summary.claims(evidence, paper=balancer)),
+        "causes": summary.common_causes(claims),
         "equations": _equations(),
         "pictures": _pictures(evidence["pictures"], pictures or {}),
     }

@@ -54,7 +54,6 @@ SECTIONS: Final[tuple[Section, ...]] = (
     loop.INJECTIONS,
     consequences.SECTION,
     CASES,
-    eccentric.SECOND_BALANCER,
     Section(name="numerics", title="Numerical verification"),
     studies.EXTREMES,
     studies.TRADE,

@@ -36,14 +36,10 @@ def tone(verdict: str) -> str:
     return _TONES.get(verdict, "open")
 
 
-def claims(evidence: Record, *, paper: str = "liquid_ring") -> list[Record]:
-    """Cases that judge one paper, in its order."""
-    found = [
-        case
-        for case in evidence["verification"]
-        if case["kind"] == "claim" and case.get("paper", "liquid_ring") == paper
-    ]
-    return sorted(found, key=lambda case: (case.get("number") or math.inf, case["id"]))
+def claims(evidence: Record) -> list[Record]:
+    """Cases that judge the paper of the balancer, in its order."""
+    cases = [case for case in evidence["verification"] if case["kind"] == "claim"]
+    return sorted(cases, key=lambda case: (case.get("number") or math.inf, case["id"]))
 
 
 def checks(evidence: Record) -> list[Record]:
@@ -94,5 +90,5 @@ def elsewhere(case: Record, evidence: Record) -> bool:
 
 def is_papers(evidence: Record) -> bool:
     """Whether the scene is the one that its paper's claims are judged on."""
-    cases = claims(evidence, paper=evidence["balancer"])
+    cases = claims(evidence)
     return bool(cases) and not any(elsewhere(case, evidence) for case in cases)

@@ -27,7 +27,7 @@ from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
-from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
+from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reports.pictures.fields import chamber_field
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene, provenance, versions
@@ -127,24 +127,16 @@ def _ring_study(scene: Scene, tell: Progress) -> Record:
     models = {"calibrated": calibration.model, "paper": paper_model(scene)}
     return {
         "limit_m": scene.controller.limit,
-        "paper": _paper(),
+        "paper": {
+            "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
+            "lambda_m": paper.PAPER_LAMBDA,
+            "lambda_spread": papers.LAMBDA_TOLERANCE,
+        },
         "operating_point": _operating_point(scene, calibration),
         "pressure": {"profile": field.pressure_profile(scene=scene), "mesh": field.record},
         "calibration": calibration_document(calibration),
         "flow_law": _flow_law(scene, calibration),
         "closed_loop": {name: simulate(scene, model).to_dict() for name, model in models.items()},
-    }
-
-
-def _paper() -> Record:
-    """What the paper says, for comparison."""
-    low, high = papers.LOWEST_PRESSURE, papers.HIGHEST_PRESSURE
-    return {
-        "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
-        "lambda_m": paper.PAPER_LAMBDA,
-        "lambda_spread": papers.LAMBDA_TOLERANCE,
-        "working_range_Pa": [low.value, high.value],
-        "figure_4_pressures_Pa": [papers.LOW_PRESSURE, papers.HIGH_PRESSURE],
     }
 
 
@@ -206,19 +198,19 @@ def _operating_point(scene: Scene, calibration: Calibration) -> Record:
         opposite_fill_ratio=record["fill_ratio"],
         gas_pressure=scene.gas.pressure,
     )
+    budgets = calibration.budgets
+
+    def total(name: str) -> float | None:
+        return budgets[name].total if name in budgets else None
+
     return record | {
         "reynolds": reynolds,
         "flow_state": str(np.asarray(tube.flow_state)[nearest]),
         "velocity_paper_m_s": float(by_paper.velocity),
-        "priming_uncertainty": _total(calibration, "priming_pressure_vented"),
-        "stall_uncertainty": _total(calibration, "stall_pressure"),
+        # None where a quantity has no budget.
+        "priming_uncertainty": total("priming_pressure_vented"),
+        "stall_uncertainty": total("stall_pressure"),
     }
-
-
-def _total(calibration: Calibration, quantity: str) -> float | None:
-    """Expanded uncertainty (95 %) of a quantity; None where it has no budget."""
-    budget = calibration.budgets.get(quantity)
-    return None if budget is None else budget.total
 
 
 def _flow_law(scene: Scene, calibration: Calibration) -> Record:
@@ -227,23 +219,17 @@ def _flow_law(scene: Scene, calibration: Calibration) -> Record:
     pressures = drawn if scene.gas.pressure in drawn else [scene.gas.pressure, 2 * scene.gas.pressure]
     fill = np.linspace(0.0, scene.disc.max_fill_ratio, LAW_POINTS)
 
-    def rows(law: FlowLaw) -> Record:
-        flow = law.evaluate(fill_ratio=fill[None, :], gas_pressure=np.array(pressures)[:, None])
-        return {
-            "velocity": flow.velocity.tolist(),
-            "uncertainty": flow.uncertainty.tolist(),
-            "regime": [[Regime(int(value)).label for value in row] for row in flow.regime],
-        }
-
-    found, printed = rows(calibration.flow_law), rows(calibration.paper_law)
+    found, printed = (
+        law.evaluate(fill_ratio=fill[None, :], gas_pressure=np.array(pressures)[:, None])
+        for law in (calibration.flow_law, calibration.paper_law)
+    )
     return {
         "gas_pressure_Pa": pressures,
         "fill_ratio": fill.tolist(),
-        "velocity_m_s": found["velocity"],
-        "velocity_uncertainty": found["uncertainty"],
-        "regime": found["regime"],
-        "velocity_paper_m_s": printed["velocity"],
-        "regime_paper": printed["regime"],
+        "velocity_m_s": found.velocity.tolist(),
+        "velocity_uncertainty": found.uncertainty.tolist(),
+        "regime": [[Regime(int(value)).label for value in row] for row in found.regime],
+        "velocity_paper_m_s": printed.velocity.tolist(),
     }
 
 

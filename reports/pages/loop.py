@@ -55,7 +55,6 @@ def _reach(work: Work) -> Record:
         "pairs": scene.disc.chambers // 2,
         "vibration_m": moment * scene.rotor.influence_coefficient,
         "direction_rad": -scene.rotor.lag_angle,
-        "time_limit_s": scene.run.time_limit,
     }
 
 

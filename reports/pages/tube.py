@@ -32,7 +32,7 @@ from ringbalance.reports.figure import (
     upright,
 )
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.results.numbers import given, shown
+from ringbalance.results.numbers import given
 from ringbalance.scene.arrays import stretches
 from ringbalance.scene.models import Scene
 
@@ -125,9 +125,7 @@ def _flow_law(law: Record, row: int) -> Drawing:
     return draw(
         f"flow-law-{row}",
         curve(fill, law["velocity_paper_m_s"][row], "Eq. 19", **AS_PAPER),
-        lambda axes: axes.fill_between(
-            fill, np.maximum(velocity - width, 0), velocity + width, color=FOUND, alpha=0.2, linewidth=0
-        ),
+        curve(fill, velocity, band=width, color=FOUND, linewidth=0),
         *(
             curve(
                 fill[part],
@@ -224,7 +222,6 @@ def _path_figure(states: list[Record]) -> Drawing:
         *(part for state in states for part in _path(state)),
         level(cavity, "cavity pressure", color=MUTED, linewidth=1, linestyle=(0, (5, 2))),
         upright(crest, color=MUTED, linewidth=0.8, linestyle=":"),
-        *_margin(states, crest),
         note("siphon crest", (crest, top), (5, -9)),
         x=("path along the tube from the driven chamber", "m"),
         y=("gauge pressure", "Pa"),
@@ -245,32 +242,6 @@ def _path(state: Record) -> list[Paint]:
         parts.append(curve(path[part], pressure[part], label if full else None, **look))
         label = None if full else label
     return parts
-
-
-def _margin(states: list[Record], crest: float) -> list[Paint]:
-    """The first siphon's margin at the crest, as an arrow with its size."""
-    siphons = [s for s in states if s["regime"] == "siphon" and s["margin_Pa"] is not None]
-    return [
-        paint
-        for state in siphons[:1]
-        for paint in (
-            note(
-                f"margin {shown(state['margin_Pa'], 'Pa', digits=2)}",
-                (crest, state["hump_pressure_Pa"]),
-                (10, 26),
-                color=FOUND,
-                arrowprops={"arrowstyle": "-", "color": FOUND, "linewidth": 0.7},
-            ),
-            curve(
-                [crest] * 2,
-                [state["cavity_pressure_Pa"], state["hump_pressure_Pa"]],
-                color=FOUND,
-                linewidth=3,
-                alpha=0.6,
-                solid_capstyle="butt",
-            ),
-        )
-    ]
 
 
 TUBE: Final = Section(name="tube", title="The connecting tube", show=_tube)

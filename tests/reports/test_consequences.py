@@ -53,5 +53,5 @@ def test_claims_judged_on_another_disc_are_distinguished(evidence: Record) -> No
     marked["scene_sha256"] = "0" * 64
     assert summary.elsewhere(marked, changed)
     assert summary.tallies(changed)["claims_elsewhere"] == 1
-    assert "1 of them hold for the paper’s own disc alone" in render(changed)["report.html"]
+    assert "1 of them hold for the paper’s own disc alone" in "".join(render(changed).values())
     assert "Judged on the paper’s disc" in render(changed)["annex.html"]

@@ -39,7 +39,7 @@ def test_the_fraction_of_devices_stands_first(evidence: Record, said: Said) -> N
     assert "an ideal valve" in page
     lines = terminal_lines(recommended(evidence))
     assert [line.rpartition(": ")[2] for line in lines[:2]] == ["not met.", "met."]
-    assert lines[0].startswith("With the scene’s settings 84\u202f% of 128 drawn devices")
+    assert lines[0].startswith("With the scene’s settings 84 % of 128 drawn devices")
     assert "64 of 64 drawn devices" in said(recommended(evidence), "summary")
 
 

@@ -69,7 +69,7 @@ def _masses(scene: EccentricScene, run: EccentricRun) -> list[Drawing]:
     document, locked = run.to_dict(), locked_run(scene).to_dict()
     return [
         over_time(document, locked),
-        *([run_up(document, locked, rotor_record(scene))] if run.speed.max() > run.speed.min() else []),
+        *(run_up(document, locked, rotor_record(scene)) if run.speed.max() > run.speed.min() else []),
         mass_angles(document),
         imbalance_estimate(document, scene.imbalance.mass * scene.imbalance.radius),
         friction_estimates(document, scene.masses.friction_arm),
@@ -185,6 +185,8 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
 def _number_samples(panel: Axes, run: Record, span: float) -> None:
     """Of the first samples of the controller their numbers, from one on, where they stand apart."""
     times = run.get("samples", {"time_s": []})["time_s"][:_NUMBERED]
+    if not times:
+        return
     sizes = _MICROMETRE * np.interp(times, run["time_s"], run["amplitude_m"])
     phases = np.interp(times, run["time_s"], np.unwrap(run["phase_rad"]))
     places = sizes * np.exp(1j * phases)

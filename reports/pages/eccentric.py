@@ -34,7 +34,7 @@ def _run(_own: Record, evidence: Record) -> Record:
     varies = max(run["speed_rad_s"]) > min(run["speed_rad_s"])
     ends = np.interp([stage["end_s"] for stage in run["stages"]], run["time_s"], run["amplitude_m"])
     return {
-        "over_speed": run_up(run, locked, evidence["rotor"], evidence["drawn"]) if varies else None,
+        "over_speed": run_up(run, locked, evidence["rotor"], evidence["drawn"]) if varies else [],
         "over_time": over_time(run, locked, evidence["drawn"]),
         "stages": [{"place": place, "amplitude_m": float(end)} for place, end in enumerate(ends)],
     }

@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench bench-cfd dist lock clean
+.PHONY: help env report test test-faults test-heavy test-short test-versions lint format bench bench-cfd docs dist lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -24,7 +24,7 @@ env: ## make .venv from requirements/lock.txt and see to off-screen OpenGL; noth
 	@sh tools/make_env.sh $(VENV) requirements/lock.txt
 	@sh tools/make_opengl.sh "$(CURDIR)/$(PYTHON_IN_VENV)"
 	@# Where Python may not write bytecode, the program would be compiled again at every start.
-	@$(PYTHON_IN_VENV) -m compileall -q ringbalance ringbalance/*/
+	@$(PYTHON_IN_VENV) -m compileall -q ringbalance $(CODE)
 
 report: env ## the report on SCENE (the paper's disc) into OUT (out/)
 	$(VENV)/bin/ringbalance report $(SCENE) --out $(OUT)
@@ -64,6 +64,10 @@ bench: env ## timed comparisons, each a ratio within one run
 bench-cfd: env ## the tube and the waves beside OpenFOAM, an hour or so; keeps the results
 	@sh tools/make_openfoam.sh
 	$(PYTHON_IN_VENV) benchmarks/openfoam.py --keep
+
+docs: env ## the site of the documentation into build/site/, with every warning an error
+	$(PYTHON_IN_VENV) -m sphinx -q -W --keep-going -c docs . build/site
+	@echo "open build/site/index.html"
 
 dist: env ## source distribution and wheel of the last commit into dist/, the same bytes every time
 	$(PYTHON_IN_VENV) tools/make_dist.py

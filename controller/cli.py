@@ -8,12 +8,14 @@ from typing import Literal
 
 from ringbalance.controller.balancer import balancer_of, balancer_under, takes
 from ringbalance.controller.compare import compare as compare_balancers
+from ringbalance.controller.judging.tune import tuned
 from ringbalance.results.requirements import MET
+from ringbalance.results.result import print_rows
 from ringbalance.scene.changes import file_text
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.terminal import activity, results_console
+from ringbalance.scene.platform.terminal import activity
 
 
 def tune(
@@ -52,13 +54,13 @@ def tune(
         check_file(save, apart_from=scene)
     balancer = balancer_under(law, with_tolerance(load_scene(scene), tolerance=tolerance, models=models))
     with activity("tune", "runs ...") as shown:
-        found = balancer.recommend(pressure=pressure, remedies=remedies or None, progress=shown.show)
+        found = tuned(balancer, along=pressure, remedies=remedies or None, progress=shown.show)
     if save is not None:
         write_whole(save, file_text(found.recommended_scene, to=save.parent))
     if json:
         print(json_format.dumps(found.to_dict(), allow_nan=False))
     else:
-        results_console().print(found.rows().view())
+        print_rows(found.rows())
     return 0 if found.succeeded else 1
 
 
@@ -101,5 +103,5 @@ def compare(
     if json:
         print(json_format.dumps(found.to_dict(), allow_nan=False))
     else:
-        results_console().print(found.rows().view(headline=False))
+        print_rows(found.rows(), headline=False)
     return 0 if set(found.verdicts) == {MET} else 1

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Final
 
 from ringbalance.controller.balancer import AS_GIVEN, Run, balancer_under
-from ringbalance.results.result import csv_text
+from ringbalance.results.result import csv_text, print_rows
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import AnyScene, Models, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.terminal import Activity, activity, results_console
+from ringbalance.scene.platform.terminal import Activity, activity
 
 SETTLED: Final = 0
 NOT_SETTLED: Final = 1
@@ -55,8 +55,7 @@ def simulate(
     check_output("--plot", plot, ".svg")
     told = _with_seed(with_tolerance(load_scene(scene), tolerance=tolerance, models=models), seed)
     balancer = balancer_under(law, told)
-    # The first run on a machine compiles for ten to twenty seconds; later ones take the code that is kept.
-    with activity("simulate", "closed loop (the first run compiles) ...") as shown:
+    with activity("simulate", "closed loop ...") as shown:
         outcomes = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown))
         run, met = outcomes.traced[0].run, all(each.met(outcomes).all() for each in balancer.demands())
         document = run.to_dict() if json else {}
@@ -68,7 +67,7 @@ def simulate(
     if json:
         print(json_format.dumps(document, allow_nan=False))
     else:
-        results_console().print(balancer.rows(run).view())
+        print_rows(balancer.rows(run))
     return SETTLED if run.settled and met else NOT_SETTLED
 
 

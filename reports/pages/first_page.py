@@ -11,6 +11,7 @@ from matplotlib.patches import Patch
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -81,7 +82,7 @@ _SHADES: Final = {MET: 0.28, OPEN: 0.1}
 
 def _collect(work: Work) -> Record:
     scene, balancer = work.ring, LiquidRingBalancer(work.ring)
-    tuning = balancer.recommend(pressure=True, remedies=None)
+    tuning = tuned(balancer, along=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
     return {
         "limit_m": balancer.limit,

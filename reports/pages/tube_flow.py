@@ -15,7 +15,8 @@ from ringbalance.physics.tube.loss import FlowState, tube_loss
 from ringbalance.reports.figure import INK, MAP, MUTED, Axis, Drawing, Paint, draw, figure_of, plain_number
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.navier_stokes.flow_fields import EndFlow, SectionFlow
+from ringbalance.verification.navier_stokes.flow_fields import FlowField, end_field, section_field
+from ringbalance.verification.navier_stokes.tube import End
 
 _LARGEST: Final = 500.0
 """Re up to which a flow is drawn: beyond, a laminar one is thin layers that no picture shows."""
@@ -26,7 +27,7 @@ _FLOW_THROUGH: Final = 1 / 8
 _LINES: Final = _FLOW_THROUGH * np.linspace(0, 1, 7)[1:-1] ** 2
 _REACH: Final = 1.5
 """Of the picture of an end about the axis of the tube, over d."""
-_WINDOWS: Final = {"entrance": (-1.5, 3.5), "exit": (-1.5, 5.0)}
+_WINDOWS: Final[dict[End, tuple[float, float]]] = {"entrance": (-1.5, 3.5), "exit": (-1.5, 5.0)}
 _BESIDE: Final = 0.94
 """in, of a figure's height, for its axis and its colour bar."""
 _ALONG: Final = 2.9
@@ -41,8 +42,9 @@ def _collect(work: Work) -> Record | None:
     loss = tube_loss(scene, speed)
     reynolds = float(loss.reynolds)
     drawn = min(reynolds, _LARGEST)
-    section = SectionFlow.of(reynolds=drawn, rotation_reynolds=loss.rotation_reynolds * drawn / reynolds)
-    ends = {"entrance": EndFlow.entrance(reynolds=drawn), "exit": EndFlow.exit(reynolds=drawn)}
+    section = section_field(reynolds=drawn, rotation_reynolds=loss.rotation_reynolds * drawn / reynolds)
+    ends = {name: end_field(name, reynolds=drawn) for name in _WINDOWS}
+    drift, centre = section.velocity[:2], np.argmin(np.hypot(*section.points))
     laminar = bool(loss.flow_state == FlowState.LAMINAR)
     return {
         "drawn": "not laminar" if not laminar else "as it is" if drawn == reynolds else "too fast",
@@ -50,18 +52,18 @@ def _collect(work: Work) -> Record | None:
         "rotation_reynolds": loss.rotation_reynolds,
         "laminar": laminar,
         "section": {
-            **_field(section, section.axial_velocity),
+            **_field(section, section.velocity[2]),
             "rotation_reynolds": section.rotation_reynolds,
             "friction_ratio": section.friction_ratio,
             "friction_change": section.friction_ratio - 1,
-            "largest_drift": float(np.hypot(*section.velocity).max()),
-            "core_goes": float(np.sign(section.velocity[0, np.argmin(np.hypot(*section.points))])),
+            "largest_drift": float(np.hypot(*drift).max()),
+            "core_goes": float(np.sign(drift[0, centre])),
         },
-        **{name: _field(end, end.speed) for name, end in ends.items()},
+        **{name: _field(end, np.hypot(*end.velocity)) for name, end in ends.items()},
     }
 
 
-def _field(flow: SectionFlow | EndFlow, colour: FloatArray) -> Record:
+def _field(flow: FlowField, colour: FloatArray) -> Record:
     return {
         "reynolds": flow.reynolds,
         "points": _packed(flow.points),
@@ -102,7 +104,7 @@ def _section(record: Record) -> Drawing:
     return _drawing("section", paint, (-0.53, 0.53), (-0.53, 0.53), along, ("y/d", "1"))
 
 
-def _end(record: Record, name: str) -> Drawing:
+def _end(record: Record, name: End) -> Drawing:
     """Speed in colour and streamlines where liquid enters or leaves the tube."""
     x, r = _unpacked(record, "points").reshape(2, -1)
     left, right = max(x.min(), _WINDOWS[name][0]), min(x.max(), _WINDOWS[name][1])

@@ -190,5 +190,8 @@ def test_a_dense_liquid_starts_at_just_its_starting_pressure(
 def test_the_bore_for_fifty_has_fifty(calibration: Calibration, liquids: dict[str, dict[str, Any]]) -> None:
     oil = liquid_at(name="silicone oil 50 cSt", temperature=298.15)
     tube = replace(calibration.scene.tube, bore=liquids[oil.name]["bore_for_paper_m"])
-    asked = with_scene(calibration, replace(calibration.scene, tube=tube))
+    # At equal head: the bore is for the same p/rho.
+    head = calibration.scene.gas.pressure / calibration.scene.liquid.density
+    gas = replace(calibration.scene.gas, pressure=head * oil.density)
+    asked = with_scene(calibration, replace(calibration.scene, tube=tube, gas=gas))
     assert liquids_in_tube(asked, [oil])[1]["k"] == pytest.approx(50, rel=2e-3)

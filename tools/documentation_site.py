@@ -1,0 +1,59 @@
+"""What the site needs beside Sphinx: order of pages, equations, first page. An extension of docs/conf.py."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+from typing import Any, Final
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from typesetting import typeset
+
+LIST_OF_PAGES: Final = "docs/README"
+_SECTION: Final = re.compile(r"^## (.+?)\n(.*?)(?=^## |\Z)", re.DOTALL | re.MULTILINE)
+_ENTRY: Final = re.compile(r"^\* \[[^\]]+\]\(([^)]+)\.md\)", re.MULTILINE)
+
+
+def toctrees(page: str) -> str:
+    """The lists of a page of links as hidden tables of contents, one a section."""
+    return "".join(
+        f"\n```{{toctree}}\n:hidden:\n:caption: {title}\n\n{chr(10).join(_ENTRY.findall(body))}\n```\n"
+        for title, body in _SECTION.findall(page)
+        if _ENTRY.search(body)
+    )
+
+
+def add_order(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Let Sphinx read the order of the pages where a reader does: in docs/README.md."""
+    if docname == app.config.root_doc:
+        pages = Path(app.srcdir, f"{LIST_OF_PAGES}.md").read_text(encoding="utf-8")
+        source[0] += f"\n```{{toctree}}\n:hidden:\n\n{LIST_OF_PAGES}\n```\n"
+        source[0] += toctrees(pages.replace("](", "](docs/").replace("docs/../", ""))
+
+
+def inline_math(self: Any, node: nodes.math) -> None:
+    """An equation within a line."""
+    self.body.append(f'<span class="math">{typeset(node.astext())}</span>')
+    raise nodes.SkipNode
+
+
+def display_math(self: Any, node: nodes.math_block) -> None:
+    """An equation on a line of its own."""
+    self.body.append(f'<div class="math">{typeset(node.astext())}</div>')
+    raise nodes.SkipNode
+
+
+def add_index(app: Sphinx, error: Exception | None) -> None:
+    """README is the page that a browser opens."""
+    if error is None:
+        shutil.copyfile(Path(app.outdir, "README.html"), Path(app.outdir, "index.html"))
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Sphinx's hook."""
+    app.add_html_math_renderer("typeset", (inline_math, None), (display_math, None))
+    app.connect("source-read", add_order)
+    app.connect("build-finished", add_index)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

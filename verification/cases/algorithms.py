@@ -26,7 +26,7 @@ from ringbalance.verification.evidence import (
     Table,
     as_found,
     from_range,
-    from_rounding,
+    printed,
 )
 from ringbalance.verification.loops import (
     AMPLITUDES,
@@ -47,7 +47,7 @@ from ringbalance.verification.loops import (
 )
 from ringbalance.verification.papers import fig_7_readings
 
-_ABOUT: Final = Reference(value=40.0, uncertainty=from_rounding(10.0))
+_ABOUT: Final = printed(40.0, last_digit=10.0)
 """The paper's settling time of the trial algorithm, s."""
 _STEPS: Final = {
     "light": ((0.02, 0.05), (0.1, 0.2), (0.003, 0.005), (0.25, 1.0)),
@@ -97,13 +97,12 @@ def trial_algorithm(scene: Scene, level: Level, defect: str | None = None) -> Ev
     )
     return Evidence(
         found={
-            "settling_time": Found(value=own).moved(fastest - own, latest - own),
+            "settling_time": Found(value=own, reference=_ABOUT).moved(fastest - own, latest - own),
             **as_found(
                 phases_settled=max(sum(run.settled for run in runs) for runs in sets),
                 misadjustments=min(counts),
             ),
         },
-        reference={"settling_time": _ABOUT},
         numbers={
             "settings": float(len(sets)),
             "settling_sets": float(settled.size),
@@ -237,7 +236,8 @@ def _largest_rise(run: Simulation) -> float:
 
 _SEARCHED: Final = tuple((np.arange(2, 41) * 0.01e6).tolist())
 _ONSET: Final = (0.12e6, 0.16e6)
-"""The last printed Kp without and the first one with an overshoot, s/m."""
+_PRINTED_ONSET: Final = Reference(value=sum(_ONSET) / 2, uncertainty=from_range(_ONSET))
+"""Between the last printed Kp without and the first one with an overshoot, s/m."""
 _RAISED: Final = GAINS[:3]
 _INTEGRAL: Final = 48.0
 """The paper's 0.8 min, s."""
@@ -275,10 +275,9 @@ def proportional_gain(scene: Scene, level: Level, defect: str | None = None) -> 
     )
     named = {f"Kp = {gain * 1e-6:.2f} s/um": run for gain, run in runs.items()}
     return Evidence(
-        found={"onset": Found(value=onset), "overshoot_turn": _turn(scene)},
-        reference={
-            "onset": Reference(value=sum(_ONSET) / 2, uncertainty=from_range(_ONSET)),
-            "overshoot_turn": Reference(value=math.pi),
+        found={
+            "onset": Found(value=onset, reference=_PRINTED_ONSET),
+            "overshoot_turn": _turn(scene).against(math.pi),
         },
         numbers={
             "rate_um": rate * 1e6,

@@ -19,7 +19,6 @@ from ringbalance.verification.evidence import (
     Evidence,
     Found,
     Level,
-    Reference,
     Table,
     figure,
 )
@@ -155,11 +154,10 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
     }
     return Evidence(
         found={
-            "straight": Found(value=_straight(flow, scene)),
-            "explained": Found(value=found / explained, numerical=half_width / explained / 2),
+            "straight": Found(value=_straight(flow, scene)).against(1.0),
+            "explained": Found(value=found / explained, numerical=half_width / explained / 2).against(1.0),
             "convergence": Found(value=half_width / found),
         },
-        reference=dict.fromkeys(("straight", "explained"), Reference(value=1.0)),
         numbers={
             **terms,
             "k": found,

@@ -31,16 +31,15 @@ from ringbalance.verification.evidence import (
     Evidence,
     Found,
     Level,
-    Reference,
     Series,
     as_found,
     figure,
-    from_rounding,
+    printed,
 )
 from ringbalance.verification.papers import at_constant_speed, changed, convergence_time, envelope, thinned
 
 _RPM: Final = 30 / np.pi
-_CRITICAL: Final = Reference(value=135.0, uncertainty=from_rounding(1.0))
+_CRITICAL: Final = printed(135.0, last_digit=1.0)
 """Printed, rpm."""
 _SHOWN: Final = 12.0
 """s."""
@@ -69,8 +68,10 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     peak = largest if defect else float(np.max(balanced.amplitude[balanced.time >= begins]))
     runs = {"locked": locked, "balanced at 100 rpm": balanced}
     return Evidence(
-        found={"critical": Found(value=critical, corrected=without), "peak": Found(value=peak / largest)},
-        reference={"critical": _CRITICAL},
+        found={
+            "critical": Found(value=critical, corrected=without, reference=_CRITICAL),
+            "peak": Found(value=peak / largest),
+        },
         numbers={
             "locked": largest,
             "balanced": peak,

@@ -34,7 +34,6 @@ from ringbalance.verification.evidence import (
     Found,
     Level,
     NotRunError,
-    Reference,
     Series,
     as_found,
     figure,
@@ -331,10 +330,9 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         found={
             name: Found(
                 value=float(value), numerical=from_half_width((float(share) + 1e-8) * abs(float(value)))
-            )
+            ).against(exact[name])
             for name, (value, share) in values.items()
         },
-        reference={name: Reference(value=value) for name, value in exact.items()},
         numbers={
             **{f"{name}_change": exact[name] / bare[name] - 1 for name in ("volume", "moment", "lever")},
             "thickness": 2 * _RADIUS,

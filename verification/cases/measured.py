@@ -230,10 +230,13 @@ def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found={
             # Two washers taught the coefficient, so their error counts n/2 times, as sqrt(2) of one.
-            f"washers_{count}": Found(value=float(predicted[count]), input=spread * count / math.sqrt(2))
+            f"washers_{count}": Found(
+                value=float(predicted[count]),
+                input=spread * count / math.sqrt(2),
+                reference=_amplitude(readings[count], count),
+            )
             for count in _PREDICTED
         },
-        reference={f"washers_{count}": _amplitude(readings[count], count) for count in _PREDICTED},
         numbers={
             "points": float(sum(readings[count].size for count in _PREDICTED)),
             "taught_points": float(sum(readings[count].size for count in _TAUGHT)),

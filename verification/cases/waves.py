@@ -29,8 +29,7 @@ from ringbalance.physics.sloshing_system import (
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
-from ringbalance.verification.finite_elements import OrderStudy
+from ringbalance.verification.evidence import Convergence, Curve, Evidence, Level, as_found, figure
 from ringbalance.verification.reference.chambers import CosineWaves, disc_chamber
 
 _MODES: Final = 4
@@ -193,7 +192,7 @@ def imported_waves(scene: Scene, level: Level, defect: str | None = None) -> Evi
             still_error=study.finest_error,
         ),
         series=(shown,),
-        convergence=(study.table("frequencies without Coriolis force, largest relative error", 2.0),),
+        convergence=(study,),
     )
 
 
@@ -210,7 +209,7 @@ def _mutated(defect: str | None) -> Callable[..., SloshingSystem]:
 
 
 @lru_cache(maxsize=2)
-def _still_study(disc: Disc, levels: tuple[int, ...]) -> OrderStudy:
+def _still_study(disc: Disc, levels: tuple[int, ...]) -> Convergence:
     """Frequencies without Coriolis force at half the depth, on meshes that become finer."""
     a = (disc.inner_radius + disc.outer_radius) / 2
     exact = _without_coriolis(disc, np.log(disc.outer_radius / a), _IMPORTED_MODES)
@@ -219,4 +218,5 @@ def _still_study(disc: Disc, levels: tuple[int, ...]) -> OrderStudy:
         cut = middle_section(disc_chamber(disc, (radial, 3 * radial, 2)), surface_radius=a)
         found = _frequencies(section_system(cut.mesh, ends=0.0), 0.0)[:_IMPORTED_MODES]
         errors.append(float(np.abs(found / exact - 1).max()))
-    return OrderStudy.of(size=[1 / n for n in levels], error=errors)
+    quantity = "frequencies without Coriolis force, largest relative error"
+    return Convergence.of_errors(quantity, 2.0, size=[1 / n for n in levels], error=errors)

@@ -123,6 +123,12 @@ class Found:
         corrected = 0.0 if self.corrected is None else self.corrected
         _check(self.value, corrected, *self.reach, uncertainties=(self.numerical, self.input))
 
+    @classmethod
+    def within(cls, value: SupportsFloat, half_width: SupportsFloat, *, conclusive: bool = True) -> Self:
+        """A calculated number with its expanded uncertainty (95 %)."""
+        numerical = from_half_width(float(half_width))
+        return cls(value=float(value), numerical=numerical, conclusive=conclusive)
+
     @property
     def error(self) -> float:
         """E = S - D, the number itself where it is compared with nothing."""
@@ -161,9 +167,12 @@ class Found:
         return Found(value=corrected, reference=self.reference)
 
 
-def as_found(**values: SupportsFloat) -> dict[str, Found]:
-    """Numbers without an uncertainty of their own, by the names of the quantities that are judged."""
-    return {name: Found(value=float(value)) for name, value in values.items()}
+def as_found(**values: Found | SupportsFloat) -> dict[str, Found]:
+    """Judged quantities by name; a plain number has no uncertainty of its own."""
+    return {
+        name: value if isinstance(value, Found) else Found(value=float(value))
+        for name, value in values.items()
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -298,12 +307,16 @@ class Evidence:
 
     found: Mapping[str, Found]
     """By the names of the case's quantities."""
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    """Further numbers, SI, for the placeholders of the case's text."""
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    """Further numbers, SI, for the placeholders of the case's text; kept as floats."""
     series: Sequence[Series] = ()
     convergence: Sequence[Convergence] = ()
     tables: Sequence[Table] = ()
     status: Status = field(default_factory=Status)
+
+    def __post_init__(self) -> None:
+        numbers = {name: float(value) for name, value in self.numbers.items()}
+        object.__setattr__(self, "numbers", numbers)
 
 
 class CaseCode(Protocol):

@@ -111,7 +111,7 @@ def _terms(scene: Scene, length: float) -> dict[str, float]:
     half_width = float(loss.uncertainty_parts["bends"][0])
     return {
         "friction": float(loss.terms["friction"][0]) + arcs,
-        "rotation": float(loss.terms["rotation"][0]),
+        "rotation": loss.terms["rotation"][0],
         "bends": bends,
         "bends_half_width": half_width,
         "shift": 2 * shift,
@@ -161,7 +161,7 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
         numbers={
             **terms,
             "k": found,
-            "unknowns": float(flow.solution.statistics.unknowns),
+            "unknowns": flow.solution.statistics.unknowns,
             "rotation_reynolds": _rotation(scene),
             "reynolds": REYNOLDS,
             "bends_found": found - plain,

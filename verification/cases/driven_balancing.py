@@ -161,9 +161,9 @@ def positioning(scene: EccentricScene, level: Level, defect: str | None = None) 
     return Evidence(
         found=as_found(ratio=np.max(found.positioned / found.before)),
         numbers={
-            "before": float(found.before[0]),
-            "first": float(found.positioned[0]),
-            "second": float(found.positioned[1]),
+            "before": found.before[0],
+            "first": found.positioned[0],
+            "second": found.positioned[1],
             "arrived": max(arrived),
         },
         series=(_amplitudes("amplitude", found.runs, until=_SHOWN), angles),
@@ -180,9 +180,9 @@ def fine_tuning(scene: EccentricScene, level: Level, defect: str | None = None) 
             left=np.min(found.positioned / found.before), ended=np.max(found.after / found.before)
         ),
         numbers={
-            "left_m": float(found.positioned.min()),
-            "end": float(found.after.max()),
-            "time": float(max(settled)),
+            "left_m": found.positioned.min(),
+            "end": found.after.max(),
+            "time": max(settled),
         },
         series=(_amplitudes("amplitude", found.runs),),
     )

@@ -317,8 +317,8 @@ def extremes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found=as_found(broken=result.broken(), worst=worst),
         numbers={
-            "judged": float(document["judged"]),
-            "points": float(document["points"]),
+            "judged": document["judged"],
+            "points": document["points"],
             "residual": document["worst_residual"],
             "worst": worst,
             **{ending.name.lower(): float(document["endings"][str(ending)]) for ending in named},

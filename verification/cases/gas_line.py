@@ -102,7 +102,7 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         },
         numbers={
             "best_radius": best,
-            "hole_radius": float(np.abs(hole).mean()),
+            "hole_radius": np.abs(hole).mean(),
             "max_fill": disc.max_fill_ratio,
             "safe_running": safe["running"],
             "safe_stopped": safe["stopped"],
@@ -337,7 +337,7 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             **{f"{name}_change": exact[name] / bare[name] - 1 for name in ("volume", "moment", "lever")},
             "thickness": 2 * _RADIUS,
             "tip": _TIP,
-            "ring_radius": float(surface_radius(disc=scene.disc, fill_ratio=largest)),
+            "ring_radius": surface_radius(disc=scene.disc, fill_ratio=largest),
             "safe_stopped": hole["safe_stopped"],
             "safe_running": hole["safe_running"],
         },

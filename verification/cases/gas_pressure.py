@@ -69,9 +69,9 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
             "by_priming": Found(value=priming(crest), reference=LOWEST_PRESSURE),
         },
         numbers={
-            "by_ring": float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY)),
+            "by_ring": wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY),
             "scene_hump": crest,
-            "velocity_high": float(velocity_high),
+            "velocity_high": velocity_high,
         },
         series=(shown,),
     )

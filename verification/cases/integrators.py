@@ -301,10 +301,10 @@ def _stall_study(
     # Durations differ a little between the runs of one count, so each is compared with its own bound.
     share = over / (bound[:, None] * _PHASES**2)
     judged = {
-        "overshoot_share": float(share.max()),
+        "overshoot_share": share.max(),
         # At the number of segments where it is least: the bound is met, not only kept.
-        "overshoot_reach": float(share.max(axis=1).min()),
-        "cycle_error": float(np.max(np.abs(cycle / bound - 1))),
+        "overshoot_reach": share.max(axis=1).min(),
+        "cycle_error": np.max(np.abs(cycle / bound - 1)),
         "limit_error": max(abs(_longest(operation, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),
     }
     drawn = figure(

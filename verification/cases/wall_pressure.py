@@ -96,12 +96,12 @@ def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evid
         }
         | {"without_plates": shape.scaled(1 / float(without_plates[-1])).against(1.0)},
         numbers={
-            "shortfall_full": float(shortfall[-1]),
-            "shortfall_thin": float(shortfall[0]),
+            "shortfall_full": shortfall[-1],
+            "shortfall_thin": shortfall[0],
             "bare_difference": float(
                 np.max(np.abs(without_plates / wall_pressure_of(scene, x, disc=bare) - 1))
             ),
-            "gravity": float(gravity.columns["change by gravity"][-1]),
+            "gravity": gravity.columns["change by gravity"][-1],
         },
         series=(over_fill, _over_plates(scene)),
         convergence=(mesh_table(ring, "wall_pressure", "Pa", -1),),

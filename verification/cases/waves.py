@@ -95,11 +95,11 @@ def _overview(scene: Scene, points: int) -> Evidence:
     return Evidence(
         found={},
         numbers={
-            "first": float(ratios[-1, 0]),
+            "first": ratios[-1, 0],
             "third": dict(resonant_fills(disc=disc, modes=_MODES)).get(3, 0.0),
-            "double": float(np.interp(2.0, swings[fills > 0.2], fills[fills > 0.2])),
-            "equal": float(equal.amplification.value[0]),
-            "equal_pressure": float(equal.pressure_amplification.value[0]),
+            "double": np.interp(2.0, swings[fills > 0.2], fills[fills > 0.2]),
+            "equal": equal.amplification.value[0],
+            "equal_pressure": equal.pressure_amplification.value[0],
         },
         series=(frequencies, swinging),
     )
@@ -160,8 +160,8 @@ def _swing_errors(
         for waves, depth in zip(turned, _depths(disc, fills).tolist(), strict=True)
     ]
     return {
-        "forced": float(np.abs(swing.amplification.value / np.array(moments) - 1).max()),
-        "pressure": float(np.abs(swing.pressure_amplification.value / np.array(pressures) - 1).max()),
+        "forced": np.abs(swing.amplification.value / np.array(moments) - 1).max(),
+        "pressure": np.abs(swing.pressure_amplification.value / np.array(pressures) - 1).max(),
     }
 
 

@@ -340,7 +340,7 @@ def manufactured_study(
         ),
         numbers={
             "curving": walls["straight"].finest_error / walls["quadratic"].finest_error,
-            "unknowns": float(unknowns),
+            "unknowns": unknowns,
         },
         series=(
             order_figure(

@@ -152,10 +152,7 @@ def runs_table(
     shown: Sequence[str] = ("settled after", "misadjustments"),
     units: Mapping[str, str],
 ) -> Table:
-    """What became of groups of runs, each at one value of every setting: the worst of a group.
-
-    Args: `units`: of the settings.
-    """
+    """What became of groups of runs, each at one value of every setting: the worst of a group."""
     columns = {what: [_SHOWN[what](runs) for runs in groups] for what in shown}
     times = {"settled after": "s"} if "settled after" in shown else {}
     return Table(name=name, columns={**settings, **columns}, units={**units, **times})

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.tube import (
-    Patch,
     geometric_vertices,
     patch_mesh,
+    ruled,
+    tensor,
     with_midpoints,
 )
 
@@ -52,7 +53,15 @@ class CylinderForces:
     unknowns: int
 
 
-def wall_force(*, system: FlowSystem, solution: FlowSolution, boundary: str) -> FloatArray:
+def reaction(system: FlowSystem, solution: FlowSolution, *, viscosity: float) -> FloatArray:
+    """Force of the surroundings on a fluid of density 1 at its nodes, shape (components, velocity nodes)."""
+    residual = system.linear_matrix(Coefficients(viscosity=viscosity)) @ solution.vector
+    residual += system.convection_vector(solution.vector)
+    residual[system.free] = 0.0
+    return system.split(residual)[0]
+
+
+def wall_force(*, system: FlowSystem, solution: FlowSolution, boundary: str, viscosity: float) -> FloatArray:
     """Force of the fluid on a boundary, from the residual of its momentum equations.
 
     F = -sum over the boundary's nodes of (weak momentum residual).
@@ -60,21 +69,27 @@ def wall_force(*, system: FlowSystem, solution: FlowSolution, boundary: str) -> 
     Returns: Shape (components,), per unit depth on a plane mesh (per radian in (x, r)).
     Source: e.g. Giles, Larson, Levenstam, Suli, Oxford NA-97/06 (1997), on dual evaluation of wall forces.
     """
-    nodes = system.space.boundary_nodes(boundary)
-    return np.asarray(-solution.reaction[:, nodes].sum(axis=1), dtype=np.float64)
+    nodes = system.boundary_nodes(boundary)
+    return np.asarray(-reaction(system, solution, viscosity=viscosity)[:, nodes].sum(axis=1))
 
 
 def wall_torque(
-    *, system: FlowSystem, solution: FlowSolution, boundary: str, centre: tuple[float, float] = (0.0, 0.0)
+    *,
+    system: FlowSystem,
+    solution: FlowSolution,
+    boundary: str,
+    viscosity: float,
+    centre: tuple[float, float] = (0.0, 0.0),
 ) -> float:
     """Torque of the fluid on a boundary of a plane flow, counter-clockwise positive, from the residual.
 
     T = -sum over nodes of [(x - x0) R_y - (y - y0) R_x]; needs the stress form when the wall moves.
     Args: `boundary`: name of a boundary whose velocity is given. `centre`: (x0, y0).
     """
-    nodes = system.space.boundary_nodes(boundary)
-    x, y = system.space.node_coordinates()[:, nodes] - np.asarray(centre)[:, None]
-    return float(-(x * solution.reaction[1, nodes] - y * solution.reaction[0, nodes]).sum())
+    nodes = system.boundary_nodes(boundary)
+    x, y = system.nodes[:, nodes] - np.asarray(centre)[:, None]
+    force = reaction(system, solution, viscosity=viscosity)[:, nodes]
+    return float(-(x * force[1] - y * force[0]).sum())
 
 
 def kovasznay(*, reynolds: float) -> tuple[Field, Field, Field]:
@@ -110,15 +125,14 @@ def kovasznay_flow(*, cells: int, reynolds: float = 40.0) -> tuple[FlowSystem, F
 
     Args: `cells`: along each side. `reynolds`: Re.
     """
-    sides = dict.fromkeys(("west", "east", "south", "north"), "boundary")
     x, y = np.linspace(-0.5, 1.0, 2 * cells + 1), np.linspace(-0.5, 0.5, 2 * cells + 1)
-    mesh = patch_mesh([Patch.tensor(x=x, y=y, sides=sides)])
+    mesh = patch_mesh([tensor(x=x, y=y)])
     velocity = kovasznay(reynolds=reynolds)[0]
     conditions = [
-        Dirichlet(boundary="boundary", component=0, value=lambda x: velocity(x)[0]),
-        Dirichlet(boundary="boundary", component=1, value=lambda x: velocity(x)[1]),
+        Dirichlet(boundary="wall", component=0, value=lambda x: velocity(x)[0]),
+        Dirichlet(boundary="wall", component=1, value=lambda x: velocity(x)[1]),
     ]
-    system = FlowSystem.of(space=FlowSpace.taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
+    system = FlowSystem.of(mesh=mesh, conditions=conditions, enclosed=True)
     return system, solve_flow(system=system, coefficients=Coefficients(viscosity=1 / reynolds))
 
 
@@ -131,15 +145,14 @@ def field_errors(
         exact, up to a constant.
     Returns: The three errors.
     """
-    space = system.space
-    u, du = space.at_points(solution.velocity)
-    p = solution.pressure[space.pressure.element_dofs.T] @ space.pressure_shape
-    w, area = space.weights, space.weights.sum()
-    exact = pressure(space.points)
+    u, du = system.at_points(solution.velocity)
+    p = np.asarray(system.pressure.interpolate(solution.pressure))
+    w, area, points = system.weights, system.weights.sum(), system.points
+    exact = pressure(points)
     gap = (p - (w * p).sum() / area) - (exact - (w * exact).sum() / area)
     return FieldErrors(
-        velocity_l2=float(np.sqrt((w * (u - velocity(space.points)) ** 2).sum())),
-        velocity_h1=float(np.sqrt((w * (du - gradient(space.points)) ** 2).sum())),
+        velocity_l2=float(np.sqrt((w * (u - velocity(points)) ** 2).sum())),
+        velocity_h1=float(np.sqrt((w * (du - gradient(points)) ** 2).sum())),
         pressure_l2=float(np.sqrt((w * gap**2).sum())),
     )
 
@@ -176,20 +189,22 @@ def taylor_couette(
     around[-1] = 0.0
     inner, outer = _arc(inner_radius, around), _arc(outer_radius, around)
     blend = np.linspace(0.0, 1.0, 2 * cells + 1)
-    ring = Patch.ruled(inner=inner, outer=outer, blend=blend, sides={"south": "inner", "north": "outer"})
-    walls = (("inner", inner_speed), ("outer", outer_speed))
+    middle = (inner_radius + outer_radius) / 2
+    ring = patch_mesh(
+        [ruled(inner=inner, outer=outer, blend=blend)], inner=lambda at: np.hypot(at[0], at[1]) < middle
+    )
+    walls = (("inner", inner_speed), ("wall", outer_speed))
     conditions = [Dirichlet(boundary=b, component=c, value=_spinning(w, c)) for b, w in walls for c in (0, 1)]
-    space = FlowSpace.taylor_hood(mesh=patch_mesh([ring]))
-    system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, stress_form=True)
+    system = FlowSystem.of(mesh=ring, conditions=conditions, enclosed=True, stress_form=True)
     solution = solve_flow(system=system, coefficients=Coefficients(viscosity=viscosity))
     gap = outer_radius**2 - inner_radius**2
     solid = (outer_speed * outer_radius**2 - inner_speed * inner_radius**2) / gap
     vortex = (inner_speed - outer_speed) * (inner_radius * outer_radius) ** 2 / gap
-    x = space.node_coordinates()
+    x = system.nodes
     spin = solid + vortex / (x**2).sum(axis=0)
     error = np.abs(solution.velocity - np.stack([-spin * x[1], spin * x[0]])).max()
     return TaylorCouette(
-        torque=wall_torque(system=system, solution=solution, boundary="inner"),
+        torque=wall_torque(system=system, solution=solution, boundary="inner", viscosity=viscosity),
         exact_torque=-4 * np.pi * viscosity * vortex,
         velocity_error=float(error / max(abs(inner_speed) * inner_radius, abs(outer_speed) * outer_radius)),
     )
@@ -205,11 +220,10 @@ def cavity_flow(*, cells: int, reynolds: float, wall_ratio: float = 4.0) -> tupl
     """
     half = geometric_vertices(cells=cells // 2, ratio=wall_ratio) / 2
     line = with_midpoints(vertices=np.concatenate([half, 1 - half[-2::-1]]))
-    sides = {"west": "wall", "east": "wall", "south": "wall", "north": "lid"}
-    mesh = patch_mesh([Patch.tensor(x=line, y=line, sides=sides)])
+    mesh = patch_mesh([tensor(x=line, y=line)], lid=lambda at: at[1] > 1 - 1e-9)
     conditions = [Dirichlet(boundary="lid", component=0, value=1.0), Dirichlet(boundary="lid", component=1)]
     conditions += [Dirichlet(boundary="wall", component=c) for c in (0, 1)]
-    system = FlowSystem.of(space=FlowSpace.taylor_hood(mesh=mesh), conditions=conditions, enclosed=True)
+    system = FlowSystem.of(mesh=mesh, conditions=conditions, enclosed=True)
     solution = None
     for step in [r for r in (100.0, 400.0, 1000.0, 2000.0) if r < reynolds] + [reynolds]:
         solution = solve_flow(system=system, coefficients=Coefficients(viscosity=1 / step), start=solution)
@@ -221,6 +235,7 @@ def cavity_flow(*, cells: int, reynolds: float, wall_ratio: float = 4.0) -> tupl
 
 
 _CENTRE, _RADIUS, _HEIGHT, _LENGTH = (0.2, 0.2), 0.05, 0.41, 2.2
+_VISCOSITY = 1e-3
 
 
 def cylinder_mesh(*, around: int, across: int, along: int, growth: float = 8.0) -> Any:
@@ -236,17 +251,18 @@ def cylinder_mesh(*, around: int, across: int, along: int, growth: float = 8.0) 
     corners = _HEIGHT * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
     blend = with_midpoints(vertices=geometric_vertices(cells=across, ratio=growth))
     patches = []
-    for side, name in enumerate(("wall", None, "wall", "inflow")):
+    for side in range(4):
         angles = np.pi * (1.25 + 0.5 * (side + line[:, 0]))
         outer = (1 - line) * corners[side] + line * corners[side + 1]
-        sides = {"south": "cylinder"} | ({"north": name} if name else {})
-        patches.append(
-            Patch.ruled(inner=_arc(_RADIUS, angles, _CENTRE), outer=outer, blend=blend, sides=sides)
-        )
+        patches.append(ruled(inner=_arc(_RADIUS, angles, _CENTRE), outer=outer, blend=blend))
     x = with_midpoints(vertices=geometric_vertices(cells=along, ratio=4.0))
-    channel = {"east": "outflow", "south": "wall", "north": "wall"}
-    patches.append(Patch.tensor(x=_HEIGHT + (_LENGTH - _HEIGHT) * x, y=_HEIGHT * line[:, 0], sides=channel))
-    return patch_mesh(patches)
+    patches.append(tensor(x=_HEIGHT + (_LENGTH - _HEIGHT) * x, y=_HEIGHT * line[:, 0]))
+    return patch_mesh(
+        patches,
+        inflow=lambda at: at[0] < 1e-9,
+        outflow=lambda at: at[0] > _LENGTH - 1e-9,
+        cylinder=lambda at: np.hypot(at[0] - _CENTRE[0], at[1] - _CENTRE[1]) < 2 * _RADIUS,
+    )
 
 
 def cylinder_flow(*, mesh: Any) -> tuple[FlowSystem, FlowSolution]:
@@ -259,8 +275,8 @@ def cylinder_flow(*, mesh: Any) -> tuple[FlowSystem, FlowSolution]:
     )
     still = [Dirichlet(boundary=b, component=c) for b in ("wall", "cylinder") for c in (0, 1)]
     conditions = [inflow, Dirichlet(boundary="inflow", component=1), *still]
-    system = FlowSystem.of(space=FlowSpace.taylor_hood(mesh=mesh), conditions=conditions)
-    return system, solve_flow(system=system, coefficients=Coefficients(viscosity=1e-3))
+    system = FlowSystem.of(mesh=mesh, conditions=conditions)
+    return system, solve_flow(system=system, coefficients=Coefficients(viscosity=_VISCOSITY))
 
 
 def cylinder_forces(*, system: FlowSystem, solution: FlowSolution) -> CylinderForces:
@@ -271,13 +287,15 @@ def cylinder_forces(*, system: FlowSystem, solution: FlowSolution) -> CylinderFo
     Source: reference values 5.57953523384, 0.010618948146, 0.11752016697 of G. Nabh, dissertation, Heidelberg
         (1998), for the problem of Schaefer and Turek (1996).
     """
-    drag, lift = 500.0 * wall_force(system=system, solution=solution, boundary="cylinder")
-    x = system.space.mesh.doflocs[:, : system.space.pressure_nodes]
+    drag, lift = 500.0 * wall_force(
+        system=system, solution=solution, boundary="cylinder", viscosity=_VISCOSITY
+    )
+    x = system.pressure.doflocs
     front = np.argmin(np.hypot(x[0] - 0.15, x[1] - 0.2))
     back = np.argmin(np.hypot(x[0] - 0.25, x[1] - 0.2))
     return CylinderForces(
         drag=float(drag),
         lift=float(lift),
         pressure_difference=float(solution.pressure[front] - solution.pressure[back]),
-        unknowns=system.space.unknowns,
+        unknowns=system.unknowns,
     )

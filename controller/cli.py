@@ -9,11 +9,12 @@ from typing import Literal
 from ringbalance.controller.balancer import balancer_of, balancer_under, takes
 from ringbalance.controller.compare import compare as compare_balancers
 from ringbalance.results.requirements import MET
+from ringbalance.results.result import print_rows
 from ringbalance.scene.changes import file_text
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.terminal import activity, results_console
+from ringbalance.scene.platform.terminal import activity
 
 
 def tune(
@@ -58,7 +59,7 @@ def tune(
     if json:
         print(json_format.dumps(found.to_dict(), allow_nan=False))
     else:
-        results_console().print(found.rows().view())
+        print_rows(found.rows())
     return 0 if found.succeeded else 1
 
 
@@ -101,5 +102,5 @@ def compare(
     if json:
         print(json_format.dumps(found.to_dict(), allow_nan=False))
     else:
-        results_console().print(found.rows().view(headline=False))
+        print_rows(found.rows(), headline=False)
     return 0 if set(found.verdicts) == {MET} else 1

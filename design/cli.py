@@ -13,7 +13,7 @@ from ringbalance.design.axes import Plan, plan_of_file, plan_of_texts
 from ringbalance.design.design_rows import design_document, design_rows
 from ringbalance.design.designing import run_design
 from ringbalance.design.sweep import STORE, Sweep, run_sweep
-from ringbalance.results.result import Presentation
+from ringbalance.results.result import Presentation, print_rows
 from ringbalance.scene.changes import file_text
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
@@ -21,7 +21,7 @@ from ringbalance.scene.narrowing import read_tolerance
 from ringbalance.scene.origins import SceneFile
 from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.processes import checked_workers
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_message
 
 TABLE: Final = "table.csv"
 SUMMARY: Final = "sweep.json"
@@ -92,8 +92,8 @@ def sweep(
     if json:
         print(text)
     else:
-        results_console().print(found.rows().view())
-        messages_console().print(f"written to {out}", highlight=False)
+        print_rows(found.rows())
+        print_message(f"written to {out}")
     return 0
 
 
@@ -125,7 +125,7 @@ def design(scene: Path, *, save: Path | None = None, workers: int | None = None,
     if json:
         print(json_format.dumps(found.to_dict(), allow_nan=False))
     else:
-        results_console().print(found.rows().view())
+        print_rows(found.rows())
     return 0 if found.succeeded else 1
 
 

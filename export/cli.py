@@ -16,7 +16,7 @@ from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_message, results_console
 
 Text = Literal["c", "st", "csv", "python"]
 Host = Literal[Text, Version]
@@ -74,14 +74,14 @@ def export(
         results_console().print(str(out / file), highlight=False)
     size = f"{8 * len(law.constants)} bytes of constants"
     text = f"{size}, velocities within {law.departure:.1e} of the calibrated law's"
-    messages_console().print(text, highlight=False)
+    print_message(text)
     return 0
 
 
 def _unit(law: CompactLaw, name: str, version: Version, all_systems: bool) -> dict[str, bytes]:
     unit, runs = fmu_bytes(law, name, version, all_systems=all_systems)
     if not runs:
-        messages_console().print("no C compiler here: the unit holds its source alone", highlight=False)
+        print_message("no C compiler here: the unit holds its source alone")
     return {f"{name}.fmu": unit}
 
 

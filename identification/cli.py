@@ -15,10 +15,11 @@ from ringbalance.identification.next_measurement import next_measurement
 from ringbalance.identification.parameters import FitError
 from ringbalance.identification.reading import read_observations
 from ringbalance.identification.saving import save_result
+from ringbalance.results.result import print_rows
 from ringbalance.scene.faults import SceneError, did_you_mean
 from ringbalance.scene.loader import read_scene
 from ringbalance.scene.platform.files import check_file
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_message
 
 DONE, FAILED = 0, 1
 _USAGE = (
@@ -63,12 +64,12 @@ def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tupl
         print(json_format.dumps(document, allow_nan=False))
     else:
         rows = fit_rows(result, data=observations, told=told, following=following)
-        results_console().print(rows.view(headline=False))
+        print_rows(rows, headline=False)
     if asked.save is not None:
         save_result(
             asked.save, text=text, result=result, data=observations, folder=scene.parent, said=told.sentences
         )
-        messages_console().print(f"fitted scene written to {asked.save}", highlight=False, soft_wrap=True)
+        print_message(f"fitted scene written to {asked.save}")
     return (DONE if told.holds else FAILED), result
 
 

@@ -134,17 +134,21 @@ def surface_radius(*, disc: Disc, fill_ratio: npt.ArrayLike) -> FloatArray:
         raise ValueError("fill_ratio must lie within [0, 1]")
     if (table := imported_table(disc)) is not None:
         return np.asarray(np.sqrt(table.level_of(x * table.volume)))
-    r1, r2 = disc.inner_radius, disc.outer_radius
-    within = partial(swept_area, central_angle=disc.central_angle, plate_thickness=disc.plate_thickness)
-    whole = within(radius=r2)
-    target = x * (whole - within(radius=r1))
-    # The depth form keeps full relative accuracy for a film of a micrometre, where a^2 = R2^2 - ... cancels.
+    least, most, t = disc.inner_radius**2, disc.outer_radius**2, disc.plate_thickness
+
+    def within(squared: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+        """`swept_area`, and its slope by the square of the radius, alpha."""
+        alpha = half_angle(disc=disc, radius=np.sqrt(squared))
+        return squared * alpha - t * np.sqrt(squared - t**2), alpha
+
+    whole = within(most)[0]
+    target = x * (whole - within(least)[0])
     # Newton's steps square the error, so the last of this size leaves rounding alone.
-    squared, enough = r2**2 - x * (r2**2 - r1**2), _LAST_STEP * r2**2
+    squared, enough = most - x * (most - least), _LAST_STEP * most
     for _ in range(60):
-        a = np.sqrt(squared)
-        step = (whole - within(radius=a) - target) / half_angle(disc=disc, radius=a)
-        squared = np.minimum(np.maximum(squared + step, r1**2), r2**2)
+        area, alpha = within(squared)
+        step = (whole - area - target) / alpha
+        squared = np.minimum(np.maximum(squared + step, least), most)
         if (np.abs(step) <= enough).all():
             break
     return np.asarray(np.sqrt(squared), dtype=np.float64)

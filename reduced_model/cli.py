@@ -8,10 +8,11 @@ from pathlib import Path
 from ringbalance.reduced_model.calibration import calibrate as calibrate_scene
 from ringbalance.reduced_model.calibration_rows import calibration_rows
 from ringbalance.reduced_model.documents import calibration_document
+from ringbalance.results.result import print_rows
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.files import check_file
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_message
 
 DONE = 0
 
@@ -48,8 +49,8 @@ def calibrate(
     if json:
         print(json_format.dumps(calibration_document(found), allow_nan=False))
     else:
-        results_console().print(calibration_rows(found).view(headline=False))
+        print_rows(calibration_rows(found), headline=False)
     if save is not None:
         found.flow_law.save(save)
-        messages_console().print(f"law written to {save}", highlight=False)
+        print_message(f"law written to {save}")
     return DONE

@@ -22,8 +22,8 @@ from ringbalance.scene.uncertain import half_widths
 
 FACTOR: Final = "draw_down_factor"
 """The scene's factor on the depth of `port_depth`, an uncertain input as any other."""
-_SCANS_OF_ONE: Final = 257, 3
-"""Places of a scan of a single row, for which few calls cost least, and number of finer ones."""
+_PLACES: Final = 257
+"""Of a scan of a single row, for which a long one costs little."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +173,7 @@ def stalled_fill_ratio(*, law: FlowLaw, total: float, gas_pressure: float) -> fl
 
     lowest = max(0.0, total - law.max_fill_ratio)
     end = np.array([max(lowest, NEARLY_EMPTY * total)])
-    stalled = float(first_stalled(moves, start=np.array([total / 2]), end=end, scans=_SCANS_OF_ONE)[0])
+    stalled = float(first_stalled(moves, start=np.array([total / 2]), end=end, places=_PLACES)[0])
     return lowest if math.isnan(stalled) else stalled
 
 

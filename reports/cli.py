@@ -13,7 +13,7 @@ from ringbalance.scene import Scene, liquid_ring_scene, load_scene, read_scene
 from ringbalance.scene.narrowing import Models, with_tolerance
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.processes import beside
-from ringbalance.scene.platform.terminal import activity, messages_console, since_start
+from ringbalance.scene.platform.terminal import activity, print_message, since_start
 from ringbalance.verification.evidence import Level
 
 DONE: Final = 0
@@ -47,7 +47,7 @@ def report(
         OSError: the folder cannot be written.
     """
     told, text = read_scene(scene)
-    console, workers = messages_console(), min(MOST_WORKERS, os.cpu_count() or 1)
+    workers = min(MOST_WORKERS, os.cpu_count() or 1)
     with activity("report", "reading") as shown, beside(workers, loading=_load) as pool:
         finished = write_report(
             with_tolerance(told, tolerance=tolerance, models=models),
@@ -58,8 +58,8 @@ def report(
             progress=shown.show,
         )
     for line in finished.summary:
-        console.print(line, markup=False, highlight=False)
-    console.print(f"took {since_start():.0f} s", style="dim", highlight=False)
+        print_message(line)
+    print_message(f"took {since_start():.0f} s")
     print(finished.page)
     return DONE if finished.sound else NOT_SOUND
 
@@ -87,7 +87,7 @@ def plot(scene: Path, *, out: Path = Path("out")) -> int:
     with activity("plot", "pressure fields") as shown:
         pictures = draw_pictures(told, out, progress=shown.show)
     if not pictures["drawn"]:
-        messages_console().print(pictures["text"], markup=False, highlight=False)
+        print_message(pictures["text"])
     print(out)
     return DONE if pictures["drawn"] else NOT_SOUND
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Final
 
 from ringbalance.controller.balancer import AS_GIVEN, Run, balancer_under
-from ringbalance.results.result import csv_text
+from ringbalance.results.result import csv_text, print_rows
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.narrowing import AnyScene, Models, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.terminal import Activity, activity, results_console
+from ringbalance.scene.platform.terminal import Activity, activity
 
 SETTLED: Final = 0
 NOT_SETTLED: Final = 1
@@ -68,7 +68,7 @@ def simulate(
     if json:
         print(json_format.dumps(document, allow_nan=False))
     else:
-        results_console().print(balancer.rows(run).view())
+        print_rows(balancer.rows(run))
     return SETTLED if run.settled and met else NOT_SETTLED
 
 

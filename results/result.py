@@ -20,6 +20,8 @@ from rich.text import Text
 from ringbalance.results.numbers import MISSING, percent, plain
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.origins import summary_text
+from ringbalance.scene.platform.display import display
+from ringbalance.scene.platform.terminal import results_console
 
 Cells = Sequence[str]
 Facts = Sequence[tuple[str, str]]
@@ -213,6 +215,18 @@ class Rows:
         rows = [(each.name, each.symbol, each.text) for each in self.quantities[:_MOST]]
         table = Table(heads=("quantity", "symbol", "value (95 %)"), rows=rows)
         return f"<div><strong>{escape(self.title)}</strong>{sentences}{_html_table(table)}</div>"
+
+
+def print_rows(rows: Rows, *, headline: bool = True) -> None:
+    """Write a result to standard output, about five lines of it where the command line asks for that.
+
+    Args: `headline`: see `Rows.view`.
+    """
+    console = results_console()
+    if display().brief:
+        console.print(summary_text(rows.lines()), markup=False, highlight=False)
+    else:
+        console.print(rows.view(headline=headline))
 
 
 class Result:

@@ -10,16 +10,29 @@ import atexit
 import difflib
 import gc
 import os
+import shlex
 import sys
 import traceback
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from inspect import signature
-from typing import Any, get_args
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, get_args
 
-from cyclopts import App, CycloptsError, MissingArgumentError, Parameter, Token, UnknownCommandError, convert
+from cyclopts import (
+    App,
+    CycloptsError,
+    Group,
+    MissingArgumentError,
+    Parameter,
+    Token,
+    UnknownCommandError,
+    convert,
+)
 
 import ringbalance
+from ringbalance.scene.platform.display import LOG, displayed
 from ringbalance.scene.platform.garbage import seldom_collected
 from ringbalance.signals import interrupts
 from ringbalance.streams import discard_unwritten, drop_unusable_size, interpreter_error, prepare_streams
@@ -28,57 +41,122 @@ DONE = 0
 BAD_INPUT = 2
 INTERRUPTED = 130
 BROKEN_PIPE = 141
+EXAMPLE_SCENES = ("my_disc.toml", "other_disc.toml")
+
+_EVERYWHERE = Parameter(group=Group("Options of every command", sort_key=100), show_default=False)
+
+
+class Command(NamedTuple):
+    """A command as its `--help` shows it."""
+
+    target: str
+    """Module and function."""
+    summary: str
+    example: str
+    """Arguments; SCENE stands for a scene file."""
+    failure: str
+    """Condition of exit code 1; empty: never given."""
+
+    def epilogue(self, name: str) -> str:
+        """An example, the exit codes, and the page with the rest."""
+        example = " ".join(("ringbalance", name, self.example.replace("SCENE", EXAMPLE_SCENES[0]))).strip()
+        failed = f"1 {self.failure}; " if self.failure else ""
+        return (
+            f"Example: {example}\n\n"
+            f"Exit codes: 0 done; {failed}2 bad input, or output that cannot be written; 130 interrupted; "
+            "141 the reader of standard output went away.\n\n"
+            f"All options, files and JSON keys: docs/commands.md"
+        )
+
 
 COMMANDS = {
     "report": (
         "ringbalance.reports.cli:report",
         "Verify, calibrate, simulate and draw: everything, into a report and its annex.",
+        "SCENE --out out",
+        "a check of the program failed (what becomes of the scene's requirements does not count)",
     ),
     "calibrate": (
         "ringbalance.reduced_model.cli:calibrate",
         "lambda, k and the flow law of a disc, with uncertainties.",
+        "SCENE --save law.json",
+        "",
     ),
-    "simulate": ("ringbalance.reports.simulate_cli:simulate", "One closed-loop balancing run."),
+    "simulate": (
+        "ringbalance.reports.simulate_cli:simulate",
+        "One closed-loop balancing run.",
+        "SCENE --plot run.svg",
+        "the run did not settle",
+    ),
     "tune": (
         "ringbalance.controller.cli:tune",
-        "Recommended gain, its margins, and the settling times under it.",
+        "Settings of the controller chosen by runs of drawn devices, and the fraction that they serve.",
+        "SCENE --save tuned.toml",
+        "what the scene requires is not met with the best settings, or it is undecided",
     ),
     "export": (
         "ringbalance.export.cli:export",
         "The flow law for another program: C, FMI, structured text, a Python module, a table.",
+        "SCENE --to c --out law",
+        "",
     ),
     "sweep": (
         "ringbalance.design.cli:sweep",
         "Many designs: a row of answers for every point of a grid or a sample.",
+        "SCENE --vary tube.bore=0.5mm:2mm:30 --out sweep",
+        "",
     ),
     "design": (
         "ringbalance.design.cli:design",
         "The smallest disc, with bore, pressure, valve and settings, that meets what a scene requires.",
+        "SCENE --save designed.toml",
+        "no design meets what the scene requires, or it is undecided",
     ),
     "fit": (
         "ringbalance.reports.fit_cli:fit",
         "Parameters of a built disc from measurements, with intervals and what the data identify.",
+        "SCENE rig.csv --save fitted.toml",
+        "the fit does not describe its data, or they prefer another law",
     ),
     "verify": (
         "ringbalance.verification.cli:verify",
         "The verification cases and the paper's claims, judged.",
+        "gci_celik2008 --mutations",
+        "a code verification failed, or a mutation was not noticed",
     ),
-    "compare": ("ringbalance.controller.cli:compare", "Two balancers on one rotor, side by side."),
+    "compare": (
+        "ringbalance.controller.cli:compare",
+        "Two balancers on one rotor, side by side.",
+        "SCENE other_disc.toml",
+        "one of the two does not settle the fraction of devices that is asked for, or it is undecided",
+    ),
     "trade": (
         "ringbalance.verification.trade:trade",
         "Speed against accuracy: designs a second and error of every model.",
+        "SCENE --level light",
+        "",
     ),
     "extremes": (
         "ringbalance.verification.extremes.study:extremes",
         "Limits of validity: where results stop, what is reported beyond, and whether the invariants hold "
         "inside.",
+        "SCENE --out extremes",
+        "an invariant does not hold",
     ),
-    "plot": ("ringbalance.reports.cli:plot", "The off-screen 3-D pictures alone."),
+    "plot": (
+        "ringbalance.reports.cli:plot",
+        "The off-screen 3-D pictures alone.",
+        "SCENE --out pictures",
+        "this machine cannot draw; the fields are written",
+    ),
     "doctor": (
         "ringbalance.doctor:doctor",
         "What this machine gives the program, and what to do where something lacks.",
+        "",
+        "something is broken",
     ),
 }
+"""By name, see `Command`."""
 THREAD_COUNTS = (
     "OPENBLAS_NUM_THREADS",
     "OMP_NUM_THREADS",
@@ -87,7 +165,6 @@ THREAD_COUNTS = (
     "VECLIB_MAXIMUM_THREADS",
     "NUMEXPR_NUM_THREADS",
 )
-EXAMPLE_SCENES = ("my_disc.toml", "other_disc.toml")
 
 
 def _converted(hint: Any, tokens: Sequence[Token]) -> Any:
@@ -104,18 +181,44 @@ def _build_app() -> App:
         name="ringbalance",
         help="Are the closed formulas of a liquid-ring rotor balancer to be trusted, for your disc?",
         help_epilogue=(
-            "Exit codes: 0 done; 1 a check of the program failed or what the scene requires is not met (the "
-            "result is still written; report does not judge the scene by its code); 2 bad input, or output "
-            "that cannot be written; 130 interrupted; 141 the reader of standard output went away."
+            "ringbalance COMMAND --help has the options, an example and the exit codes of a command; "
+            "ringbalance --install-completion lets the shell complete names of commands and options. "
+            "Begin with: ringbalance report my_disc.toml (README.md has a scene to copy, docs/ all pages)."
         ),
         version=ringbalance.__version__,
         default_parameter=Parameter(negative=(), converter=_converted),
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )
-    for name, (target, summary) in COMMANDS.items():
-        app.command(target, name=name, help=summary)
+    for name, entry in COMMANDS.items():
+        command = Command._make(entry)
+        app.command(command.target, name=name, help=command.summary, help_epilogue=command.epilogue(name))
+    app.register_install_completion_command(
+        help="Let this shell (bash, zsh or fish) complete names of commands and options.", help_epilogue=""
+    )
+    app.meta.suppress_keyboard_interrupt = False
+    app.meta.default(partial(_dispatch, app))
     return app
+
+
+def _dispatch(
+    app: App,
+    /,
+    *tokens: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+    brief: Annotated[bool, _EVERYWHERE] = False,
+    quiet: Annotated[bool, _EVERYWHERE] = False,
+    log: Annotated[Path | None, _EVERYWHERE] = None,
+) -> Any:
+    """Run the command that the tokens name.
+
+    Args:
+        brief: print about five lines: what was computed, its first numbers and the verdict.
+        quiet: show no progress and no messages; errors alone.
+        log: add progress, messages and errors to this file, each with its time.
+    """
+    with displayed(brief=brief, quiet=quiet, log=log):
+        LOG.info("ringbalance %s %s", ringbalance.__version__, shlex.join(tokens))
+        return app(tokens, exit_on_error=False, print_error=False)
 
 
 def _say(text: str) -> None:
@@ -159,7 +262,7 @@ def _refusal(error: OSError) -> str:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    result = _build_app()(arguments, exit_on_error=False, print_error=False)
+    result = _build_app().meta(arguments, exit_on_error=False, print_error=False)
     sys.stdout.flush()
     return result if isinstance(result, int) else DONE
 

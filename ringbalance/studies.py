@@ -25,7 +25,7 @@ from ringbalance.scene import AnyScene, SceneError
 from ringbalance.scene.changes import checked_scene, document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
-from ringbalance.verification.extremes.study import SIZES, Extremes, base_of, find_extremes
+from ringbalance.verification.extremes.study import SIZES, Extremes, find_extremes
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases as run_scene_cases
 from ringbalance.verification.trade import TradeStudy, trade_study
@@ -118,8 +118,8 @@ def extremes(
         being done, the points done and their number.
     Raises: SceneError: a scene that cannot be used, or whose chamber is imported.
     """
-    base = base_of(liquid_ring_scene(checked_scene(scene)))
-    return find_extremes(base, size=SIZES[level], workers=workers, progress=progress)
+    given = liquid_ring_scene(checked_scene(scene))
+    return find_extremes(given, size=SIZES[level], workers=workers, progress=progress)
 
 
 def plot(scene: AnyScene, out: str | PathLike[str]) -> tuple[Path, ...]:

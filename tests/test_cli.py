@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -182,7 +183,7 @@ def command(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException | int], 
         module = ModuleType("acting_command")
         module.act = act  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "acting_command", module)
-        monkeypatch.setattr(cli, "COMMANDS", {"act": ("acting_command:act", "acts")})
+        monkeypatch.setattr(cli, "COMMANDS", {"act": ("acting_command:act", "acts", "", "")})
         return cli.main(["act"])
 
     return run_it
@@ -268,3 +269,51 @@ runpy.run_module("ringbalance", run_name="__main__")
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+def test_brief_prints_a_title_three_numbers_and_the_verdict(here: Run) -> None:
+    whole, brief = here("calibrate", PAPER), here("calibrate", "--brief", PAPER)
+    assert brief.returncode == 0
+    assert brief.stdout.splitlines()[0] == whole.stdout.splitlines()[0]
+    assert len(brief.stdout.splitlines()) <= 6 < len(whole.stdout.splitlines())
+    assert "lambda per transferred mass" in brief.stdout
+
+
+def test_quiet_silences_messages_and_not_errors(here: Run, tmp_path: Path) -> None:
+    law = tmp_path / "law.json"
+    assert str(law) in here("calibrate", PAPER, "--save", law).stderr
+    assert here("calibrate", PAPER, "--save", law, "--quiet").stderr == ""
+    assert_bad_input(here("--quiet", "calibrate", "absent.toml"), "absent.toml")
+
+
+def test_a_log_has_command_lines_messages_and_errors_with_their_times(here: Run, tmp_path: Path) -> None:
+    log, law = tmp_path / "log.txt", tmp_path / "law.json"
+    here("calibrate", PAPER, "--save", law, "--log", log, "--quiet")
+    here("calibrate", "absent.toml", "--log", log)
+    lines = log.read_text(encoding="utf-8").splitlines()
+    assert all(re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} (INFO|ERROR) ", line) for line in lines)
+    assert [line for line in lines if f"law written to {law}" in line]
+    assert [line for line in lines if " ERROR absent.toml" in line]
+    assert len([line for line in lines if re.search(r"INFO ringbalance [\d.]+ calibrate ", line)]) == 2
+
+
+def test_a_log_that_cannot_be_written_is_refused(here: Run, tmp_path: Path) -> None:
+    assert_bad_input(here("calibrate", PAPER, "--log", tmp_path / "absent" / "log.txt"), "log.txt")
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_help_has_an_example_and_the_exit_codes_of_its_command(here: Run, name: str) -> None:
+    shown = " ".join(here(name, "--help").stdout.split())
+    assert f"Example: ringbalance {name}" in shown
+    assert ("0 done; 1 " in shown) == bool(cli.Command._make(cli.COMMANDS[name]).failure)
+    assert "docs/commands.md" in shown
+
+
+def test_the_shell_s_completion_is_written(
+    here: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("SHELL", "/bin/bash")
+    assert here("--install-completion").returncode == 0
+    (script,) = tmp_path.rglob("completions/ringbalance")
+    assert {"calibrate", "--tolerance"} <= set(script.read_text().replace("'", " ").split())

@@ -23,7 +23,7 @@ from ringbalance.controller.judging.judge import judged, judged_all
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.toml import toml_bytes
-from ringbalance.verification.extremes.study import Size, base_of, find_extremes
+from ringbalance.verification.extremes.study import Size, find_extremes
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "commands.md"
 SHARED: Final = "Keys that several commands have"
@@ -200,8 +200,8 @@ def test_keys_of_verify(printed: Any) -> None:
 
 @pytest.mark.heavy
 def test_keys_of_extremes() -> None:
-    base = base_of(liquid_ring_scene(rb.load_scene(PAPER)))
-    found = find_extremes(base, size=Size(points=1, sweep=2, fineness=1.0))
+    scene = liquid_ring_scene(rb.load_scene(PAPER))
+    found = find_extremes(scene, size=Size(points=1, sweep=2, fineness=1.0))
     violated = found.to_dict() | {"violations": [{"point": {"speed": 1.0}, "violations": []}]}
     compare("`extremes --json`", [violated])
 

@@ -8,16 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.flow import FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution
 
 _MARGIN = 0.05
 """Share of an element by which a point may lie outside it: a chord's sagitta on a coarser curved mesh."""
 
 
-def _candidates(space: FlowSpace, points: FloatArray) -> tuple[IntArray, IntArray]:
+def _candidates(system: FlowSystem, points: FloatArray) -> tuple[IntArray, IntArray]:
     """Pairs (point, element) whose bounding box holds the point."""
-    corners = space.node_coordinates()[:, space.velocity.element_dofs]
+    corners = system.nodes[:, system.velocity.element_dofs]
     low, high = corners.min(axis=1), corners.max(axis=1)
     margin = _MARGIN * (high - low) + 1e-12
     inside = np.ones((points.shape[1], low.shape[1]), dtype=bool)
@@ -33,10 +33,10 @@ def _shape_at(element: Any, local: FloatArray, count: int) -> tuple[FloatArray, 
     return shape, np.stack([np.broadcast_to(dphi, local.shape) for _, dphi in pairs])
 
 
-def _reference_coordinates(space: FlowSpace, points: FloatArray, elements: IntArray) -> FloatArray:
+def _reference_coordinates(system: FlowSystem, points: FloatArray, elements: IntArray) -> FloatArray:
     """Newton's inverse of the element map, shape (dimension, pairs)."""
-    basis = space.velocity
-    nodes = space.node_coordinates()[:, basis.element_dofs[:, elements]]
+    basis = system.velocity
+    nodes = system.nodes[:, basis.element_dofs[:, elements]]
     local = np.full(points.shape, 0.5 if nodes.shape[1] in (9, 27) else 1 / 3)
     for _ in range(12):
         shape, slope = _shape_at(basis.elem, local, basis.Nbfun)
@@ -53,7 +53,7 @@ def _outside(local: FloatArray, simplex: bool) -> FloatArray:
     return np.asarray(np.maximum(excess, 0.0), dtype=np.float64)
 
 
-def _locate(*, space: FlowSpace, points: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
+def _locate(*, system: FlowSystem, points: npt.ArrayLike) -> tuple[IntArray, FloatArray]:
     """Element and reference coordinates of points.
 
     Args: `points`: shape (dimension, n).
@@ -61,9 +61,9 @@ def _locate(*, space: FlowSpace, points: npt.ArrayLike) -> tuple[IntArray, Float
     Raises: ValueError: a point outside the mesh.
     """
     at = np.asarray(points, dtype=np.float64)
-    point, element = _candidates(space, at)
-    local = _reference_coordinates(space, at[:, point], element)
-    outside = _outside(local, space.mesh.refdom.__name__ in ("RefTri", "RefTet"))
+    point, element = _candidates(system, at)
+    local = _reference_coordinates(system, at[:, point], element)
+    outside = _outside(local, system.velocity.mesh.refdom.__name__ in ("RefTri", "RefTet"))
     order = np.lexsort((outside, point))
     found, first = np.unique(point[order], return_index=True)
     best = order[first]
@@ -78,14 +78,14 @@ def probe(*, system: FlowSystem, solution: FlowSolution, points: npt.ArrayLike) 
     Args: `points`: shape (dimension, n), inside the mesh.
     Raises: ValueError: a point outside the mesh.
     """
-    return _evaluate(system.space, solution.vector, np.asarray(points, dtype=np.float64))
+    return _evaluate(system, solution.vector, np.asarray(points, dtype=np.float64))
 
 
-def _evaluate(space: FlowSpace, vector: FloatArray, points: FloatArray) -> FloatArray:
-    element, local = _locate(space=space, points=points)
-    velocity, pressure = space.split(vector)
+def _evaluate(system: FlowSystem, vector: FloatArray, points: FloatArray) -> FloatArray:
+    element, local = _locate(system=system, points=points)
+    velocity, pressure = system.split(vector)
     rows = []
-    for basis, values in [(space.velocity, v) for v in velocity] + [(space.pressure, pressure)]:
+    for basis, values in [(system.velocity, v) for v in velocity] + [(system.pressure, pressure)]:
         shape, _ = _shape_at(basis.elem, local, basis.Nbfun)
         rows.append((values[basis.element_dofs[:, element]] * shape).sum(axis=0))
     return np.stack(rows)
@@ -93,8 +93,7 @@ def _evaluate(space: FlowSpace, vector: FloatArray, points: FloatArray) -> Float
 
 def transfer(*, source: FlowSystem, solution: FlowSolution, target: FlowSystem) -> FloatArray:
     """A flow on another mesh of the same domain, as a start for Newton's method there."""
-    space = target.space
-    velocity = _evaluate(source.space, solution.vector, space.node_coordinates())[:-1]
-    pressure_points = np.asarray(space.pressure.doflocs, dtype=np.float64)
-    pressure = _evaluate(source.space, solution.vector, pressure_points)[-1]
+    velocity = _evaluate(source, solution.vector, target.nodes)[:-1]
+    pressure_points = np.asarray(target.pressure.doflocs, dtype=np.float64)
+    pressure = _evaluate(source, solution.vector, pressure_points)[-1]
     return np.concatenate([velocity.ravel(), pressure])

@@ -2,31 +2,31 @@
 
     .venv/bin/python tools/other_pythons.py
 
-Supported is what pyproject.toml's requires-python says.  Python is looked for as `python3.X` on the search
-path and among the versions of pyenv; one that does not start, or has no venv, does not count.  The Python
-that runs this is left out, since `make test` has used it.  Of the others, the oldest and the newest that
-this machine has run `make test`, those between `make test-short`.  Each has an environment, `.venv-3.X`.
+Supported are the versions that pyproject.toml's classifiers name.  Python is looked for as `python3.X` on
+the search path and among the versions of pyenv; one that does not start, or has no venv, does not count.
+The Python that runs this is left out, since `make test` has used it.  Of the others, the oldest and the
+newest that this machine has run `make test`, those between `make test-short`.  Each has an environment,
+`.venv-3.X`.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from packaging.specifiers import SpecifierSet
-
 ROOT = Path(__file__).resolve().parents[1]
 _ASK = "import sys, ensurepip, venv; print('%d.%d' % sys.version_info[:2])"
 
 
-def supported(requires_python: str) -> list[str]:
-    """Minor versions that a specifier allows, such as "3.11"."""
-    allowed = SpecifierSet(requires_python)
-    return [f"3.{minor}" for minor in range(100) if f"3.{minor}.0" in allowed]
+def supported(classifiers: Sequence[str]) -> list[str]:
+    """Minor versions that classifiers name, such as "3.11", in rising order."""
+    found = (re.fullmatch(r"Programming Language :: Python :: 3\.(\d+)", text) for text in classifiers)
+    return [f"3.{minor}" for minor in sorted(int(match[1]) for match in found if match)]
 
 
 def starts(python: Path, version: str) -> bool:
@@ -60,7 +60,7 @@ def main() -> int:
     """Test under each further interpreter; the first that fails ends it."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     running = f"3.{sys.version_info.minor}"
-    versions = supported(project["requires-python"])
+    versions = supported(project["classifiers"])
     others = interpreters([version for version in versions if version != running])
     for version, python in others.items():
         print(f"Python {version}: {python or 'not on this machine, not tested'}", flush=True)

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Final
 
 from ringbalance.results.numbers import percent
-from ringbalance.results.result import Rows, Table
+from ringbalance.results.result import Rows, Table, print_rows
 from ringbalance.scene import AnyScene, liquid_ring_scene, load_scene
+from ringbalance.scene.platform.display import display
 from ringbalance.scene.platform.processes import checked_workers
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_error, results_console
 from ringbalance.verification.case import CaseDefinition, CaseError
 from ringbalance.verification.catalogue import (
     OwnCase,
@@ -94,7 +95,7 @@ def verify(
 
 
 def _say(error: Exception) -> None:
-    messages_console().print(f"ringbalance: {error}", markup=False, highlight=False, soft_wrap=True)
+    print_error(f"ringbalance: {error}")
 
 
 def _chosen(ids: Sequence[str], own: Mapping[str, OwnCase]) -> tuple[list[CaseDefinition], list[CaseError]]:
@@ -178,7 +179,7 @@ def _judge_data(path: Path, *, json: bool) -> int:
         ),
         listed=0,
     )
-    results_console().print(rows.view(headline=False))
+    print_rows(rows, headline=False)
     return _DONE
 
 
@@ -198,12 +199,12 @@ def _print_list(definitions: Sequence[CaseDefinition], *, json: bool) -> None:
     rows = [(d.id, kind_text(d), d.cost, d.title) for d in definitions]
     table = Table(heads=("case", "kind", "cost", "title"), rows=rows)
     cases = Rows(title=f"{len(rows)} cases", quantities=(), tables=(table,), listed=0)
-    results_console().print(cases.view(headline=False))
+    print_rows(cases, headline=False)
 
 
 def _print_results(results: Sequence[CaseResult]) -> None:
     console = results_console()
-    for result in results:
+    for result in () if display().brief else results:
         console.print(result.rows().view(headline=False), "")
     counts = Counter(result.verdict for result in results)
     console.print(", ".join(f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict]))

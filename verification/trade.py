@@ -30,14 +30,14 @@ from ringbalance.reduced_model.law.paper_law import paper_law
 from ringbalance.reduced_model.paper import PAPER_DRAG_COEFFICIENT
 from ringbalance.reduced_model.terms import TERMS, models_used
 from ringbalance.results.numbers import MISSING, number, percent
-from ringbalance.results.result import Result, Rows, Table
+from ringbalance.results.result import Result, Rows, Table, print_rows
 from ringbalance.results.rows import Quantity
 from ringbalance.scene import load_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import Models, liquid_ring_scene, with_tolerance
 from ringbalance.scene.platform.files import check_file, write_whole
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.scene.uncertain import without_fitted
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.typed_record import plain
@@ -360,8 +360,8 @@ def trade(
     if json:
         print(text)
     else:
-        results_console().print(study.rows().view(headline=False))
+        print_rows(study.rows(), headline=False)
     if out is not None:
         write_whole(out / _FILE, text + "\n")
-        messages_console().print(f"written to {out / _FILE}", highlight=False)
+        print_message(f"written to {out / _FILE}")
     return 0

@@ -14,7 +14,12 @@ from ringbalance.physics.gas import HEAT_CAPACITY_RATIO, GasLine
 from ringbalance.physics.sloshing import FREQUENCY_UNCERTAINTY
 from ringbalance.physics.sloshing_system import sloshing_system
 from ringbalance.physics.tube.friction import friction_factor, friction_uncertainty
-from ringbalance.physics.tube.local_losses import entrance_loss, exit_loss
+from ringbalance.physics.tube.local_losses import (
+    entrance_loss,
+    entrance_uncertainty,
+    exit_loss,
+    exit_uncertainty,
+)
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Tube
 
@@ -93,13 +98,14 @@ def tube_loss(slenderness: float, reynolds: float, critical: float) -> tuple[flo
     Args: `slenderness`: L/d. `critical`: critical Re over the usual one.
     """
     tube = _tube(slenderness)
-    friction = {"reynolds": reynolds, "relative_roughness": 0.0, "critical_ratio": critical}
-    terms: list[tuple[FloatArray, FloatArray]] = [
-        (slenderness * friction_factor(**friction), slenderness * friction_uncertainty(**friction)),
-        entrance_loss(tube=tube, reynolds=reynolds, critical_ratio=critical),
-        exit_loss(tube=tube, reynolds=reynolds, critical_ratio=critical),
-    ]
-    values, half_widths = np.array(terms, dtype=np.float64).T
+    flow = {"reynolds": reynolds, "critical_ratio": critical}
+    friction = {**flow, "relative_roughness": 0.0}
+    values = slenderness * friction_factor(**friction), entrance_loss(tube=tube, **flow), exit_loss(**flow)
+    half_widths = (
+        slenderness * friction_uncertainty(**friction),
+        entrance_uncertainty(tube=tube, **flow),
+        exit_uncertainty(tube=tube, **flow),
+    )
     return float(np.sum(values)), float(np.linalg.norm(half_widths))
 
 

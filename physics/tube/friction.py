@@ -12,7 +12,6 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.physics.results import Estimate
 from ringbalance.scene.arrays import FloatArray, clipped
 
 STRAIGHT_CRITICAL_REYNOLDS: Final = 1070 * 28**0.23
@@ -22,26 +21,32 @@ _EQUAL_FORCE: Final = (1.0, 0.25)
 """T of the curved tube that is like the turning one, over Kt: by equal forces, and by equal gradients."""
 
 
-def turbulent_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> Estimate:
+def turbulent_friction_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> FloatArray:
     """Turbulent friction factor with rotation over the one without.
 
     0.942 + 0.058 Kt^0.282 up to Kt = 500, 0.942 Kt^0.05 above, 1 below Kt = 1, the joints rounded.
-    Returns: Estimate of the ratio, of the broadcast shape. The formula is recalled and unverified, so its 95
-        % half-width reaches the farthest of what else could be: no effect at all, and `curved_friction_ratio`
-        of the bend whose centrifugal force equals the Coriolis force, a/R_c = S, or S/2. Zero without
-        rotation.
+    Returns: The ratio, of the broadcast shape.
     Range: stated for Kt = R_Om^2/Re >= 1, smooth tubes.
     Source: Ito and Nanbu, J. Basic Eng. 93 (1971) 383, recalled.
     """
-    re, rotation = (np.asarray(v, dtype=np.float64) for v in (reynolds, rotation_reynolds))
-    kt = rotation**2 / re
+    kt = np.asarray(rotation_reynolds, dtype=np.float64) ** 2 / np.asarray(reynolds, dtype=np.float64)
     power = 0.942 + 0.058 * (1 + np.minimum(kt, 1e9) ** (0.282 * 8)) ** (1 / 8)
     far = 0.942 * np.maximum(kt, 1.0) ** 0.05
     weight = 1 / (1 + (_TURBULENT_JOIN / np.maximum(kt, 1e-9)) ** 4)
-    ratio = (1 - weight) * power + weight * far
-    bends = (curved_friction_ratio(curvature_number=share * kt) for share in _EQUAL_FORCE)
-    gaps = [np.abs(ratio - 1), *(np.abs(ratio - bend) for bend in bends)]
-    return Estimate(value=ratio, uncertainty=np.asarray(np.max(np.array(gaps), axis=0), dtype=np.float64))
+    return np.asarray((1 - weight) * power + weight * far)
+
+
+def turbulent_ratio_uncertainty(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) -> FloatArray:
+    """Expanded uncertainty (95 %) of `turbulent_friction_ratio`, zero without rotation.
+
+    The formula is recalled and unverified, so it reaches the farthest of what else could be: no effect at
+    all, and `curved_friction_ratio` of the bend whose centrifugal force equals the Coriolis force, a/R_c = S,
+    or S/2.
+    """
+    kt = np.asarray(rotation_reynolds, dtype=np.float64) ** 2 / np.asarray(reynolds, dtype=np.float64)
+    ratio = turbulent_friction_ratio(reynolds=reynolds, rotation_reynolds=rotation_reynolds)
+    bends = [curved_friction_ratio(curvature_number=share * kt) for share in _EQUAL_FORCE]
+    return np.asarray(np.max(np.abs([ratio - other for other in (np.ones_like(kt), *bends)]), axis=0))
 
 
 def curved_friction_ratio(*, curvature_number: npt.ArrayLike) -> FloatArray:

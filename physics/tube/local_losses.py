@@ -87,14 +87,20 @@ def end_table(end: str) -> _EndTable:
     )
 
 
-def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
+def _end_value(end: str, reynolds: npt.ArrayLike) -> FloatArray:
+    """K alone, at half the cost of `_end_loss`."""
     re = np.asarray(reynolds, dtype=np.float64)
     if not (np.all(re > 0.0) and np.all(np.isfinite(re))):
         raise ValueError("reynolds must be finite and above zero")
-    table = end_table(end)
+    table, inside = end_table(end), np.minimum(re, _LIMIT)
+    grown = 1 + inside / _SCALE
+    return np.asarray(table.scaled(np.log(grown)) * grown**table.power / inside)
+
+
+def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
+    re, value, table = np.asarray(reynolds, dtype=np.float64), _end_value(end, reynolds), end_table(end)
     inside = np.minimum(re, _LIMIT)
     a = np.log1p(inside / _SCALE)
-    value = table.scaled(a) * np.exp(table.power * a) / inside
     uncertainty_95 = np.interp(a, table.nodes, table.numerical) + table.interpolation_error * np.exp(a)
     beyond, risen = re > _LIMIT, clipped((re - _LIMIT) / (_FULL - _LIMIT), 0.0, 1.0)
     status = Status()
@@ -104,7 +110,7 @@ def _end_loss(end: str, reynolds: npt.ArrayLike) -> Estimate:
         )
         status = Status(code=StatusCode.OUT_OF_RANGE, text=text)
     return Estimate(
-        value=np.asarray(value, dtype=np.float64),
+        value=value,
         uncertainty=np.asarray(
             uncertainty_95 / inside + _DOMAIN * np.abs(value) + _BEYOND_TABLE * risen**2 * (3 - 2 * risen),
             dtype=np.float64,
@@ -181,55 +187,63 @@ def _turbulent_entrance_loss(*, tube: Tube) -> tuple[float, float]:
     return float(entrance_distance(Di=tube.bore, method="Crane")), 0.3
 
 
-def entrance_loss(
-    *, tube: Tube, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0
-) -> tuple[FloatArray, FloatArray]:
+def entrance_loss(*, tube: Tube, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0) -> FloatArray:
     """Entrance loss beyond the profile's kinetic energy, (p_reservoir - p_tube) 2/(rho u^2) - f L/d - alpha.
 
     Laminar: K_ent - 2 of a sharp entrance by finite elements, turbulent: the entrance's K, blended over the
     transition.
     Args: `critical_ratio`: critical Re over the straight tube's, broadcasts.
-    Returns: K and its expanded uncertainty (95 %), of the broadcast shape.
     Source: `laminar_entrance_loss`; an entrance that is not sharp has the same laminar value with a
         wider half-width.
     """
+    turned = turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
+    turbulent, _ = _turbulent_entrance_loss(tube=tube)
+    return np.asarray((1 - turned) * (_end_value("entrance", reynolds) - 2) + turned * turbulent)
+
+
+def entrance_uncertainty(
+    *, tube: Tube, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0
+) -> FloatArray:
+    """Expanded uncertainty (95 %) of `entrance_loss`."""
     re = np.asarray(reynolds, dtype=np.float64)
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
     turbulent, half_width = _turbulent_entrance_loss(tube=tube)
     table = laminar_entrance_loss(reynolds=re)
-    laminar = table.value - 2
     unlike = 0.0 if tube.entrance == "sharp" else _OTHER_ENTRANCE + 0.2 * _CREEPING / re
     uncertainty_95 = (1 - turned) * (table.uncertainty + unlike) + turned * half_width
-    gap = 2 * turned * (1 - turned) * (laminar - turbulent)
-    return (1 - turned) * laminar + turned * turbulent, np.hypot(uncertainty_95, gap)
+    return np.hypot(uncertainty_95, 2 * turned * (1 - turned) * (table.value - 2 - turbulent))
 
 
 def exit_loss(
+    *, reynolds: npt.ArrayLike, critical_ratio: npt.ArrayLike = 1.0, friction_ratio: npt.ArrayLike = 1.0
+) -> FloatArray:
+    """What a laminar exit adds to the "+1": alpha - 1 + K_exit, as the stream carries alpha u^2/2 away.
+
+    Turbulent it is zero, because there the "+1" is the whole exit loss.
+    Args: `critical_ratio`: critical Re over the straight tube's, broadcasts. `friction_ratio`: F of developed
+        laminar flow, broadcasts.
+    Source: alpha of `kinetic_factor`; K_exit from `laminar_exit_loss`, which is for the profile
+        without rotation.
+    """
+    turned = turbulent_share(reynolds=reynolds, critical_ratio=critical_ratio)
+    carried = _laminar_kinetic_factor(np.asarray(friction_ratio, dtype=np.float64)) - 1
+    return np.asarray((1 - turned) * (carried + _end_value("exit", reynolds)))
+
+
+def exit_uncertainty(
     *,
     tube: Tube,
     reynolds: npt.ArrayLike,
     critical_ratio: npt.ArrayLike = 1.0,
     friction_ratio: npt.ArrayLike = 1.0,
-) -> tuple[FloatArray, FloatArray]:
-    """What a laminar exit adds to the "+1": alpha - 1 + K_exit, as the stream carries alpha u^2/2 away.
-
-    Turbulent it is zero, because there the "+1" is the whole exit loss.
-    Args: `tube`: the tube; one too short for a developed laminar profile widens the half-width. `reynolds`:
-        Re, any shape, positive. `critical_ratio`: critical Re over the straight tube's, broadcasts.
-        `friction_ratio`: F of developed laminar flow, broadcasts.
-    Returns: K and its expanded uncertainty (95 %), of the broadcast shape.
-    Source: alpha of `kinetic_factor`; K_exit from `laminar_exit_loss`, which is for the profile
-        without rotation.
-    """
+) -> FloatArray:
+    """Expanded uncertainty (95 %) of `exit_loss`; a tube too short for a developed profile widens it."""
     re, ratio = (np.asarray(v, dtype=np.float64) for v in (reynolds, friction_ratio))
     turned = turbulent_share(reynolds=re, critical_ratio=critical_ratio)
     undeveloped = np.minimum(1.0, LAMINAR_ENTRY_LENGTH * re * tube.bore / tube.length)
-    table = laminar_exit_loss(reynolds=re)
     blunted = ROTATING_PROFILE_UNCERTAINTY * np.minimum(1.0, (ratio - 1) / 0.1)
-    uncertainty_95 = (1 - turned) * (table.uncertainty + 0.3 * undeveloped + blunted) + 0.06 * turned
-    gap = 2 * turned * (1 - turned)
-    carried = _laminar_kinetic_factor(ratio) - 1
-    return (1 - turned) * (carried + table.value), np.hypot(uncertainty_95, gap)
+    laminar = laminar_exit_loss(reynolds=re).uncertainty + 0.3 * undeveloped + blunted
+    return np.hypot((1 - turned) * laminar + 0.06 * turned, 2 * turned * (1 - turned))
 
 
 _BEND_UNCERTAINTY: Final = 0.25

@@ -20,14 +20,15 @@ from ringbalance.physics.tube.friction import (
     friction_factor,
     friction_uncertainty,
     turbulent_friction_ratio,
+    turbulent_ratio_uncertainty,
     turbulent_share,
 )
 from ringbalance.physics.tube.local_losses import (
     LAMINAR_ENTRY_LENGTH,
     bend_in_range,
     bend_uncertainty,
-    entrance_loss,
-    exit_loss,
+    entrance_uncertainty,
+    exit_uncertainty,
     straight_length,
 )
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio, rotation_table_covers
@@ -119,25 +120,25 @@ def model_parts(*, tube: Tube, state: TubeState) -> dict[str, FloatArray]:
         return {}
     re, rough, ratio = state.reynolds, tube.roughness / tube.bore, state.critical_ratio
     straight = straight_length(tube=tube) / tube.bore
-    lam = rotating_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
-    tur = turbulent_friction_ratio(reynolds=re, rotation_reynolds=state.rotation_reynolds)
+    numbers = {"reynolds": re, "rotation_reynolds": state.rotation_reynolds}
+    lam, turbulent = rotating_friction_ratio(**numbers), turbulent_friction_ratio(**numbers)
     friction = friction_uncertainty(
         reynolds=re,
         relative_roughness=rough,
         laminar_ratio=lam.value,
-        turbulent_ratio=tur.value,
+        turbulent_ratio=turbulent,
         critical_ratio=ratio,
     )
     higher = friction_factor(
         reynolds=re,
         relative_roughness=rough,
         laminar_ratio=lam.value + lam.uncertainty,
-        turbulent_ratio=tur.value + tur.uncertainty,
+        turbulent_ratio=turbulent + turbulent_ratio_uncertainty(**numbers),
         critical_ratio=ratio,
     )
     ends = (
-        entrance_loss(tube=tube, reynolds=re, critical_ratio=ratio)[1],
-        exit_loss(tube=tube, reynolds=re, critical_ratio=ratio, friction_ratio=lam.value)[1],
+        entrance_uncertainty(tube=tube, reynolds=re, critical_ratio=ratio),
+        exit_uncertainty(tube=tube, reynolds=re, critical_ratio=ratio, friction_ratio=lam.value),
     )
     return {
         "friction correlation": straight * friction,

@@ -129,11 +129,12 @@ def _rectangle(table: str, rows: Rows) -> Rectangle:
     )
 
 
-def _logarithm(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> FloatArray:
-    """ln F at the nearest point of the rectangle."""
-    a, b = clipped(a, 0.0, rectangle.a_limit), clipped(b, 0.0, rectangle.b_limit)
-    logarithm = _base_at(rectangle.table, a, b) + rectangle.difference.ev(a, b)
-    return np.asarray(np.where(a > 0.0, logarithm, 0.0))
+def _logarithm(rectangle: Rectangle, a: FloatArray, b: FloatArray, *, where: BoolArray) -> FloatArray:
+    """ln F at the nearest point of the rectangle; zero without rotation, and where it does not count."""
+    logarithm, here = np.zeros(a.shape), where & (a > 0.0)
+    a, b = clipped(a[here], 0.0, rectangle.a_limit), clipped(b[here], 0.0, rectangle.b_limit)
+    logarithm[here] = _base_at(rectangle.table, a, b) + rectangle.difference.ev(a, b)
+    return logarithm
 
 
 def _discretisation(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> FloatArray:
@@ -146,7 +147,7 @@ def _discretisation(rectangle: Rectangle, a: FloatArray, b: FloatArray) -> Float
 def _gap(rectangle: Rectangle, rows: Rows) -> FloatArray:
     """Relative gaps of the interpolant to points solved between the nodes."""
     a, b, fine, _ = _columns(rows)
-    return np.asarray(np.abs(np.exp(_logarithm(rectangle, a, b)) / fine - 1), dtype=np.float64)
+    return np.asarray(np.abs(np.exp(_logarithm(rectangle, a, b, where=a > 0)) / fine - 1), dtype=np.float64)
 
 
 @lru_cache(maxsize=1)
@@ -245,7 +246,10 @@ def laminar_ratio(*, reynolds: npt.ArrayLike, rotation_reynolds: npt.ArrayLike) 
 def _ratio(at: _Place, rotation: FloatArray) -> FloatArray:
     table = friction_table()
     slow, fast = _carried_on(
-        _logarithm(table.slow, *at.slow), _logarithm(table.fast, *at.fast), at.kl, rotation
+        _logarithm(table.slow, *at.slow, where=at.weight < 1),
+        _logarithm(table.fast, *at.fast, where=at.weight > 0),
+        at.kl,
+        rotation,
     )
     return np.asarray((1 - at.weight) * slow + at.weight * fast)
 

@@ -111,11 +111,11 @@ def tube_state_at(*, tube: Tube, reynolds: npt.ArrayLike, rotation_reynolds: npt
     else:
         # The arcs turn too: rotation acts on the whole length, friction without it on the straights alone.
         terms = {
-            "entrance": entrance_loss(tube=tube, reynolds=re, critical_ratio=critical)[0],
+            "entrance": entrance_loss(tube=tube, reynolds=re, critical_ratio=critical),
             "friction": straight_length(tube=tube) / tube.bore * straight,
             "rotation": tube.length / tube.bore * (turning - straight),
             "bends": np.asarray(sum(bends, start=np.zeros(re.shape)), dtype=np.float64),
-            "exit": exit_loss(tube=tube, reynolds=re, critical_ratio=critical, friction_ratio=laminar)[0],
+            "exit": exit_loss(reynolds=re, critical_ratio=critical, friction_ratio=laminar),
             "extra": np.full(re.shape, tube.extra_loss),
         }
     return TubeState(
@@ -139,7 +139,7 @@ def _rotation(
         reynolds=re,
         relative_roughness=rough,
         laminar_ratio=laminar,
-        turbulent_ratio=turbulent_friction_ratio(reynolds=re, rotation_reynolds=rotation).value,
+        turbulent_ratio=turbulent_friction_ratio(reynolds=re, rotation_reynolds=rotation),
         critical_ratio=critical,
     )
     return turning, laminar, critical

@@ -16,7 +16,7 @@ from ringbalance.reports.figure import INK, MAP, MUTED, NARROW, Drawing, draw, f
 from ringbalance.reports.pages.cases import anchor, case_view
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.verification.navier_stokes.flow_fields import EndFlow, SectionFlow
+from ringbalance.verification.navier_stokes.flow_fields import FlowField, end_field, section_field
 
 _LARGEST: Final = 500.0
 """Re up to which a flow is drawn: beyond, a laminar one is thin layers that no picture shows."""
@@ -158,9 +158,9 @@ def _collect(work: Work) -> Record | None:
         "reynolds": reynolds,
         "rotation_reynolds": loss.rotation_reynolds,
         "laminar": laminar,
-        "section": _section_record(SectionFlow.of(reynolds=drawn, rotation_reynolds=rotation)),
-        "entrance": _end_record(EndFlow.entrance(reynolds=drawn)),
-        "exit": _end_record(EndFlow.exit(reynolds=drawn)),
+        "section": _section_record(section_field(reynolds=drawn, rotation_reynolds=rotation)),
+        "entrance": _end_record(end_field("entrance", reynolds=drawn)),
+        "exit": _end_record(end_field("exit", reynolds=drawn)),
     }
 
 
@@ -172,27 +172,27 @@ def _packed(values: npt.ArrayLike) -> str:
     return " ".join(f"{value:.{_DIGITS}g}" for value in np.asarray(values).ravel())
 
 
-def _section_record(flow: SectionFlow) -> Record:
+def _section_record(flow: FlowField) -> Record:
     return {
         "reynolds": flow.reynolds,
         "rotation_reynolds": flow.rotation_reynolds,
         "friction_ratio": flow.friction_ratio,
         "friction_change": flow.friction_ratio - 1,
-        "largest_drift": float(np.hypot(*flow.velocity).max()),
+        "largest_drift": float(np.hypot(*flow.velocity[:2]).max()),
         "points": _packed(flow.points),
         "triangles": " ".join(str(node) for node in flow.triangles.ravel()),
-        "colour": _packed(flow.axial_velocity),
+        "colour": _packed(flow.velocity[2]),
         "stream_function": _packed(flow.stream_function),
-        "velocity": _packed(flow.velocity),
+        "velocity": _packed(flow.velocity[:2]),
     }
 
 
-def _end_record(flow: EndFlow) -> Record:
+def _end_record(flow: FlowField) -> Record:
     return {
         "reynolds": flow.reynolds,
         "points": _packed(flow.points),
         "triangles": " ".join(str(node) for node in flow.triangles.ravel()),
-        "colour": _packed(flow.speed),
+        "colour": _packed(np.hypot(*flow.velocity)),
         "stream_function": _packed(flow.stream_function),
     }
 

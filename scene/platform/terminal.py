@@ -21,10 +21,14 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn
 from rich.text import Text
 
+from ringbalance.scene.platform.display import LOG, display
+
 FIRST_LINE: Final = 10.0
 """Seconds without a terminal before the first line."""
 NEXT_LINE: Final = 30.0
 """Seconds from one line to the next."""
+_NEXT_LOGGED: Final = 1.0
+"""Seconds from one entry of the log to the next."""
 _LOADED: Final = time.perf_counter()
 _STAT: Final = Path("/proc/self/stat")
 _STARTED_AT: Final = 19
@@ -60,8 +64,20 @@ def results_console() -> Console:
 
 
 def messages_console() -> Console:
-    """Standard error, for progress and messages."""
-    return _Terminal(stderr=True)
+    """Standard error, for progress and messages; silent where the command line asks for quiet."""
+    return _Terminal(stderr=True, quiet=display().quiet)
+
+
+def print_message(text: str) -> None:
+    """Write to standard error, unless the command line asks for quiet, and to the log."""
+    LOG.info("%s", text)
+    messages_console().print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def print_error(text: str) -> None:
+    """Write to standard error and to the log."""
+    LOG.error("%s", text)
+    _Terminal(stderr=True).print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 class Activity:
@@ -72,6 +88,7 @@ class Activity:
 
     def __init__(self, text: str, bar: Progress) -> None:
         self.text = text
+        self._logged = monotonic()
         self._bar = bar
         self._task: TaskID = bar.add_task(escape(text), total=None)
 
@@ -82,6 +99,9 @@ class Activity:
             work altogether, in the same unit; None where it is not known.
         """
         self.text = text
+        if monotonic() > self._logged + _NEXT_LOGGED:
+            LOG.info("%s", text)
+            self._logged = monotonic()
         self._bar.update(self._task, description=escape(text), completed=done, total=total)
 
 
@@ -92,12 +112,13 @@ def activity(command: str, text: str) -> Iterator[Activity]:
     Args: `command`: its name, which begins each line. `text`: what it does first.
     Yields: The activity, to be kept up to date.
     """
-    console = messages_console()
+    LOG.info("%s: %s", command, text)
+    console, quiet = messages_console(), display().quiet
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
         shown, ended = Activity(text, bar), Event()
         lines = Thread(target=_write_lines, args=(command, shown, ended), daemon=True)
-        if not console.is_terminal:
+        if not (quiet or console.is_terminal):
             lines.start()
         try:
             yield shown

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import json
 import re
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from other_pythons import supported
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
@@ -125,6 +127,24 @@ def test_one_version_everywhere(project: Mapping[str, Any], root: Path) -> None:
     assert ringbalance.__version__ == version
     assert f"\nversion: {version}\n" in (root / "CITATION.cff").read_text()
     assert f"\n## [{version}]" in (root / "CHANGELOG.md").read_text()
+    assert json.loads((root / "codemeta.json").read_text())["version"] == version
+
+
+def test_each_licence_has_its_text_and_each_transcription_its_licence(
+    project: Mapping[str, Any], root: Path
+) -> None:
+    annotations = tomllib.loads((root / "REUSE.toml").read_text())["annotations"]
+    licences = {entry["SPDX-License-Identifier"] for entry in annotations}
+    assert {path.stem for path in (root / "LICENSES").iterdir()} == licences
+    assert set(project["project"]["license"].split(" AND ")) == licences
+    assert (root / "LICENSE").read_text() == (root / "LICENSES/BSD-3-Clause.txt").read_text()
+    stated = {
+        str(path.relative_to(root)): match[1].replace(" ", "-")
+        for path in sorted((root / "verification/validation/data").glob("*.csv"))
+        if (match := re.search(r'^# licence = ".*the transcription (.*)"$', path.read_text(), re.MULTILINE))
+    }
+    annotated = {path: e["SPDX-License-Identifier"] for e in annotations[1:] for path in e["path"]}
+    assert stated == annotated != {}
 
 
 @pytest.mark.parametrize("name", ["lock.txt", "lock-all.txt", "bootstrap.txt"])
@@ -134,17 +154,12 @@ def test_locks_have_hashes_and_no_host(root: Path, name: str) -> None:
     assert lock_faults(text) == []
 
 
-def supported_versions(project: Mapping[str, Any]) -> list[str]:
-    """Minor versions of Python that the project promises."""
-    allowed = SpecifierSet(project["project"]["requires-python"])
-    return [version for minor in range(100) if f"{(version := f'3.{minor}')}.0" in allowed]
-
-
 def test_locks_serve_every_supported_python(project: Mapping[str, Any], root: Path) -> None:
     requirements = project["project"]["dependencies"] + project["dependency-groups"]["dev"]
     extras = [one for extra in project["project"]["optional-dependencies"].values() for one in extra]
-    versions = supported_versions(project)
+    versions = supported(project["project"]["classifiers"])
     assert len(versions) >= 3
+    assert all(f"{version}.0" in SpecifierSet(project["project"]["requires-python"]) for version in versions)
     for version in versions:
         text, text_all = ((root / "requirements" / name).read_text() for name in ("lock.txt", "lock-all.txt"))
         assert pin_errors(text, version, requirements) == [], version

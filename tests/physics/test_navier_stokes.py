@@ -22,20 +22,19 @@ from published_flows import (
 from skfem import MeshHex
 
 from ringbalance.physics.results import StatusCode
-from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSystem
 from ringbalance.verification.navier_stokes.newton import (
     NewtonSettings,
     solve_flow,
 )
-from ringbalance.verification.navier_stokes.tube import Patch, patch_mesh
+from ringbalance.verification.navier_stokes.tube import patch_mesh, tensor
 
 DATA = Path(__file__).parent / "data"
 
 
 def _square(cells: int) -> object:
     line = np.linspace(0.0, 1.0, 2 * cells + 1)
-    sides = dict.fromkeys(("west", "east", "south", "north"), "wall")
-    return patch_mesh([Patch.tensor(x=line, y=line, sides=sides)])
+    return patch_mesh([tensor(x=line, y=line)])
 
 
 def _orders(coarse: FieldErrors, fine: FieldErrors) -> list[float]:
@@ -173,33 +172,31 @@ def test_three_components_with_coriolis_converge_at_third_order() -> None:
     errors = []
     for cells in (4, 8):
         conditions = [Dirichlet(boundary="wall", component=c, value=partial(_component, c)) for c in range(3)]
-        space = FlowSpace.taylor_hood(mesh=_square(cells), components=3)
         system = FlowSystem.of(
-            space=space,
+            mesh=_square(cells),
+            components=3,
             conditions=conditions,
             enclosed=True,
-            coriolis=CORIOLIS,
             body_force=_manufactured_force,
         )
         solution = solve_flow(
-            system=system, coefficients=Coefficients(inertia=2.0, viscosity=0.1, rotation=1.0)
+            system=system, coefficients=Coefficients(inertia=2.0, viscosity=0.1, rotation=CORIOLIS)
         )
         assert solution.status.ok
-        errors.append(np.abs(solution.velocity - _manufactured(space.node_coordinates())).max())
+        errors.append(np.abs(solution.velocity - _manufactured(system.nodes)).max())
     assert np.log2(errors[0] / errors[1]) > 2.7
     assert errors[1] < 1.2e-3
 
 
 def _random_system() -> tuple[FlowSystem, np.ndarray]:
     conditions = [Dirichlet(boundary="wall", component=c) for c in range(3)]
-    space = FlowSpace.taylor_hood(mesh=_square(2), components=3)
-    system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, coriolis=CORIOLIS)
-    return system, np.random.default_rng(0).normal(size=space.unknowns)
+    system = FlowSystem.of(mesh=_square(2), components=3, conditions=conditions, enclosed=True)
+    return system, np.random.default_rng(0).normal(size=system.unknowns)
 
 
 def test_jacobian_is_the_exact_derivative() -> None:
     system, vector = _random_system()
-    c = Coefficients(inertia=1.3, viscosity=0.2, rotation=0.7)
+    c = Coefficients(inertia=1.3, viscosity=0.2, rotation=0.7 * CORIOLIS)
     change = np.zeros_like(vector)
     change[system.free] = np.random.default_rng(1).normal(size=system.free.size)
     linear = system.linear_matrix(c)
@@ -232,13 +229,12 @@ def test_a_flow_inside_the_space_is_exact_in_three_dimensions() -> None:
     conditions = [
         Dirichlet(boundary="wall", component=c, value=partial(_square_of_next, c)) for c in range(3)
     ]
-    space = FlowSpace.taylor_hood(mesh=mesh)
-    system = FlowSystem.of(space=space, conditions=conditions, enclosed=True, body_force=_solid_force)
+    system = FlowSystem.of(mesh=mesh, conditions=conditions, enclosed=True, body_force=_solid_force)
     solution = solve_flow(system=system, coefficients=Coefficients(viscosity=0.5))
     assert solution.status.ok
-    at = space.node_coordinates()
+    at = system.nodes
     np.testing.assert_allclose(solution.velocity, at[[1, 2, 0]] ** 2, atol=1e-10)
-    p = np.asarray(space.pressure.doflocs)
+    p = np.asarray(system.pressure.doflocs)
     expected = p[0] + 2 * p[1] - p[2]
     np.testing.assert_allclose(solution.pressure - solution.pressure[0], expected - expected[0], atol=1e-8)
 
@@ -246,7 +242,7 @@ def test_a_flow_inside_the_space_is_exact_in_three_dimensions() -> None:
 def test_a_failed_solve_says_what_to_do() -> None:
     conditions = [Dirichlet(boundary="wall", component=0, value=lambda x: np.where(x[1] == 1, 1.0, 0.0))]
     conditions += [Dirichlet(boundary="wall", component=1)]
-    system = FlowSystem.of(space=FlowSpace.taylor_hood(mesh=_square(4)), conditions=conditions, enclosed=True)
+    system = FlowSystem.of(mesh=_square(4), conditions=conditions, enclosed=True)
     solution = solve_flow(
         system=system, coefficients=Coefficients(viscosity=1e-5), settings=NewtonSettings(max_iterations=4)
     )

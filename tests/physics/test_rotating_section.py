@@ -92,7 +92,7 @@ def _followed(kl: float, s: float, around: int) -> float:
 def test_a_path_recovers_from_steps_that_fail() -> None:
     system, taken = _system(4), [0.0]
 
-    def solve(kl: float, start: FlowSolution) -> FlowSolution:
+    def solve(kl: float, start: FlowSolution | None) -> FlowSolution:
         found = solve_section(system=system, kl=kl, s=1.0, start=start)
         if kl - taken[-1] > 40.0:
             return replace(found, status=Status(code=StatusCode.NOT_CONVERGED, text="too far"))

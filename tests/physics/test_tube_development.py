@@ -20,7 +20,7 @@ from ringbalance.physics.tube.loss import (
 )
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.verification.cases.sections import decay_length, slowest_decay
-from ringbalance.verification.navier_stokes.flow import Coefficients, FlowSystem
+from ringbalance.verification.navier_stokes.flow import FlowSystem
 from ringbalance.verification.navier_stokes.newton import FlowSolution, NewtonSettings, solve_flow
 from ringbalance.verification.navier_stokes.tube import (
     SectionMesh,
@@ -148,7 +148,7 @@ def test_developing_length_bounds_the_slowest_decay_everywhere(rotation: float) 
 
 
 def _alpha(flow: FlowSolution, system: FlowSystem) -> float:
-    weights, axial = system.space.weights, system.space.at_points(flow.velocity)[0][2]
+    weights, axial = system.weights, system.at_points(flow.velocity)[0][2]
     return float((weights * axial**3).sum() / weights.sum())
 
 
@@ -189,16 +189,15 @@ def _entry_excess(re: float, rotation: float, blunt: float) -> float:
     way = 5 * bound(re, rotation)
     tube = swept_tube(section=cells.mesh(), segments=[Segment(length=way, cells=16, ratio=6.0)])
     flow = bent_tube._system(tube, system, developed, re)
-    space, nodes = system.space, system.space.velocity_nodes
-    profile = 1 - np.minimum(2 * np.hypot(*space.node_coordinates()), 1.0) ** blunt
-    profile *= space.weights.sum() / (system.flow_load[2 * nodes : 3 * nodes] @ profile)
+    profile = 1 - np.minimum(2 * np.hypot(*system.nodes), 1.0) ** blunt
+    profile *= system.weights.sum() / (system.load() @ profile)
     given = flow.fixed_values.copy().reshape(-1)
-    inlet, count = flow.space.boundary_nodes("inlet"), flow.space.velocity_nodes
+    inlet, count = flow.boundary_nodes("inlet"), flow.nodes.shape[1]
     for component, value in enumerate((profile[tube.section_node[inlet]], 0.0, 0.0)):
         given[component * count + inlet] = value
     solution = solve_flow(
         system=dataclasses.replace(flow, fixed_values=given),
-        coefficients=Coefficients(inertia=re, viscosity=1.0, rotation=2 * rotation),
+        coefficients=bent_tube.coefficients(reynolds=re, rotation_reynolds=rotation),
         start=bent_tube._guess(tube, flow, developed, re),
         settings=NewtonSettings(tolerance=1e-6),
     )

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import csv
 import math
-import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib.resources import files
@@ -22,14 +21,12 @@ from ringbalance.physics.pressure.loads import liquid_integrals
 from ringbalance.physics.pressure.ring import RingQuantities, ring_quantities
 from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.pressure.surface import solve_with_gravity
-from ringbalance.scene import bundled_scene
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.platform.files import cache_folder
 from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found
-from ringbalance.verification.extremes.design import Base
-from ringbalance.verification.extremes.point import SOUND, Defect, Ending
-from ringbalance.verification.extremes.study import SIZES, Size, counted, find_extremes
+from ringbalance.verification.extremes.point import Ending
+from ringbalance.verification.extremes.study import SIZES, Size, find_extremes
 from ringbalance.verification.finite_elements import found_of, mesh_table, mutated_force, ring_of
 from ringbalance.verification.papers import with_plate
 from ringbalance.verification.reference.chambers import exact_moment, exact_totals, exact_wall_pressure
@@ -54,17 +51,16 @@ _ROUND_OFF: Final = 1e-13
 _COUNT: Final = 240
 _SEED: Final = 20
 _WIDTHS: Final = {None: 1.0, "half_widths_quartered": 0.25, "half_widths_padded": 100.0}
-_DEFECTS: Final = {
-    None: SOUND,
-    "half_widths_hundredth": Defect(width_factor=0.01),
-    "liquid_lost": Defect(leak=1e-6),
+_MUTATIONS: Final[Mapping[str | None, Mapping[str, float]]] = {
+    None: {},
+    "half_widths_hundredth": {"width_factor": 0.01},
+    "liquid_lost": {"leak": 1e-6},
 }
 _FEW: Final = Size(points=40, sweep=2, fineness=1.0)
 """Enough for a mutation to show."""
 _WORKERS: Final = 2
-_KEPT: Final = "extremes-points.json"
-"""From which an interrupted run resumes."""
-_PAPER: Final = "liquid_ring_paper"
+_KEPT: Final = "extremes"
+"""Folder from which an interrupted run resumes."""
 
 
 class _Example(NamedTuple):
@@ -309,24 +305,25 @@ def _random_disc(generator: np.random.Generator) -> Disc:
 
 def extremes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """The designed set and the axes of the extremes; a heavy run."""
-    document = tomllib.loads(bundled_scene(_PAPER).read_text(encoding="utf-8"))
-    base = Base(document=document, file=f"{_PAPER}.toml", defect=_DEFECTS[defect])
-    size = SIZES[level] if defect is None else _FEW
-    kept = cache_folder() / _KEPT if level == "heavy" and defect is None else None
-    found = find_extremes(base, size=size, workers=_WORKERS, kept=kept)
-    everything = found.everything
-    endings, worst = counted(everything), max(j.worst_ratio for j in everything)
-    named = (Ending.SOLVED, Ending.WIDE, Ending.STATUS, Ending.REFUSED)
+    result = find_extremes(
+        scene,
+        size=SIZES[level] if defect is None else _FEW,
+        workers=_WORKERS,
+        kept=cache_folder() / _KEPT if level == "heavy" and defect is None else None,
+        mutation=_MUTATIONS[defect],
+    )
+    document, named = result.to_dict(), (Ending.SOLVED, Ending.WIDE, Ending.STATUS, Ending.REFUSED)
+    worst = document["worst_error_over_half_width"]
     return Evidence(
-        found=as_found(broken=found.broken(), worst=worst),
+        found=as_found(broken=result.broken(), worst=worst),
         numbers={
-            "judged": float(len(everything)),
-            "points": float(len(found.points)),
-            "residual": max(j.residual for j in everything),
+            "judged": float(document["judged"]),
+            "points": float(document["points"]),
+            "residual": document["worst_residual"],
             "worst": worst,
-            **{ending.name.lower(): float(endings[str(ending)]) for ending in named},
+            **{ending.name.lower(): float(document["endings"][str(ending)]) for ending in named},
         },
-        tables=[Table(name=name, columns=columns) for name, columns in found.tables().items()],
+        tables=(Table(name="axes", columns=result.axes_table()),),
     )
 
 

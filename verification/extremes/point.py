@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from enum import StrEnum
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -18,16 +18,10 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.loader import scene_from
 from ringbalance.scene.models import Scene
-from ringbalance.scene.narrowing import liquid_ring_scene
-from ringbalance.scene.toml import toml_bytes
+from ringbalance.verification.extremes.axes import Point, scene_at
 from ringbalance.verification.reference.chambers import exact_wall_pressure
 
-PERIODS: Final = 20
-"""Of the controller that a point's closed loop may take."""
-GAS_TIME: Final = 0.2
-"""s, beyond those: a short period with long valve-open times is no reason for hundreds of operations."""
 ROUND_OFF: Final = 1e-12
 """Relative: what floating point may take from a conserved or monotone quantity."""
 WIDE: Final = 1.0
@@ -67,51 +61,49 @@ class Judgement:
     loop: str = ""
     """Outcome of its closed loop."""
 
+    @property
+    def answered(self) -> bool:
+        """Whether the point got an answer, with or without a reservation."""
+        return self.ending not in (Ending.REFUSED, Ending.BROKEN)
+
     @classmethod
-    def refused(cls, error: SceneError) -> Judgement:
-        """Judge a refusal: it has to name what is wrong. Args: `error`: as a user meets it."""
-        return cls(ending=Ending.REFUSED, text=str(error), violations=tuple(_unclear(error)))
+    def of_record(cls, record: dict[str, Any]) -> Self:
+        """From plain data, as `judged` gives it and a file keeps it."""
+        ending, violations = Ending(record["ending"]), tuple(record["violations"])
+        return cls(**record | {"ending": ending, "violations": violations})
 
 
-@dataclass(frozen=True, kw_only=True)
-class Defect:
-    """Deliberate errors, to show that the judgement notices; the defaults are none."""
-
-    width_factor: float = 1.0
-    """Multiplies every half-width of the chamber."""
-    leak: float = 0.0
-    """Share of the liquid lost by the end of a run."""
-
-
-SOUND: Final = Defect()
-
-
-def judge_point(
-    document: Mapping[str, Any], *, file: str = "extremes.toml", defect: Defect = SOUND
-) -> Judgement:
-    """Take a scene file through calibration and closed loop, and look for anything that should not be.
+def judged(scene: Scene, point: Point, *, width_factor: float = 1.0, leak: float = 0.0) -> dict[str, Any]:
+    """Take a scene at a point through calibration and closed loop, and look for anything that should not be.
 
     An exception other than a scene's error counts as broken, whatever it is.
+    Args: `width_factor`: of every half-width of the chamber; other than 1 only to show that the judgement
+        notices. `leak`: fraction of the liquid that is lost by the end of a run, likewise.
+    Returns: The judgement as plain data.
     """
     try:
-        scene = liquid_ring_scene(scene_from(content=toml_bytes(document), file=file))
-        calibration = calibrate(scene)
-        run = simulate(scene, calibration.model)
+        varied = scene_at(scene, point)
+        calibration = calibrate(varied)
+        run = simulate(varied, calibration.model)
     except SceneError as error:
-        return Judgement.refused(error)
+        # By its name alone: the path of the file is nothing of the scene's.
+        text = str(error).replace(scene.file, scene.source)
+        return asdict(Judgement(ending=Ending.REFUSED, text=text, violations=tuple(_unclear(error))))
     except Exception as error:
         # Whatever it is: finding it is what this is for.
         text = f"{type(error).__name__}: {error}"
-        return Judgement(ending=Ending.BROKEN, text=text, violations=(f"exception {text}",))
-    ratio, status = _worst_ratio(calibration, defect.width_factor), calibration.chamber.status
-    violations = (*_calibration_faults(calibration, ratio), *_loop_faults(scene, run, defect.leak))
-    return Judgement(
-        ending=Ending.BROKEN if violations else _ending(calibration),
-        text="" if status.ok else status.text,
-        violations=violations,
-        residual=float(calibration.statistics["relative_residual"]),
-        worst_ratio=ratio,
-        loop=str(run.outcome),
+        return asdict(Judgement(ending=Ending.BROKEN, text=text, violations=(f"exception {text}",)))
+    ratio, status = _worst_ratio(calibration, width_factor), calibration.chamber.status
+    violations = (*_calibration_faults(calibration, ratio), *_loop_faults(varied, run, leak))
+    return asdict(
+        Judgement(
+            ending=Ending.BROKEN if violations else _ending(calibration),
+            text="" if status.ok else status.text,
+            violations=violations,
+            residual=float(calibration.statistics["relative_residual"]),
+            worst_ratio=ratio,
+            loop=str(run.outcome),
+        )
     )
 
 

@@ -10,38 +10,40 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.design.static import content_of
+from ringbalance.design.store import Store
+from ringbalance.design.work import answers, tasks_of
 from ringbalance.results.numbers import number
-from ringbalance.results.result import Cells, Result, Rows, Table
+from ringbalance.results.result import Cells, Result, Rows, Table, print_rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.changes import document_of
 from ringbalance.scene.faults import Fault, SceneError
 from ringbalance.scene.loader import load_scene
 from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged, write_whole
 from ringbalance.scene.platform.processes import checked_workers
-from ringbalance.scene.platform.terminal import activity, messages_console, results_console
+from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.scene.toml import toml_text
 from ringbalance.verification.evidence import Level
-from ringbalance.verification.extremes.design import AXES, Axis, Base, Point, design
-from ringbalance.verification.extremes.design import Progress as Counting
-from ringbalance.verification.extremes.point import Ending, Judgement
+from ringbalance.verification.extremes.axes import AXES, Axis, Point, designed_set
+from ringbalance.verification.extremes.point import Ending, Judgement, judged
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, the points done of it and their number."""
 Record = dict[str, Any]
 
-_DONE: Final = 0
-_BROKEN: Final = 1
 _FILE: Final = "extremes.json"
-_KEPT: Final = "extremes-points.json"
+_STORE: Final = "store"
+"""Folder of kept judgements in that of a study."""
 _SEED: Final = 1
 _MOST_SHOWN: Final = 20
 """Violations reported in full."""
@@ -66,150 +68,156 @@ SIZES: Final[Mapping[Level, Size]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Span:
-    """A stretch of one axis along which points end alike."""
-
-    low: float
-    """First value judged, in the axis' unit."""
-    high: float
-    """Last value judged."""
-    ending: Ending
-    loop: str
-    """Outcome of the closed loop; empty where there is none."""
-    text: str
-    """What the program says there: its message or reservation, at the end towards the nearest answer."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """One axis from end to end."""
+    """One axis from end to end: even steps, and closer ones where the ending changes."""
 
     axis: Axis
-    values: FloatArray
-    """In the axis' unit, ascending, shape (n,): even steps, and closer ones where the ending changes."""
+    shares: FloatArray
+    """Fractions of the way along the axis, ascending, shape (n,)."""
     judgements: tuple[Judgement, ...]
 
-    def solved(self) -> tuple[float, float] | None:
-        """First and last value that got an answer, with or without a reservation; None for none."""
-        good = [v for v, j in zip(self.values, self.judgements, strict=True) if _answered(j)]
-        return (float(good[0]), float(good[-1])) if good else None
+    @property
+    def values(self) -> list[float]:
+        """In the axis' unit."""
+        return [float(self.axis.at(share)) for share in self.shares]
 
-    def beyond(self) -> tuple[str, ...]:
-        """What the program says past either end of that, each message once."""
-        told = (j.text for j in self.judgements if not _answered(j))
-        return tuple(dict.fromkeys(told))
+    @property
+    def points(self) -> list[Point]:
+        """Of each judgement."""
+        return [{self.axis.name: value} for value in self.values]
 
-    def changes(self) -> tuple[int, ...]:
-        """Places after which a point ends in another way than the one before."""
-        pairs = zip(self.judgements[:-1], self.judgements[1:], strict=True)
-        return tuple(i for i, (one, other) in enumerate(pairs) if _alike(one) != _alike(other))
+    def middles(self, fineness: float) -> list[float]:
+        """Fractions half-way between neighbours that end differently, further apart than that."""
+        places, ends = self.shares.tolist(), list(map(_outcome, self.judgements))
+        return [
+            (places[i] + places[i + 1]) / 2
+            for i in range(len(ends) - 1)
+            if ends[i] != ends[i + 1] and places[i + 1] - places[i] > fineness
+        ]
 
-    def spans(self) -> tuple[_Span, ...]:
-        """The stretches along which points end alike, from one end of the axis to the other."""
-        ends = [*(i + 1 for i in self.changes()), len(self.judgements)]
-        starts = [0, *ends[:-1]]
-        return tuple(self._span(start, end) for start, end in zip(starts, ends, strict=True))
+    def with_more(self, shares: Sequence[float], judgements: Sequence[Judgement]) -> Sweep:
+        """The sweep with further places."""
+        places, found = np.append(self.shares, shares), (*self.judgements, *judgements)
+        order = np.argsort(places)
+        return Sweep(axis=self.axis, shares=places[order], judgements=tuple(found[i] for i in order))
 
-    def _span(self, start: int, end: int) -> _Span:
-        judgement = self.judgements[start]
-        # Towards the answers: what is said last below them, and first above.
-        said = self.judgements[end - 1 if start == 0 else start]
-        return _Span(
-            low=float(self.values[start]),
-            high=float(self.values[end - 1]),
-            ending=judgement.ending,
-            loop=judgement.loop,
-            text=said.text,
-        )
+    def spans(self) -> list[Record]:
+        """The stretches along which points end alike, from one end of the axis to the other.
+
+        Each with its first and last value in the axis' unit, how its points and their loops end, and what the
+        program says there, at the end towards the nearest answer.
+        """
+        values, spans = self.values, []
+        for _, group in groupby(range(len(values)), key=lambda i: _outcome(self.judgements[i])):
+            start, *rest = group
+            last = rest[-1] if rest else start
+            said = self.judgements[last if start == 0 else start]
+            spans.append(
+                {
+                    "low": values[start],
+                    "high": values[last],
+                    "ending": str(said.ending),
+                    "loop": said.loop,
+                    "text": said.text,
+                }
+            )
+        return spans
+
+    def to_dict(self) -> Record:
+        """The axis with all its judgements, and what the program says past either end of its answers."""
+        axis, values = self.axis, self.values
+        answered = [value for value, each in zip(values, self.judgements, strict=True) if each.answered]
+        beyond = (each.text for each in self.judgements if not each.answered)
+        return {
+            "axis": axis.name,
+            "title": axis.title,
+            "unit": axis.unit,
+            "tried": [axis.low, axis.high],
+            "answered": [answered[0], answered[-1]] if answered else None,
+            "beyond": list(dict.fromkeys(beyond)),
+            "spans": self.spans(),
+            "values": values,
+            "ending": [str(each.ending) for each in self.judgements],
+            "loop": [each.loop for each in self.judgements],
+            "residual": [each.residual for each in self.judgements],
+        }
 
 
-def _alike(judgement: Judgement) -> tuple[Ending, str]:
+def _outcome(judgement: Judgement) -> tuple[Ending, str]:
     return judgement.ending, judgement.loop
-
-
-def _answered(judgement: Judgement) -> bool:
-    """Whether a point got an answer, with or without a reservation."""
-    return judgement.ending not in (Ending.REFUSED, Ending.BROKEN)
-
-
-def _sweeps(
-    base: Base, *, count: int, fineness: float, workers: int = 1, progress: Counting | None = None
-) -> tuple[Sweep, ...]:
-    """Every axis alone, in even steps, then halved wherever neighbours end differently.
-
-    Of changes back and forth within a step some may be missed.
-    Args: `count`: values on each to begin with. `fineness`: fraction of an axis to which changes are found.
-    """
-
-    def judge_all(places: Sequence[tuple[Axis, float]]) -> Sequence[Judgement]:
-        points = [{axis.name: value} for axis, value in places]
-        return base.judged(points, workers=workers, progress=progress)
-
-    grid = np.linspace(0, 1, count)
-    found = judge_all([(axis, float(value)) for axis in AXES for value in axis.at(grid)])
-    made = [
-        Sweep(axis=axis, values=axis.at(grid), judgements=tuple(found[k * count : (k + 1) * count]))
-        for k, axis in enumerate(AXES)
-    ]
-    while gaps := [(k, i) for k, sweep in enumerate(made) for i in _wide(sweep, fineness)]:
-        middles = [_middle(made[k], i) for k, i in gaps]
-        more = judge_all([(made[k].axis, value) for (k, _), value in zip(gaps, middles, strict=True)])
-        # From the right, so that places to the left stay where they are.
-        for (k, i), value, judgement in reversed(list(zip(gaps, middles, more, strict=True))):
-            made[k] = _with(made[k], i + 1, value, judgement)
-    return tuple(made)
-
-
-def _wide(sweep: Sweep, fineness: float) -> list[int]:
-    """Changes that lie between values further apart than that."""
-    places = [sweep.axis.share(float(value)) for value in sweep.values]
-    return [i for i in sweep.changes() if places[i + 1] - places[i] > fineness]
-
-
-def _middle(sweep: Sweep, place: int) -> float:
-    low, high = (sweep.axis.share(float(value)) for value in sweep.values[place : place + 2])
-    return float(sweep.axis.at((low + high) / 2))
-
-
-def _with(sweep: Sweep, place: int, value: float, judgement: Judgement) -> Sweep:
-    return Sweep(
-        axis=sweep.axis,
-        values=np.insert(sweep.values, place, value),
-        judgements=(*sweep.judgements[:place], judgement, *sweep.judgements[place:]),
-    )
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Extremes(Result):
-    """What was found."""
+    """Judgements of the designed set, in the order of its points, and of every axis."""
 
     points: tuple[Point, ...]
     judgements: tuple[Judgement, ...]
-    """Of the designed set, in the order of its points."""
     sweeps: tuple[Sweep, ...]
 
     @property
     def everything(self) -> tuple[Judgement, ...]:
         """Judgements of the designed set and the sweeps."""
-        return self.judgements + tuple(j for sweep in self.sweeps for j in sweep.judgements)
+        return self.judgements + tuple(each for sweep in self.sweeps for each in sweep.judgements)
+
+    def broken(self) -> int:
+        """Number of points, of all looked at, at which anything was not as it should be."""
+        return sum(bool(each.violations) for each in self.everything)
+
+    def to_dict(self) -> Record:
+        """Numbers of points by how they and their loops ended, the worst of them, and every axis."""
+        everything = self.everything
+        endings = Counter(each.ending for each in everything)
+        return {
+            "points": len(self.points),
+            "judged": len(everything),
+            "endings": {str(ending): endings[ending] for ending in Ending},
+            "loop_endings": dict(Counter(each.loop for each in everything if each.loop)),
+            "worst_residual": max((each.residual for each in everything), default=0.0),
+            "worst_error_over_half_width": max((each.worst_ratio for each in everything), default=-1.0),
+            "violations": self._violations(),
+            "axes": [sweep.to_dict() for sweep in self.sweeps],
+        }
+
+    def _violations(self) -> list[Record]:
+        points = (*self.points, *(point for sweep in self.sweeps for point in sweep.points))
+        return [
+            {"point": dict(point), "violations": list(each.violations)}
+            for point, each in zip(points, self.everything, strict=True)
+            if each.violations
+        ][:_MOST_SHOWN]
+
+    def axes_table(self) -> dict[str, list[Any]]:
+        """The stretches of all axes as columns."""
+        spans = [(sweep.axis, span) for sweep in self.sweeps for span in sweep.spans()]
+        keys = {"from": "low", "to": "high", "ending": "ending", "loop": "loop", "said": "text"}
+        return {
+            "axis": [axis.title for axis, _ in spans],
+            "unit": [axis.unit for axis, _ in spans],
+            **{name: [span[key] for _, span in spans] for name, key in keys.items()},
+        }
 
     def rows(self) -> Rows:
         """How the points ended, and where along each axis."""
-        everything, worst = self.everything, max((j.worst_ratio for j in self.everything), default=-1.0)
-        residual = max((j.residual for j in everything), default=0.0)
-        return Rows(
-            title=f"Limits of validity: {len(everything)} points",
-            quantities=(
-                Quantity(key="broken", name="points with a violated invariant", value=float(self.broken())),
-                Quantity(key="worst_residual", name="largest residual", value=residual, digits=2),
-                Quantity(
-                    key="worst_error_over_half_width",
-                    name="largest error over its half-width",
-                    value=None if worst < 0 else worst,
-                    digits=2,
-                ),
+        document = self.to_dict()
+        worst = document["worst_error_over_half_width"]
+        quantities = (
+            ("broken", "points with a violated invariant", float(self.broken()), 6),
+            ("worst_residual", "largest residual", document["worst_residual"], 2),
+            (
+                "worst_error_over_half_width",
+                "largest error over its half-width",
+                None if worst < 0 else worst,
+                2,
             ),
-            facts=[(ending, str(count)) for ending, count in counted(everything).items() if count],
+        )
+        return Rows(
+            title=f"Limits of validity: {document['judged']} points",
+            quantities=tuple(
+                Quantity(key=key, name=name, value=value, digits=digits)
+                for key, name, value, digits in quantities
+            ),
+            facts=[(ending, str(count)) for ending, count in document["endings"].items() if count],
             findings=tuple(
                 Finding(
                     code="invariant_violated",
@@ -218,47 +226,14 @@ class Extremes(Result):
                         "point": ", ".join(f"{axis} {value:.4g}" for axis, value in each["point"].items()),
                     },
                 )
-                for each in _violations(self)
+                for each in document["violations"]
             ),
             tables=(
                 Table(
-                    heads=("input", "stretch", "answer", "loop", "said"),
-                    rows=axis_rows(self.tables()["axes"]),
+                    heads=("input", "stretch", "answer", "loop", "said"), rows=axis_rows(self.axes_table())
                 ),
             ),
         )
-
-    def to_dict(self) -> Record:
-        """What was found as plain numbers, lists and texts."""
-        everything = self.everything
-        return {
-            "points": len(self.points),
-            "judged": len(everything),
-            "endings": counted(everything),
-            "loop_endings": dict(Counter(j.loop for j in everything if j.loop)),
-            "worst_residual": max((j.residual for j in everything), default=0.0),
-            "worst_error_over_half_width": max((j.worst_ratio for j in everything), default=-1.0),
-            "violations": _violations(self),
-            "axes": [_sweep(sweep) for sweep in self.sweeps],
-        }
-
-    def tables(self) -> dict[str, dict[str, list[Any]]]:
-        """Columns by table: "axes", the spans of each that end alike."""
-        spans = [(sweep.axis, span) for sweep in self.sweeps for span in sweep.spans()]
-        axes: dict[str, list[Any]] = {
-            "axis": [axis.title for axis, _ in spans],
-            "unit": [axis.unit for axis, _ in spans],
-            "from": [span.low for _, span in spans],
-            "to": [span.high for _, span in spans],
-            "ending": [str(span.ending) for _, span in spans],
-            "loop": [span.loop for _, span in spans],
-            "said": [span.text for _, span in spans],
-        }
-        return {"axes": axes}
-
-    def broken(self) -> int:
-        """Number of points, of all looked at, at which anything was not as it should be."""
-        return sum(bool(j.violations) for j in self.everything)
 
 
 def axis_rows(columns: Record) -> list[Cells]:
@@ -285,69 +260,78 @@ def _stretch(low: float, high: float, unit: str) -> str:
 
 
 def find_extremes(
-    base: Base,
+    scene: Scene,
     *,
     size: Size,
     workers: int = 1,
     progress: Progress | None = None,
     kept: Path | None = None,
+    mutation: Mapping[str, float] | None = None,
 ) -> Extremes:
     """Look at a scene's extremes, with the same result for any number of workers.
 
-    Args: `kept`: file from which an interrupted designed set resumes.
-    Raises: OSError: the kept file cannot be read or written.
+    Args: `kept`: folder from which an interrupted study resumes. `mutation`: see `judged`.
+    Raises: SceneError: its chamber is imported.
+    Raises: OSError: the folder cannot be written.
     """
+    _check_sector(scene)
+    content, keywords = content_of(scene), dict(mutation or {})
+    store = None if kept is None else Store(folder=kept)
 
-    def told(what: str) -> Callable[[int, int], None] | None:
-        return None if progress is None else lambda done, number: progress(what, done, number)
+    def judge_all(what: str, points: Sequence[Point]) -> list[Judgement]:
+        tasks = tasks_of(content, [partial(judged, scene, point, **keywords) for point in points])
+        records = answers(
+            what,
+            tasks,
+            store=store,
+            executor=None,
+            workers=workers,
+            progress=progress and (lambda done: progress(done.what, done.points, done.total)),
+        )
+        return [Judgement.of_record(record) for record in records]
 
-    points = design(count=size.points, seed=_SEED)
-    # First, so that a kept file that cannot be used is known at once.
-    judgements = base.judged(points, workers=workers, progress=told("designed set"), kept=kept)
+    points = designed_set(count=size.points, seed=_SEED)
     return Extremes(
         points=points,
-        judgements=judgements,
-        sweeps=_sweeps(
-            base, count=size.sweep, fineness=size.fineness, workers=workers, progress=told("axes")
-        ),
+        judgements=tuple(judge_all("designed set", points)),
+        sweeps=_sweeps(partial(judge_all, "axes"), size),
     )
 
 
-def counted(judgements: Sequence[Judgement]) -> dict[str, int]:
-    """Points by how they ended, every ending named. Returns: Numbers of points by ending."""
-    numbers = Counter(j.ending for j in judgements)
-    return {str(ending): numbers[ending] for ending in Ending}
+def _sweeps(judge: Callable[[Sequence[Point]], Sequence[Judgement]], size: Size) -> tuple[Sweep, ...]:
+    """Every axis alone, in even steps, then halved wherever neighbours end differently.
+
+    Of changes back and forth within a step some may be missed.
+    """
+    sweeps = [Sweep(axis=axis, shares=np.zeros(0), judgements=()) for axis in AXES]
+    places = [np.linspace(0, 1, size.sweep).tolist() for _ in AXES]
+    while any(places):
+        points = [
+            {axis.name: float(axis.at(share))}
+            for axis, shares in zip(AXES, places, strict=True)
+            for share in shares
+        ]
+        found = iter(judge(points))
+        sweeps = [
+            sweep.with_more(shares, [next(found) for _ in shares])
+            for sweep, shares in zip(sweeps, places, strict=True)
+        ]
+        places = [sweep.middles(size.fineness) for sweep in sweeps]
+    return tuple(sweeps)
 
 
-def _violations(extremes: Extremes) -> list[Record]:
-    alone = [
-        ({sweep.axis.name: float(value)}, judgement)
-        for sweep in extremes.sweeps
-        for value, judgement in zip(sweep.values, sweep.judgements, strict=True)
-    ]
-    places = [*zip(extremes.points, extremes.judgements, strict=True), *alone]
-    return [
-        {"point": dict(point), "violations": list(judgement.violations)}
-        for point, judgement in places
-        if judgement.violations
-    ][:_MOST_SHOWN]
-
-
-def _sweep(sweep: Sweep) -> Record:
-    axis, solved = sweep.axis, sweep.solved()
-    return {
-        "axis": axis.name,
-        "title": axis.title,
-        "unit": axis.unit,
-        "tried": [axis.low, axis.high],
-        "answered": None if solved is None else list(solved),
-        "beyond": list(sweep.beyond()),
-        "spans": [{**asdict(span), "ending": str(span.ending)} for span in sweep.spans()],
-        "values": sweep.values.tolist(),
-        "ending": [str(j.ending) for j in sweep.judgements],
-        "loop": [j.loop for j in sweep.judgements],
-        "residual": [j.residual for j in sweep.judgements],
-    }
+def _check_sector(scene: Scene) -> None:
+    if scene.disc.geometry is None:
+        return
+    fault = Fault(
+        file=scene.file,
+        table="disc",
+        key="mesh",
+        value=toml_text(scene.disc.geometry.file),
+        problem="the study takes the dimensions of a sector between plates to their extremes",
+        allowed="a scene that gives the dimensions of its chambers",
+    )
+    raise SceneError([fault])
 
 
 def extremes(
@@ -364,8 +348,8 @@ def extremes(
     Args:
         scene: the scene file.
         json: print one JSON document instead of tables.
-        out: also write extremes.json to this folder; after an interrupted run with the same folder the
-            designed set resumes where it stopped.
+        out: also write extremes.json to this folder; an interrupted run with the same folder resumes where it
+            stopped.
         level: "heavy" judges thousands of points, for an hour or more.
         workers: processes; default one for each core, at most two.
 
@@ -376,44 +360,26 @@ def extremes(
         SceneError: a scene that cannot be used; nothing is written.
         OSError: the folder cannot be written.
     """
-    base = base_of(liquid_ring_scene(load_scene(scene)))
-    console = messages_console()
-    with nullcontext() if out is None else staged(out, files=(_KEPT, _FILE)) as stage:
+    given = liquid_ring_scene(load_scene(scene))
+    _check_sector(given)
+    with nullcontext() if out is None else staged(out, files=(_FILE,)) as stage:
         with activity("extremes", "axes") as shown:
-            found = find_extremes(
-                base,
+            result = find_extremes(
+                given,
                 size=SIZES[level],
                 workers=min(2, os.cpu_count() or 1) if workers is None else checked_workers(workers),
                 progress=lambda what, done, number: shown.show(
                     f"{what}: {done} of {number} points", done=done, total=number
                 ),
-                kept=None if out is None else out / _KEPT,
+                kept=None if out is None else out / _STORE,
             )
-        text = json_format.dumps(found.to_dict(), allow_nan=False)
+        text = json_format.dumps(result.to_dict(), allow_nan=False)
         if stage is not None:
             write_whole(stage / _FILE, text + "\n")
     if out is not None:
-        console.print(f"written to {out}", highlight=False)
+        print_message(f"written to {out}")
     if json:
         print(text)
     else:
-        results_console().print(found.rows().view(headline=False))
-    return _BROKEN if found.broken() else _DONE
-
-
-def base_of(scene: Scene) -> Base:
-    """Take a scene as the one to vary.
-
-    Raises: SceneError: its chamber is imported.
-    """
-    if scene.disc.geometry is not None:
-        fault = Fault(
-            file=scene.file,
-            table="disc",
-            key="mesh",
-            value=toml_text(scene.disc.geometry.file),
-            problem="the study takes the dimensions of a sector between plates to their extremes",
-            allowed="a scene that gives the dimensions of its chambers",
-        )
-        raise SceneError([fault])
-    return Base(document=document_of(scene), file=scene.source)
+        print_rows(result.rows(), headline=False)
+    return 1 if result.broken() else 0

@@ -1,18 +1,18 @@
-"""Steady laminar flow by Newton's method with the exact Jacobian, and flows followed along a parameter.
+"""Flows by Newton's method with the exact Jacobian, and followed along a parameter.
 
 The prescribed flow rate borders the matrix by one row and column, solved with a second right-hand side: a
 dense row inside the matrix would ruin the sparse factors.  Eliminating along the diagonal keeps these three
 to four times sparser than partial pivoting does, because fill-in gives the pressure block its diagonal in
 time.  It is not safe by construction, so every solve checks its residual, refines it, and falls back on
-partial pivoting when that does not help.  A path is followed with a secant predictor, and steps that recover
-from failure.
+partial pivoting when that does not help.
+A path is followed with a secant predictor, and steps that recover from failure.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy.sparse.linalg import splu
@@ -21,54 +21,43 @@ from ringbalance.physics.results import Statistics, Status, StatusCode
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.navier_stokes.flow import Coefficients, FlowSystem
 
-_EASY = 2.0
-"""Parameter up to which a start from rest converges."""
 _GOOD, _USABLE, _REFINEMENTS = 1e-12, 1e-8, 3
+"""Relative residuals: of a solution that is as good as it gets, and of one that will do; attempts between."""
 
 
-@dataclass(eq=False)
 class Factors:
-    """A matrix with its sparse factors; made by `Factors.of`."""
+    """Sparse factors of a square CSC matrix of symmetric pattern. Raises: RuntimeError: it is singular."""
 
-    matrix: Any
-    factors: Any
-    pivoted: bool
-
-    @classmethod
-    def of(cls, matrix: Any) -> Factors:
-        """Factors of a square CSC matrix of symmetric pattern. Raises: RuntimeError: it is singular."""
+    def __init__(self, matrix: Any) -> None:
+        self.matrix, self.pivoted = matrix, False
         try:
             symmetric = {"SymmetricMode": True}
-            factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
+            self.factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
         except RuntimeError:
-            return cls(matrix=matrix, factors=_with_pivoting(matrix), pivoted=True)
-        return cls(matrix=matrix, factors=factors, pivoted=False)
+            self._pivot()
+
+    def _pivot(self) -> None:
+        self.factors, self.pivoted = splu(self.matrix, permc_spec="COLAMD"), True
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solution of A x = b, refined, with pivots if need be. Raises: RuntimeError: A is singular."""
-        x, gap = _refined(self.matrix, self.factors, right)
+        x, gap = self._refined(right)
         if gap > _USABLE and not self.pivoted:
-            self.factors, self.pivoted = _with_pivoting(self.matrix), True
-            x, gap = _refined(self.matrix, self.factors, right)
+            self._pivot()
+            x, gap = self._refined(right)
         return x
 
-
-def _refined(matrix: Any, factors: Any, right: FloatArray) -> tuple[FloatArray, float]:
-    """Solution with up to three refinements, and its relative residual."""
-    scale = float(np.abs(right).max()) or 1.0
-    x = np.asarray(factors.solve(right), dtype=np.float64)
-    gap = np.inf
-    for _ in range(_REFINEMENTS):
-        residual = right - matrix @ x
-        gap, before = float(np.abs(residual).max()) / scale, gap
-        if gap <= _GOOD or not gap < before / 2:
-            break
-        x = x + factors.solve(residual)
-    return x, gap if np.isfinite(gap) else np.inf
-
-
-def _with_pivoting(matrix: Any) -> Any:
-    return splu(matrix, permc_spec="COLAMD")
+    def _refined(self, right: FloatArray) -> tuple[FloatArray, float]:
+        """Solution with up to three refinements, and its relative residual."""
+        scale = float(np.abs(right).max()) or 1.0
+        x, gap = np.asarray(self.factors.solve(right), dtype=np.float64), np.inf
+        for _ in range(_REFINEMENTS):
+            residual = right - self.matrix @ x
+            gap, before = float(np.abs(residual).max()) / scale, gap
+            if gap <= _GOOD or not gap < before / 2:
+                break
+            x = x + self.factors.solve(residual)
+        return x, gap if np.isfinite(gap) else np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +73,7 @@ class NewtonSettings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlowSolution:
-    """Velocity, pressure and reactions of a flow, with how the solve ended."""
+    """Velocity and pressure of a flow, with how the solve ended."""
 
     vector: FloatArray
     """Full vector of unknowns; a start for a neighbouring solve."""
@@ -92,132 +81,31 @@ class FlowSolution:
     """Nodal, shape (components, velocity nodes)."""
     pressure: FloatArray
     """Nodal, shape (pressure nodes,)."""
-    reaction: FloatArray
-    """Force of the surroundings on the fluid at a node, (components, velocity nodes); zero inside."""
     driving_gradient: float
     """G that drives the prescribed flow rate, 0 without one."""
     status: Status
     statistics: Statistics
 
-
-@dataclass(eq=False)
-class _Iteration:
-    """Working state of one Newton solve."""
-
-    vector: FloatArray
-    gradient: float
-    factors: Factors | None = None
-    bordering: FloatArray | None = None
-    update: float = np.inf
-    contracting: bool = True
-    """Whether the last step was well below the one before, so that old factors may serve once more."""
-    iterations: int = 0
-    progress: Callable[[str], None] | None = None
-
-
-def _residual(system: FlowSystem, c: Coefficients, linear: Any, state: _Iteration) -> FloatArray:
-    residual = np.asarray(linear @ state.vector, dtype=np.float64)
-    residual -= system.source + state.gradient * system.flow_load
-    if c.inertia != 0.0:
-        residual += c.inertia * system.convection_vector(state.vector)
-    if system.enclosed:
-        # A boundary flow that does not close in the discrete sense is spread evenly instead of
-        # becoming a point source at the pinned node.
-        mass = residual[-system.mean_load.size :]
-        mass -= mass.sum() / system.mean_load.sum() * system.mean_load
-    return residual
-
-
-def _factorize(system: FlowSystem, c: Coefficients, linear: Any, state: _Iteration) -> Factors:
-    jacobian = linear
-    if c.inertia != 0.0:
-        jacobian = linear + c.inertia * system.convection_matrix(state.vector)
-    factors = Factors.of(system.free_part(jacobian))
-    if system.flow_component is not None:
-        state.bordering = factors.solve(system.flow_load[system.free])
-    return factors
-
-
-def _step(
-    system: FlowSystem, factors: Factors, residual: FloatArray, flow_rate: float, state: _Iteration
-) -> None:
-    change = factors.solve(-residual[system.free])
-    if state.bordering is not None:
-        border = system.flow_load[system.free]
-        missing = flow_rate - float(system.flow_load @ state.vector)
-        share = (missing - float(border @ change)) / float(border @ state.bordering)
-        change += share * state.bordering
-        state.gradient += share
-    full = np.zeros_like(state.vector)
-    full[system.free] = change
-    state.vector = state.vector + full
-    largest = float(np.abs(system.space.split(state.vector)[0]).max())
-    moved = float(np.abs(system.space.split(full)[0]).max())
-    before, state.update = state.update, moved / largest if largest > 0.0 else 0.0
-    state.contracting = state.update < 0.1 * before
-    state.iterations += 1
-    if state.progress is not None:
-        state.progress(f"Newton iteration {state.iterations}: relative change {state.update:.1e}")
-
-
-def _iterate(
-    system: FlowSystem, c: Coefficients, flow_rate: float, settings: NewtonSettings, state: _Iteration
-) -> str:
-    """Newton steps; returns an empty text on convergence, else what went wrong."""
-    linear = system.linear_matrix(c)
-    for _ in range(settings.max_iterations):
-        residual = _residual(system, c, linear, state)
-        keep = c.inertia == 0.0 or (state.update < settings.keep_factors_below and state.contracting)
-        try:
-            if state.factors is None or not keep:
-                state.factors = _factorize(system, c, linear, state)
-            _step(system, state.factors, residual, flow_rate, state)
-        except RuntimeError as error:
-            return f"the matrix could not be factorized ({error})"
-        if not np.isfinite(state.update) or state.update > 1e8:
-            return "the iteration diverged"
-        if state.update <= settings.tolerance:
-            return ""
-    return f"no convergence in {settings.max_iterations} iterations (last relative change {state.update:.1e})"
-
-
-def _status(problem: str) -> Status:
-    if not problem:
-        return Status()
-    remedy = "start from the solution of a neighbouring, less convective case, or refine the mesh"
-    return Status(code=StatusCode.NOT_CONVERGED, text=f"{problem}; {remedy}")
-
-
-def _centred(system: FlowSystem, vector: FloatArray) -> FloatArray:
-    """The same flow with a mean pressure of zero."""
-    count = system.mean_load.size
-    shifted = vector.copy()
-    shifted[-count:] -= float(system.mean_load @ vector[-count:]) / float(system.mean_load.sum())
-    return shifted
-
-
-def _solution(system: FlowSystem, c: Coefficients, state: _Iteration, problem: str) -> FlowSolution:
-    finite = np.all(np.isfinite(state.vector))
-    vector = np.where(np.isfinite(state.vector), state.vector, 0.0)
-    state.vector = _centred(system, vector) if system.enclosed else vector
-    residual = _residual(system, c, system.linear_matrix(c), state)
-    reaction = residual.copy()
-    reaction[system.free] = 0.0
-    scale = float(np.abs(reaction).max()) or 1.0
-    velocity, pressure = system.space.split(state.vector)
-    return FlowSolution(
-        vector=state.vector,
-        velocity=velocity,
-        pressure=pressure,
-        reaction=system.space.split(reaction)[0],
-        driving_gradient=state.gradient,
-        status=_status(problem or ("" if finite else "the iteration diverged")),
-        statistics=Statistics(
-            unknowns=int(system.free.size),
-            iterations=state.iterations,
-            relative_residual=float(np.abs(residual[system.free]).max()) / scale,
-        ),
-    )
+    @classmethod
+    def of(
+        cls,
+        system: FlowSystem,
+        vector: FloatArray,
+        *,
+        driving_gradient: float = 0.0,
+        status: Status | None = None,
+        statistics: Statistics | None = None,
+    ) -> Self:
+        """A flow by its full vector."""
+        velocity, pressure = system.split(vector)
+        return cls(
+            vector=vector,
+            velocity=velocity,
+            pressure=pressure,
+            driving_gradient=driving_gradient,
+            status=status or Status(),
+            statistics=statistics or Statistics(),
+        )
 
 
 def solve_flow(
@@ -238,27 +126,135 @@ def solve_flow(
     """
     if not coefficients.viscosity > 0.0:
         raise ValueError("viscosity must be above zero")
-    settings = settings or NewtonSettings()
-    if start is not None and start.vector.size != system.space.unknowns:
+    if start is not None and start.vector.size != system.unknowns:
         raise ValueError("start belongs to another system")
+    settings = settings or NewtonSettings()
     if start is None:
-        state = _Iteration(vector=system.fixed_values.copy(), gradient=0.0, progress=progress)
-        still = Coefficients(inertia=0.0, viscosity=coefficients.viscosity, rotation=coefficients.rotation)
-        problem = _iterate(system, still, flow_rate, settings, state)
-        if problem or coefficients.inertia == 0.0:
-            return _solution(system, still, state, problem)
-        state.factors, state.update = None, np.inf
+        creeping = _Newton(system, replace(coefficients, inertia=0.0), flow_rate, progress)
+        creeping.iterate(settings)
+        if creeping.problem or coefficients.inertia == 0.0:
+            return creeping.solution()
+        newton = _Newton(system, coefficients, flow_rate, progress, creeping)
     else:
-        vector = np.where(
-            np.isin(np.arange(start.vector.size), system.free), start.vector, system.fixed_values
+        newton = _Newton(system, coefficients, flow_rate, progress)
+        newton.vector[system.free] = start.vector[system.free]
+        newton.gradient = start.driving_gradient
+    newton.iterate(settings)
+    return newton.solution()
+
+
+class _Newton:
+    """Working state of one Newton solve."""
+
+    def __init__(
+        self,
+        system: FlowSystem,
+        coefficients: Coefficients,
+        flow_rate: float,
+        progress: Callable[[str], None] | None,
+        before: _Newton | None = None,
+    ) -> None:
+        self.system, self.inertia, self.flow_rate = system, coefficients.inertia, flow_rate
+        self.linear, self.progress = system.linear_matrix(coefficients), progress
+        self.vector: FloatArray = system.fixed_values.copy() if before is None else before.vector
+        self.gradient: float = 0.0 if before is None else before.gradient
+        self.iterations: int = 0 if before is None else before.iterations
+        self.update, self.contracting, self.problem = np.inf, True, ""
+
+    def iterate(self, settings: NewtonSettings) -> None:
+        """Take steps until they are small; `problem` says what went wrong."""
+        factors: Factors | None = None
+        for _ in range(settings.max_iterations):
+            # Contracting: well below the step before, so that old factors may serve once more.
+            keep = self.inertia == 0.0 or (self.update < settings.keep_factors_below and self.contracting)
+            try:
+                if factors is None or not keep:
+                    factors = self._factors()
+                self._step(factors)
+            except RuntimeError as error:
+                self.problem = f"the matrix could not be factorized ({error})"
+                return
+            if not np.isfinite(self.update) or self.update > 1e8:
+                self.problem = "the iteration diverged"
+                return
+            if self.update <= settings.tolerance:
+                return
+        change = f"last relative change {self.update:.1e}"
+        self.problem = f"no convergence in {settings.max_iterations} iterations ({change})"
+
+    def _residual(self) -> FloatArray:
+        system = self.system
+        residual = np.asarray(self.linear @ self.vector, dtype=np.float64) - system.source
+        if system.flow_load is not None:
+            residual -= self.gradient * system.flow_load
+        if self.inertia != 0.0:
+            residual += self.inertia * system.convection_vector(self.vector)
+        if system.enclosed:
+            # A boundary flow that does not close in the discrete sense is spread evenly instead of
+            # becoming a point source at the pinned node.
+            mass = residual[-system.mean_load.size :]
+            mass -= mass.sum() / system.mean_load.sum() * system.mean_load
+        return residual
+
+    def _factors(self) -> Factors:
+        system, jacobian = self.system, self.linear
+        if self.inertia != 0.0:
+            jacobian = jacobian + self.inertia * system.convection_matrix(self.vector)
+        factors = Factors(system.free_part(jacobian))
+        if system.flow_load is not None:
+            self.bordering = factors.solve(system.flow_load[system.free])
+        return factors
+
+    def _step(self, factors: Factors) -> None:
+        system = self.system
+        change = np.zeros_like(self.vector)
+        change[system.free] = factors.solve(-self._residual()[system.free])
+        if system.flow_load is not None:
+            border = system.flow_load[system.free]
+            missing = self.flow_rate - float(system.flow_load @ (self.vector + change))
+            share = missing / float(border @ self.bordering)
+            change[system.free] += share * self.bordering
+            self.gradient += share
+        self.vector = self.vector + change
+        largest, moved = (float(np.abs(system.split(each)[0]).max()) for each in (self.vector, change))
+        before, self.update = self.update, moved / largest if largest > 0.0 else 0.0
+        self.contracting = self.update < 0.1 * before
+        self.iterations += 1
+        if self.progress is not None:
+            self.progress(f"Newton iteration {self.iterations}: relative change {self.update:.1e}")
+
+    def solution(self) -> FlowSolution:
+        """The flow as it is, with a mean pressure of zero where nothing else fixes its level."""
+        system = self.system
+        if not np.all(np.isfinite(self.vector)):
+            self.problem = self.problem or "the iteration diverged"
+        self.vector = np.where(np.isfinite(self.vector), self.vector, 0.0)
+        if system.enclosed:
+            pressure = self.vector[-system.mean_load.size :]
+            pressure -= float(system.mean_load @ pressure) / float(system.mean_load.sum())
+        residual = np.abs(self._residual())
+        at_walls = np.delete(residual, system.free)
+        status = Status()
+        if self.problem:
+            remedy = "start from the solution of a neighbouring, less convective case, or refine the mesh"
+            status = Status(code=StatusCode.NOT_CONVERGED, text=f"{self.problem}; {remedy}")
+        return FlowSolution.of(
+            system,
+            self.vector,
+            driving_gradient=self.gradient,
+            status=status,
+            statistics=Statistics(
+                unknowns=int(system.free.size),
+                iterations=self.iterations,
+                relative_residual=float(residual[system.free].max() / (at_walls.max() or 1.0)),
+            ),
         )
-        state = _Iteration(vector=vector, gradient=start.driving_gradient, progress=progress)
-    problem = _iterate(system, coefficients, flow_rate, settings, state)
-    return _solution(system, coefficients, state, problem)
 
 
-Solve = Callable[[float, FlowSolution], FlowSolution]
-FirstSolve = Callable[[float, FlowSolution | None], FlowSolution]
+Solve = Callable[[float, FlowSolution | None], FlowSolution]
+"""Flow at a parameter from a predicted start, or from rest."""
+_EASY = 2.0
+"""Parameter up to which a start from rest converges."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -276,54 +272,59 @@ class StepRule:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _FlowPath:
+class FlowPath:
     """Flows at the targets that were reached, in order."""
 
     solutions: tuple[FlowSolution, ...]
     status: Status
+    """NOT_CONVERGED, and where, when a target was not reached."""
     failures: int
     """Steps that had to be repeated with half their length."""
 
 
 @dataclass(eq=False)
 class _Walk:
-    """Where the path is: the last two flows and the present step."""
+    """Where the path is: the last two flows, and the present step."""
 
+    solve: Solve
+    rule: StepRule
     at: float
     flow: FlowSolution
     step: float
-    before: float | None = None
-    flow_before: FlowSolution | None = None
+    before: tuple[float, FlowSolution] | None = None
     failures: int = 0
 
+    def reach(self, target: float) -> bool:
+        """Whether the target is reached."""
+        while self.at != target and self.step >= self.rule.smallest:
+            self._advance(target)
+        return self.at == target
 
-def _predicted(walk: _Walk, parameter: float) -> FlowSolution:
-    if walk.flow_before is None or walk.before is None:
-        return walk.flow
-    share = (parameter - walk.at) / (walk.at - walk.before)
-    vector = walk.flow.vector + share * (walk.flow.vector - walk.flow_before.vector)
-    gradient = walk.flow.driving_gradient
-    gradient += share * (gradient - walk.flow_before.driving_gradient)
-    return replace(walk.flow, vector=vector, driving_gradient=gradient)
+    def _advance(self, target: float) -> None:
+        remaining = abs(target - self.at)
+        length = min(self.step, remaining)
+        # A sliver left over would make the secant through it worthless.
+        length = remaining if remaining - length < 0.1 * length else length
+        parameter = target if length == remaining else self.at + length * (1 if target > self.at else -1)
+        flow = self.solve(parameter, self._predicted(parameter))
+        if not flow.status.ok:
+            self.failures, self.step = self.failures + 1, length / 2
+            return
+        easy = flow.statistics.iterations <= self.rule.easy_iterations
+        self.before = self.at, self.flow
+        self.at, self.flow = parameter, flow
+        self.step = min(max(self.step, length) * (self.rule.growth if easy else 1.0), self.rule.largest)
 
-
-def _advance(walk: _Walk, solve: Solve, target: float, rule: StepRule) -> bool:
-    """One step towards the target; false when even the smallest step fails."""
-    remaining = target - walk.at
-    full = min(walk.step, abs(remaining))
-    # A sliver left over would make the secant through it worthless.
-    full = abs(remaining) if abs(remaining) - full < 0.1 * full else full
-    parameter = target if full == abs(remaining) else walk.at + full * (1 if remaining > 0 else -1)
-    flow = solve(parameter, _predicted(walk, parameter))
-    if not flow.status.ok:
-        walk.failures += 1
-        walk.step = full / 2
-        return walk.step >= rule.smallest
-    easy = flow.statistics.iterations <= rule.easy_iterations
-    walk.before, walk.flow_before = walk.at, walk.flow
-    walk.at, walk.flow = parameter, flow
-    walk.step = min(max(walk.step, full) * (rule.growth if easy else 1.0), rule.largest)
-    return True
+    def _predicted(self, parameter: float) -> FlowSolution:
+        if self.before is None:
+            return self.flow
+        (at, flow), now = self.before, self.flow
+        share = (parameter - self.at) / (self.at - at)
+        return replace(
+            now,
+            vector=now.vector + share * (now.vector - flow.vector),
+            driving_gradient=now.driving_gradient + share * (now.driving_gradient - flow.driving_gradient),
+        )
 
 
 def follow(
@@ -333,30 +334,26 @@ def follow(
     start_at: float,
     targets: Sequence[float],
     rule: StepRule | None = None,
-) -> _FlowPath:
+) -> FlowPath:
     """Flows at the targets, each reached from the one before; a failed step is halved, an easy one grows.
 
-    Args: `solve`: flow at a parameter from a predicted start. `start`: a converged flow. `start_at`: its
-        parameter. `targets`: parameters to reach, in monotone order.
-    Returns: The flows reached; the status says NOT_CONVERGED, and where, when a target was not reached.
+    Args: `start`: a converged flow. `start_at`: its parameter. `targets`: parameters to reach, in monotone
+        order.
     """
     rule = rule or StepRule()
-    walk = _Walk(at=start_at, flow=start, step=rule.first)
+    walk = _Walk(solve=solve, rule=rule, at=start_at, flow=start, step=rule.first)
     reached: list[FlowSolution] = []
-    status = Status()
     for target in targets:
-        while walk.at != target and _advance(walk, solve, target, rule):
-            pass
-        if walk.at != target:
+        if not walk.reach(target):
             text = f"the path ended at {walk.at:.6g} on its way to {target:.6g}"
             remedy = "refine the mesh or take smaller steps"
             status = Status(code=StatusCode.NOT_CONVERGED, text=f"{text}; {remedy}")
-            break
+            return FlowPath(solutions=tuple(reached), status=status, failures=walk.failures)
         reached.append(walk.flow)
-    return _FlowPath(solutions=tuple(reached), status=status, failures=walk.failures)
+    return FlowPath(solutions=tuple(reached), status=Status(), failures=walk.failures)
 
 
-def flow_at(*, solve: FirstSolve, parameter: float, first: float) -> FlowSolution:
+def flow_at(*, solve: Solve, parameter: float, first: float) -> FlowSolution:
     """Flow at a parameter, followed from where a start from rest converges. Raises: ArithmeticError: none."""
     flow = solve(min(parameter, _EASY), None)
     status = flow.status

@@ -13,7 +13,7 @@ Kl = R Re and S = R/Re; at Re = 0 (S infinite) the problem is linear.
 
 **Meshes** are put together from patches of structured nodes. A patch is an array of nodes, shape (2 m + 1,
 2 n + 1, 2): every second node is a vertex, the others are the mid-nodes of a quadratic mesh and lie on the
-true geometry. Patches that share nodes are glued.
+true geometry. Patches that share nodes are glued; boundaries are named by the places of their facets.
 
 **Entrance from a reservoir and exit into one**, axisymmetric. The tube ends flush in a plane wall with a
 sharp edge. Lengths over the bore d, velocities over the mean velocity U, pressure over mu U/d:
@@ -33,9 +33,8 @@ and K Re stays finite at Re = 0, where both ends have the same loss because cree
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import pairwise
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -43,8 +42,8 @@ import numpy.typing as npt
 from scipy import sparse
 from skfem import MeshQuad2
 
-from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSystem
 from ringbalance.verification.navier_stokes.newton import (
     Factors,
     FlowSolution,
@@ -53,11 +52,13 @@ from ringbalance.verification.navier_stokes.newton import (
     solve_flow,
 )
 
+Test = Callable[[FloatArray], BoolArray]
+"""Whether middles of facets, shape (dimension, n), belong to a boundary."""
 POISEUILLE_GRADIENT = 32.0
 """G of a tube at rest: -dp/dx d^2/(mu U)."""
 _KL_SCALE = 300.0
-CORIOLIS = ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
-"""e_z x velocity for components along (y, z, x)."""
+_TOUCHING = 1e-9
+"""Of the bore: facets nearer than this lie on a line."""
 
 
 class _HalfSection(ABC):
@@ -69,11 +70,10 @@ class _HalfSection(ABC):
 
     def system(self) -> FlowSystem:
         """Discrete equations of the half section: no slip at the wall, mirror symmetry about z = 0."""
-        space = FlowSpace.taylor_hood(mesh=self.mesh(), components=3)
         conditions = [Dirichlet(boundary="symmetry", component=1)]
         conditions += [Dirichlet(boundary="wall", component=c) for c in range(3)]
         return FlowSystem.of(
-            space=space, conditions=conditions, enclosed=True, flow_component=2, coriolis=CORIOLIS
+            mesh=self.mesh(), conditions=conditions, components=3, enclosed=True, flow_component=2
         )
 
 
@@ -94,15 +94,14 @@ class SectionMesh(_HalfSection):
         core, edges = _core(n)
         vertices = geometric_vertices(cells=self.across, ratio=self.wall_ratio)
         blend = 1 - with_midpoints(vertices=vertices)[::-1]
-        patches = [Patch(nodes=core, sides={"south": "symmetry"})]
+        patches = [core]
         ranges = ((0.0, 0.25, n), (0.25, 0.75, 2 * n), (0.75, 1.0, n))
-        for edge, (first, last, count), flat in zip(edges, ranges, ("west", "", "east"), strict=True):
+        for edge, (first, last, count) in zip(edges, ranges, strict=True):
             angles = np.pi * np.linspace(first, last, 2 * count + 1)
             wall = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
             wall[np.abs(wall) < 1e-15] = 0.0
-            sides = {"north": "wall"} | ({flat: "symmetry"} if flat else {})
-            patches.append(Patch.ruled(inner=edge, outer=wall, blend=blend, sides=sides))
-        return patch_mesh(patches)
+            patches.append(ruled(inner=edge, outer=wall, blend=blend))
+        return patch_mesh(patches, symmetry=on_symmetry)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,12 +124,13 @@ class DuctMesh(_HalfSection):
         y = width * (np.concatenate([half, 1 - half[-2::-1]]) - 0.5)
         height = width / self.aspect_ratio
         z = height / 2 * (1 - geometric_vertices(cells=self.along, ratio=self.wall_ratio)[::-1])
-        patch = Patch.tensor(
-            x=with_midpoints(vertices=y),
-            y=with_midpoints(vertices=z),
-            sides={"west": "wall", "east": "wall", "north": "wall", "south": "symmetry"},
-        )
-        return patch_mesh([patch])
+        patch = tensor(x=with_midpoints(vertices=y), y=with_midpoints(vertices=z))
+        return patch_mesh([patch], symmetry=on_symmetry)
+
+
+def on_symmetry(middle: FloatArray) -> BoolArray:
+    """Whether places lie on the line z = 0 of a half section."""
+    return np.asarray(middle[1] < _TOUCHING)
 
 
 def _lines(points: FloatArray, count: int) -> FloatArray:
@@ -147,7 +147,7 @@ def _core(n: int) -> tuple[FloatArray, list[FloatArray]]:
     straight = _lines(np.array([[-corner, corner], [corner, corner]]), 2 * n)
     bulge = np.stack([np.cos(angles), np.sin(angles)], axis=1) * corner * np.sqrt(2.0)
     top = (straight + bulge) / 2
-    nodes = Patch.ruled(inner=bottom, outer=top, blend=np.linspace(0.0, 1.0, 2 * n + 1)).nodes
+    nodes = ruled(inner=bottom, outer=top, blend=np.linspace(0.0, 1.0, 2 * n + 1))
     return nodes, [nodes[-1], nodes[::-1, -1], nodes[0, ::-1]]
 
 
@@ -165,13 +165,18 @@ def solve_section(
     Args: `start`: a neighbouring flow; needed once Kl exceeds a few thousand.
     Returns: The flow; nodal velocity components along (y, z) over nu/d, and along x over U.
     """
-    c = _coefficients(kl=kl, s=s, inertia=1.0)
-    area = float(system.space.weights.sum())
-    return solve_flow(system=system, coefficients=c, flow_rate=area, start=start, settings=settings)
+    return solve_flow(
+        system=system,
+        coefficients=section_coefficients(kl=kl, s=s),
+        flow_rate=float(system.weights.sum()),
+        start=start,
+        settings=settings,
+    )
 
 
-def _coefficients(*, kl: float, s: float, inertia: float) -> Coefficients:
-    rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (2 * s, 0.0, 0.0))
+def section_coefficients(*, kl: float, s: float, inertia: float = 1.0) -> Coefficients:
+    """Of developed flow, components along (y, z, x): velocities over nu/d in the plane, over U along it."""
+    rotation = ((0.0, 0.0, 2 * kl), (0.0, 0.0, 0.0), (-2 * s, 0.0, 0.0))
     return Coefficients(inertia=inertia, viscosity=1.0, rotation=rotation)
 
 
@@ -189,18 +194,19 @@ def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps
     Returns: G of each step.
     Raises: ArithmeticError: the flow grew without bound; the step is too long.
     """
-    coefficients, start = _coefficients(kl=kl, s=s, inertia=1.0), _disturbed(system, kl, s)
-    free, border = system.free, system.flow_load[system.free]
-    area = float(system.space.weights.sum())
-    mass = _mass(system)[free]
-    factors = _factors(system, coefficients, mass, step)
+    start, free, area = _disturbed(system, kl, s), system.free, float(system.weights.sum())
+    assert system.flow_load is not None
+    border = system.flow_load[free]
+    mass = system.of_all(sparse.kron(sparse.identity(system.components), system.mass))[free]
+    steady = system.free_part(system.linear_matrix(section_coefficients(kl=kl, s=s)))
+    factors = Factors((steady + 1.5 / step * mass[:, free]).tocsc())
     bordering = factors.solve(border)
     now, before = start, start
     convection = system.convection_vector(now)
     found = np.empty(steps)
     for i in range(steps):
         carried, convection = convection, system.convection_vector(now)
-        pull = coefficients.inertia * (2 * convection - carried)[free]
+        pull = (2 * convection - carried)[free]
         change = factors.factors.solve(mass @ (4 * now - before) / (2 * step) - pull)
         found[i] = (area - border @ change) / (border @ bordering)
         now, before = start.copy(), now
@@ -212,10 +218,9 @@ def march_section(*, system: FlowSystem, kl: float, s: float, step: float, steps
 
 def _disturbed(system: FlowSystem, kl: float, s: float) -> FloatArray:
     """The flow without inertia, with noise of one per cent of each component's largest velocity."""
-    linear = _coefficients(kl=kl, s=s, inertia=0.0)
-    area = float(system.space.weights.sum())
+    linear, area = section_coefficients(kl=kl, s=s, inertia=0.0), float(system.weights.sum())
     start = solve_flow(system=system, coefficients=linear, flow_rate=area).vector.copy()
-    velocity = system.space.split(start)[0]
+    velocity = system.split(start)[0]
     noise = np.random.default_rng(0).standard_normal(velocity.shape)
     noise *= 0.01 * np.abs(velocity).max(axis=1, keepdims=True)
     moving = system.free[system.free < velocity.size]
@@ -237,9 +242,8 @@ def developed_section(
 
 def solve_section_without_inertia(*, system: FlowSystem, rotation_reynolds: float) -> FlowSolution:
     """Fully developed flow in the limit Re = 0, where it is linear; components along (y, z, x) over U."""
-    c = Coefficients(inertia=0.0, viscosity=1.0, rotation=2 * rotation_reynolds)
-    area = float(system.space.weights.sum())
-    return solve_flow(system=system, coefficients=c, flow_rate=area)
+    c = section_coefficients(kl=rotation_reynolds, s=rotation_reynolds, inertia=0.0)
+    return solve_flow(system=system, coefficients=c, flow_rate=float(system.weights.sum()))
 
 
 def friction_ratio(solution: FlowSolution) -> float:
@@ -247,52 +251,22 @@ def friction_ratio(solution: FlowSolution) -> float:
     return solution.driving_gradient / POISEUILLE_GRADIENT
 
 
-def _mass(system: FlowSystem) -> Any:
-    nothing = sparse.csr_matrix((system.space.pressure_nodes,) * 2)
-    return sparse.block_diag([system.mass] * system.space.components + [nothing], format="csr")
-
-
-def _factors(system: FlowSystem, coefficients: Coefficients, mass: Any, step: float) -> Factors:
-    steady = system.free_part(system.linear_matrix(coefficients))
-    matrix = (steady + 1.5 / step * mass[:, system.free]).tocsc()
-    return Factors.of(matrix)
-
-
 # An irrational factor keeps dyadic coordinates away from the rounding boundaries of the gluing.
 _GLUE = 0.7548776662e9
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Patch:
-    """Structured nodes and the names of those of its four sides that are boundaries."""
+def ruled(*, inner: FloatArray, outer: FloatArray, blend: FloatArray) -> FloatArray:
+    """Patch between two curves of nodes, at j = 0 and at j = 2 n, joined by straight lines.
 
-    nodes: FloatArray
-    """Coordinates, shape (2 m + 1, 2 n + 1, 2)."""
-    sides: Mapping[str, str] = field(default_factory=dict)
-    """Boundary name by side: "west" i = 0, "east" i = 2 m, "south" j = 0, "north" j = 2 n."""
+    Args: `blend`: share of the way from inner to outer, shape (2 n + 1,), from 0 to 1.
+    """
+    share = blend[None, :, None]
+    return np.asarray((1 - share) * inner[:, None, :] + share * outer[:, None, :])
 
-    @classmethod
-    def ruled(
-        cls,
-        *,
-        inner: FloatArray,
-        outer: FloatArray,
-        blend: FloatArray,
-        sides: Mapping[str, str] | None = None,
-    ) -> Patch:
-        """Patch between two curves of nodes, at j = 0 and at j = 2 n, joined by straight lines.
 
-        Args: `blend`: share of the way from inner to outer, shape (2 n + 1,), from 0 to 1.
-        """
-        share = blend[None, :, None]
-        nodes = (1 - share) * inner[:, None, :] + share * outer[:, None, :]
-        return cls(nodes=nodes, sides=sides or {})
-
-    @classmethod
-    def tensor(cls, *, x: FloatArray, y: FloatArray, sides: Mapping[str, str] | None = None) -> Patch:
-        """Rectangular patch from nodes along its two directions, shapes (2 m + 1,) and (2 n + 1,)."""
-        grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-        return cls(nodes=grid, sides=sides or {})
+def tensor(*, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Rectangular patch from nodes along its two directions, shapes (2 m + 1,) and (2 n + 1,)."""
+    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
 
 
 def with_midpoints(*, vertices: npt.ArrayLike) -> FloatArray:
@@ -311,17 +285,29 @@ def geometric_vertices(*, cells: int, ratio: float) -> FloatArray:
     return np.asarray(np.concatenate(([0.0], np.cumsum(lengths))) / lengths.sum(), dtype=np.float64)
 
 
-def _numbered(patches: Sequence[Patch]) -> tuple[FloatArray, list[IntArray]]:
-    """Glued node coordinates (N, 2) and each patch's node numbers."""
-    points = np.concatenate([patch.nodes.reshape(-1, 2) for patch in patches])
+def patch_mesh(patches: Sequence[FloatArray], **named: Test) -> Any:
+    """Nine-node quadrilaterals of patches, glued where nodes coincide.
+
+    Args: `**named`: boundaries by name, each true at the middles, shape (2, n), of its facets; the rest is
+        "wall".
+    """
+    points = np.concatenate([nodes.reshape(-1, 2) for nodes in patches])
     extent = float(np.ptp(points, axis=0).max())
     keys = np.round((points - points.min(axis=0)) / extent * _GLUE).astype(np.int64)
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    numbers = np.split(
-        inverse.ravel(), np.cumsum([p.nodes.shape[0] * p.nodes.shape[1] for p in patches])[:-1]
-    )
-    shaped = [n.reshape(p.nodes.shape[:2]).astype(np.int64) for n, p in zip(numbers, patches, strict=True)]
-    return points[first], shaped
+    numbers = np.split(inverse.ravel(), np.cumsum([nodes.size // 2 for nodes in patches])[:-1])
+    cells = [_quads(number.reshape(nodes.shape[:2])) for number, nodes in zip(numbers, patches, strict=True)]
+    mesh = MeshQuad2(np.ascontiguousarray(points[first].T), np.concatenate(cells, axis=1))
+    return mesh.with_boundaries(named_facets(mesh, named))
+
+
+def named_facets(mesh: Any, named: Mapping[str, Test]) -> dict[str, IntArray]:
+    """Outer facets by the test that their middles pass; "wall" has those that pass none."""
+    outside = mesh.boundary_facets()
+    middle = mesh.p[:, mesh.facets[:, outside]].mean(axis=1)
+    found = {name: test(middle) for name, test in named.items()}
+    found["wall"] = ~np.any([*found.values(), np.zeros(outside.size, dtype=bool)], axis=0)
+    return {name: outside[where] for name, where in found.items()}
 
 
 def _quads(number: IntArray) -> IntArray:
@@ -329,31 +315,6 @@ def _quads(number: IntArray) -> IntArray:
     a, b, c = slice(0, -2, 2), slice(1, None, 2), slice(2, None, 2)
     order = [(a, a), (c, a), (c, c), (a, c), (b, a), (c, b), (b, c), (a, b), (b, b)]
     return np.stack([number[i, j].ravel() for i, j in order])
-
-
-def _side(number: IntArray, side: str) -> IntArray:
-    chains = {"west": number[0], "east": number[-1], "south": number[:, 0], "north": number[:, -1]}
-    return np.asarray(chains[side], dtype=np.int64)
-
-
-def _named_facets(mesh: Any, nodes: FloatArray, patches: Sequence[Patch], numbers: list[IntArray]) -> Any:
-    """Boundary facets by name: those whose two vertices lie on one named side of a patch."""
-    where = {tuple(point): index for index, point in enumerate(mesh.doflocs.T[: mesh.nvertices])}
-    facets = {tuple(sorted(pair)): index for index, pair in enumerate(mesh.facets.T.tolist())}
-    named: dict[str, list[int]] = {}
-    for patch, number in zip(patches, numbers, strict=True):
-        for side, name in patch.sides.items():
-            chain = [where[tuple(nodes[n])] for n in _side(number, side)[::2]]
-            pairs = pairwise(chain)
-            named.setdefault(name, []).extend(facets[(min(p), max(p))] for p in pairs)
-    return {name: np.array(sorted(found)) for name, found in named.items()}
-
-
-def patch_mesh(patches: Sequence[Patch]) -> Any:
-    """Nine-node quadrilaterals of patches, glued where nodes coincide, with named boundaries."""
-    nodes, numbers = _numbered(patches)
-    mesh = MeshQuad2(np.ascontiguousarray(nodes.T), np.concatenate([_quads(n) for n in numbers], axis=1))
-    return mesh.with_boundaries(_named_facets(mesh, nodes, patches, numbers))
 
 
 End = Literal["entrance", "exit"]
@@ -391,38 +352,35 @@ class EndMesh:
         core = 0.5 - _line(0.5, self.longest_cell * 0.5, self)[::-1]
         core[0] = 0.0
         around = 0.5 + _line(self.reservoir, longest, self)
-        patches = [
-            Patch.tensor(x=outside, y=core, sides={"east": "far", "south": "axis"}),
-            Patch.tensor(x=outside, y=around, sides={"east": "far", "west": "wall", "north": "side"}),
-            Patch.tensor(x=inside, y=core, sides={"east": "deep", "south": "axis", "north": "wall"}),
-        ]
-        return patch_mesh(patches)
+        far, deep = -sign * self.reservoir, sign * self.tube
+        return patch_mesh(
+            [tensor(x=outside, y=core), tensor(x=outside, y=around), tensor(x=inside, y=core)],
+            axis=lambda at: at[1] < _TOUCHING,
+            far=lambda at: np.abs(at[0] - far) < _TOUCHING,
+            deep=lambda at: np.abs(at[0] - deep) < _TOUCHING,
+            side=lambda at: at[1] > self.reservoir,
+        )
 
     def system(self, *, end: End) -> FlowSystem:
         """Discrete equations of an end: developed flow deep in the tube, no force on the far reservoir."""
-        space = FlowSpace.taylor_hood(mesh=self.mesh(end=end), axisymmetric=True)
         conditions = [Dirichlet(boundary="deep", component=0, value=lambda x: 2 * (1 - 4 * x[1] ** 2))]
         conditions += [Dirichlet(boundary=name, component=1) for name in ("deep", "wall", "axis")]
         conditions.append(Dirichlet(boundary="wall", component=0))
         if end == "exit":
             # The jet draws liquid in through the side; left free along it, that goes unstable near Re 1950.
             conditions.append(Dirichlet(boundary="side", component=0))
-        return FlowSystem.of(space=space, conditions=conditions)
+        return FlowSystem.of(mesh=self.mesh(end=end), conditions=conditions, axisymmetric=True)
 
 
-def _graded_line(*, length: float, longest: float, cells: EndMesh) -> FloatArray:
-    """Vertices from 0 to a length whose cells grow geometrically from the edge cell up to the longest one."""
+def _line(length: float, longest: float, cells: EndMesh) -> FloatArray:
+    """Nodes from 0 to a length whose cells grow geometrically from the edge cell up to the longest one."""
     growth = np.exp(1 / cells.cells_per_fold)
     limit = 2 * longest / cells.cells_per_fold
     steps = [cells.edge_cell]
     while sum(steps) < length:
         steps.append(min(steps[-1] * growth, limit))
     vertices = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.asarray(vertices * (length / vertices[-1]), dtype=np.float64)
-
-
-def _line(length: float, longest: float, cells: EndMesh) -> FloatArray:
-    return with_midpoints(vertices=_graded_line(length=length, longest=longest, cells=cells))
+    return with_midpoints(vertices=vertices * (length / vertices[-1]))
 
 
 def solve_end(

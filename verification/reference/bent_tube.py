@@ -32,11 +32,10 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 from skfem import MeshHex1, MeshHex2, MeshQuad1, MeshQuad2
 
-from ringbalance.physics.results import Statistics, Status
 from ringbalance.physics.tube.local_losses import MOMENTUM_FACTOR
 from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSpace, FlowSystem
+from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSystem
 from ringbalance.verification.navier_stokes.newton import (
     FlowSolution,
     NewtonSettings,
@@ -44,7 +43,12 @@ from ringbalance.verification.navier_stokes.newton import (
     follow,
     solve_flow,
 )
-from ringbalance.verification.navier_stokes.tube import SectionMesh, developed_section
+from ringbalance.verification.navier_stokes.tube import (
+    SectionMesh,
+    developed_section,
+    named_facets,
+    on_symmetry,
+)
 
 # Corner of the section (0 to 3) and end of the slab for each vertex, in scikit-fem's order.
 _HEXAHEDRON = ((2, 1), (2, 0), (1, 1), (3, 1), (1, 0), (3, 0), (0, 1), (0, 0))
@@ -68,7 +72,7 @@ class SweptTube:
     """A swept mesh with what its structure is good for."""
 
     mesh: Any
-    """`skfem.MeshHex2` with boundaries inlet, outlet and those of the section."""
+    """`skfem.MeshHex2` with boundaries inlet, outlet, symmetry and wall."""
     section_node: IntArray
     """Node of the section that each node stands on."""
     half_station: IntArray
@@ -133,24 +137,10 @@ def _prism(section: Any, slabs: int) -> Any:
     return MeshHex2.from_mesh(MeshHex1(points, cells))
 
 
-def _boundaries(section: Any, prism: Any, slabs: int) -> dict[str, IntArray]:
-    """Facets by name: the ends, and what stands on a named side of the section."""
-    z = np.asarray(prism.p[2][prism.facets]).mean(axis=0)
-    named = {"inlet": np.flatnonzero(z < 0.25), "outlet": np.flatnonzero(z > slabs - 0.25)}
-    number = np.asarray(prism.facets) % section.nvertices
-    pairs = np.sort(number, axis=0)[[0, -1]]
-    upright = np.flatnonzero(np.abs(z % 1 - 0.5) < 0.25)
-    keys = pairs[0, upright] * section.nvertices + pairs[1, upright]
-    for name, facets in section.boundaries.items():
-        low, high = np.sort(section.facets[:, facets], axis=0)
-        named[name] = upright[np.isin(keys, low * section.nvertices + high)]
-    return {name: np.asarray(found, dtype=np.int64) for name, found in named.items()}
-
-
 def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
     """Mesh of a tube along a path.
 
-    Args: `section`: `skfem.MeshQuad2` in (y, z) with named boundaries.
+    Args: `section`: `skfem.MeshQuad2` in (y, z), z >= 0.
     Returns: The mesh and its structure.
     Raises: ValueError: no segments, a length or a number of cells that is not positive, or an arc so tight
         that the section would reach its centre.
@@ -172,9 +162,14 @@ def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
     y, z = np.asarray(section.doflocs)[:, node]
     left = np.stack([-direction[1], direction[0]])
     points = np.vstack([place[:, half] + y * left[:, half], z])
+    named = {
+        "inlet": lambda at: at[2] < 0.25,
+        "outlet": lambda at: at[2] > slabs - 0.25,
+        "symmetry": on_symmetry,
+    }
     mesh = MeshHex2(np.ascontiguousarray(points), prism.t)
     return SweptTube(
-        mesh=mesh.with_boundaries(_boundaries(section, prism, slabs)),
+        mesh=mesh.with_boundaries(named_facets(prism, named)),
         section_node=np.asarray(node, dtype=np.int64),
         half_station=half,
         arc_length=at,
@@ -186,8 +181,12 @@ def swept_tube(*, section: Any, segments: Sequence[Segment]) -> SweptTube:
 Progress = Callable[[str], None]
 _NEWTON = NewtonSettings(tolerance=1e-7, max_iterations=10)
 
-CORIOLIS = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-"""e_z x velocity for components along (x, y, z)."""
+
+def coefficients(*, reynolds: float, rotation_reynolds: float) -> Coefficients:
+    """Of flow in a tube that turns about e_z, components along (x, y, z)."""
+    twice = 2 * rotation_reynolds
+    rotation = ((0.0, -twice, 0.0), (twice, 0.0, 0.0), (0.0, 0.0, 0.0))
+    return Coefficients(inertia=reynolds, viscosity=1.0, rotation=rotation)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -245,11 +244,10 @@ class BentTubeFlow:
         tube = swept_tube(section=cells.mesh(), segments=segments)
         system = _system(tube, section, developed, reynolds)
         say(f"{system.free.size} unknowns in {tube.arc_length.size // 2} slabs")
-        rotation = 2 * rotation_reynolds * coriolis_factor
 
-        def solve(share: float, start: FlowSolution) -> FlowSolution:
+        def solve(share: float, start: FlowSolution | None) -> FlowSolution:
             say(f"inertia {share:.3g} of its full value")
-            c = Coefficients(inertia=share * reynolds, viscosity=1.0, rotation=rotation)
+            c = coefficients(reynolds=share * reynolds, rotation_reynolds=coriolis_factor * rotation_reynolds)
             return solve_flow(system=system, coefficients=c, start=start, settings=_NEWTON, progress=say)
 
         solution = solve(first_inertia, _guess(tube, system, developed, reynolds))
@@ -306,41 +304,33 @@ def _swept_pressure(tube: SweptTube, developed: FlowSolution, reynolds: float) -
     return np.asarray(fall[station] + developed.pressure[node] / reynolds, dtype=np.float64)
 
 
-def _outlet_load(tube: SweptTube, space: FlowSpace, section: FlowSpace, pressure: FloatArray) -> FloatArray:
+def _outlet_load(
+    tube: SweptTube, system: FlowSystem, section: FlowSystem, pressure: FloatArray
+) -> FloatArray:
     """Integral over the outlet of minus the section's pressure times normal and shape functions."""
     normal_force = section.load(np.asarray(section.pressure.interpolate(pressure)))
     at_outlet = np.flatnonzero(tube.half_station == tube.half_station.max())
-    load = np.zeros((3, space.velocity_nodes))
-    load[:2, at_outlet] = -tube.direction[:, -1:] * normal_force[tube.section_node[at_outlet]]
-    return np.concatenate([load.ravel(), np.zeros(space.pressure_nodes)])
+    load = np.zeros(system.unknowns)
+    velocity, _ = system.split(load)
+    velocity[:2, at_outlet] = -tube.direction[:, -1:] * normal_force[tube.section_node[at_outlet]]
+    return load
 
 
 def _system(tube: SweptTube, section: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSystem:
     conditions = [Dirichlet(boundary="symmetry", component=2)]
     conditions += [Dirichlet(boundary=name, component=c) for name in ("inlet", "wall") for c in range(3)]
-    space = FlowSpace.taylor_hood(mesh=tube.mesh)
-    system = FlowSystem.of(space=space, conditions=conditions, coriolis=CORIOLIS)
+    system = FlowSystem.of(mesh=tube.mesh, conditions=conditions)
     velocity = _swept_velocity(tube, developed, reynolds)
-    velocity[:, space.boundary_nodes("wall")] = 0.0
-    fixed = np.concatenate([velocity.ravel(), np.zeros(space.pressure_nodes)])
+    velocity[:, system.boundary_nodes("wall")] = 0.0
+    fixed = np.append(velocity.ravel(), np.zeros(system.pressure.N))
     fixed[system.free] = 0.0
-    load = _outlet_load(tube, space, section.space, developed.pressure / reynolds)
+    load = _outlet_load(tube, system, section, developed.pressure / reynolds)
     return replace(system, fixed_values=fixed, source=load)
 
 
 def _guess(tube: SweptTube, system: FlowSystem, developed: FlowSolution, reynolds: float) -> FlowSolution:
     velocity = _swept_velocity(tube, developed, reynolds)
-    vector = np.concatenate([velocity.ravel(), _swept_pressure(tube, developed, reynolds)])
-    parts = system.space.split(vector)
-    return FlowSolution(
-        vector=vector,
-        velocity=parts[0],
-        pressure=parts[1],
-        reaction=np.zeros_like(velocity),
-        driving_gradient=0.0,
-        status=Status(),
-        statistics=Statistics(),
-    )
+    return FlowSolution.of(system, np.append(velocity.ravel(), _swept_pressure(tube, developed, reynolds)))
 
 
 def _mean_pressure(tube: SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
@@ -351,17 +341,16 @@ def _mean_pressure(tube: SweptTube, section: FlowSystem, solution: FlowSolution)
 
 def _energy_flux(tube: SweptTube, section: FlowSystem, solution: FlowSolution) -> FloatArray:
     """Integral of |u|^2 times the velocity along the path, over the section, at the stations."""
-    space = section.space
     at = np.flatnonzero(tube.half_station % 2 == 0)
-    speeds = np.zeros((tube.arc_length[::2].size, 4, space.velocity_nodes))
+    speeds = np.zeros((tube.arc_length[::2].size, 4, section.velocity.N))
     tangent = tube.direction[:, tube.half_station[at]]
     u = solution.velocity[:, at]
     stations = tube.half_station[at] // 2
     speeds[stations, :3, tube.section_node[at]] = u.T
     speeds[stations, 3, tube.section_node[at]] = (u[:2] * tangent).sum(axis=0)
-    fields = speeds[:, :, space.velocity.element_dofs.T] @ space.shape
-    flux = (fields[:, :3] ** 2).sum(axis=1) * fields[:, 3] * space.weights
-    return np.asarray(flux.sum(axis=(1, 2)) / space.weights.sum(), dtype=np.float64)
+    weights = section.weights / section.weights.sum()
+    fields = (section.at_points(speed)[0] for speed in speeds)
+    return np.array([np.sum(weights * (field[:3] ** 2).sum(axis=0) * field[3]) for field in fields])
 
 
 def rotation_with_curvature(*, reynolds: float, rotation_reynolds: float, curvature: float) -> float:

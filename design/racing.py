@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Settings, balancer_of
+from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Settings, quick_balancer
 from ringbalance.controller.judging.judge import Judgement, judged_all
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.trials import Trials
@@ -123,7 +123,7 @@ def race(
         `blocks`: of devices, in the order in which they run until too many have failed; none: in heats.
     """
     try:
-        balancer = balancer_of(point_scene(scene, point))
+        balancer = quick_balancer(point_scene(scene, point))
         field = _field(balancer.trials(), places) if settings else [(None, {})]
         if not field:
             return None
@@ -136,7 +136,7 @@ def raced_longer(scene: SceneFile, point: Point, *, before: Race, asked: float) 
     """The same on `SURE` devices, or until too many have failed; as it was where it breaks down."""
     longer = before
     try:
-        balancer = balancer_of(point_scene(scene, point))
+        balancer = quick_balancer(point_scene(scene, point))
         while longer.meets.size < SURE and longer.failed <= (1 - asked) * SURE:
             size = longer.meets.size
             (longer,) = _heat(balancer, [longer], range(size, size + DEVICES), further=FURTHER)
@@ -241,7 +241,7 @@ def judged_design(
         `most`: devices; default as many as `tune` takes.
     """
     try:
-        balancer = balancer_of(point_scene(scene, point))
+        balancer = quick_balancer(point_scene(scene, point))
         tried = [settings, searched(balancer)] if search else [settings]
         fresh = [each for i, each in enumerate(tried) if each not in tried[:i]]
         judged = judged_all(balancer, fresh, most=most)
@@ -253,7 +253,7 @@ def judged_design(
 def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Draws) -> int | None:
     """How many of some devices meet what is required; None: the point is refused or breaks down."""
     try:
-        balancer = balancer_of(point_scene(scene, point))
+        balancer = quick_balancer(point_scene(scene, point))
         (outcomes,) = balancer.run_all([settings], draws)
         return int(np.count_nonzero(np.all([each.met(outcomes) for each in balancer.demands()], axis=0)))
     except (SceneError, *FAULTS):

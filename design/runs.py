@@ -6,7 +6,7 @@ from collections import Counter
 from functools import partial
 from typing import Final
 
-from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.balancer import quick_balancer
 from ringbalance.controller.judging.judge import judged_all
 from ringbalance.design.axes import Point
 from ringbalance.design.static import EMPTY, FAULTS, REFUSED, Record, point_scene, refusal
@@ -32,7 +32,7 @@ def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
         `finding`.
     """
     try:
-        balancer = balancer_of(point_scene(scene, point))
+        balancer = quick_balancer(point_scene(scene, point))
         judge = partial(judged_all, balancer, [{}], whole=False)
         (judgement,) = judge(most=min(_LOOK, runs))
         if judgement.fraction.count or judgement.verdict == OPEN:

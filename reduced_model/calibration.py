@@ -8,18 +8,18 @@ from typing import Final
 import numpy as np
 
 from ringbalance.physics.tube.loss import VELOCITIES, tube_loss
-from ringbalance.reduced_model.calibration_record import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration, OperatingPoint
 from ringbalance.reduced_model.calibration_rows import calibration_rows
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
+from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.gas_line import line_answers
-from ringbalance.reduced_model.instability import AsynchronousInstability
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law
 from ringbalance.reduced_model.law.files import load_law
 from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED, BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
-from ringbalance.reduced_model.operating_point import OperatingPoint, TubeLiquid
+from ringbalance.reduced_model.pressure_profile import TubeLiquid
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid
 from ringbalance.reduced_model.terms import models_used
 from ringbalance.reduced_model.tube.heads import TubeHeads

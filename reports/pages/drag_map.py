@@ -18,9 +18,8 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ringbalance.reduced_model import paper
-from ringbalance.reduced_model.calibration_record import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration, priming_pressure
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.operating_point import priming_pressure
 from ringbalance.reduced_model.tube.regime import (
     crest_margins,
     driving_pressure,

@@ -6,6 +6,7 @@ from typing import Final
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged
+from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
@@ -78,7 +79,7 @@ _SHARES: Final = {True: "{}: {}, merely not known", False: "{}: {}, varies betwe
 
 def _collect(work: Work) -> Record:
     scene, balancer = work.scene, LiquidRingBalancer(work.scene)
-    tuning = balancer.recommend(pressure=True, remedies=None)
+    tuning = tuned(balancer, along=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
     return {
         "limit_m": balancer.limit,

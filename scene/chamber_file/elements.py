@@ -1,4 +1,4 @@
-"""The kinds of cells and facets that a chamber can have: nodes, faces, and their orders in each format.
+"""The kinds of cells and facets that a chamber can have: nodes and faces, in meshio's order.
 
 Facets and edges of cells have one number each, so that equal ones are found by sorting.
 """
@@ -19,90 +19,18 @@ from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 CELL_KINDS: Final[tuple[CellKind, ...]] = get_args(CellKind)
 CORNERS: Final[Mapping[str, int]] = MappingProxyType(
     {
-        "vertex": 1,
-        "line": 2,
-        "line3": 2,
-        "triangle": 3,
-        "triangle6": 3,
-        "quad": 4,
-        "quad8": 4,
-        "quad9": 4,
-        "tetra": 4,
-        "tetra10": 4,
-        "hexahedron": 8,
-        "hexahedron20": 8,
-        "hexahedron27": 8,
-        "wedge": 6,
-        "wedge15": 6,
-        "wedge18": 6,
-        "pyramid": 5,
-        "pyramid13": 5,
-        "pyramid14": 5,
+        **dict.fromkeys(("triangle", "triangle6"), 3),
+        **dict.fromkeys(("quad", "quad8", "quad9", "tetra", "tetra10"), 4),
+        **dict.fromkeys(("hexahedron", "hexahedron20", "hexahedron27"), 8),
     }
 )
-"""Corners of each kind that a file may hold, whether a chamber can consist of it or not."""
+"""Of each kind of cell and facet that a chamber may have."""
 NODES: Final[Mapping[str, int]] = MappingProxyType(
     {kind: int("".join(filter(str.isdigit, kind)) or count) for kind, count in CORNERS.items()}
 )
 """A kind of second order has its number of nodes in its name."""
 FACET_KINDS: Final = MappingProxyType({3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8", 9: "quad9"})
 """By number of nodes."""
-GMSH_KINDS: Final = MappingProxyType(
-    {
-        1: "line",
-        2: "triangle",
-        3: "quad",
-        4: "tetra",
-        5: "hexahedron",
-        6: "wedge",
-        7: "pyramid",
-        8: "line3",
-        9: "triangle6",
-        10: "quad9",
-        11: "tetra10",
-        12: "hexahedron27",
-        13: "wedge18",
-        14: "pyramid14",
-        15: "vertex",
-        16: "quad8",
-        17: "hexahedron20",
-        18: "wedge15",
-        19: "pyramid13",
-    }
-)
-"""By the number of the type in a Gmsh file."""
-VTK_KINDS: Final = MappingProxyType(
-    {
-        1: "vertex",
-        3: "line",
-        5: "triangle",
-        9: "quad",
-        10: "tetra",
-        12: "hexahedron",
-        13: "wedge",
-        14: "pyramid",
-        21: "line3",
-        22: "triangle6",
-        23: "quad8",
-        24: "tetra10",
-        25: "hexahedron20",
-        26: "wedge15",
-        27: "pyramid13",
-        28: "quad9",
-        29: "hexahedron27",
-        32: "wedge18",
-    }
-)
-"""By the number of the type in a VTU file."""
-_SECOND: Final = (0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)
-GMSH_ORDER: Final[Mapping[str, tuple[int, ...]]] = MappingProxyType(
-    {
-        "tetra10": (0, 1, 2, 3, 4, 5, 6, 7, 9, 8),
-        "hexahedron20": _SECOND,
-        "hexahedron27": (*_SECOND, 22, 23, 21, 24, 20, 25, 26),
-    }
-)
-"""Places of the nodes of a Gmsh element in the order of meshio and VTK; other kinds have the same order."""
 _FACES: Final[Mapping[int, tuple[tuple[int, ...], ...]]] = MappingProxyType(
     {
         4: ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
@@ -131,9 +59,8 @@ MOST_NODES: Final = 2_000_000
 
 def dimension(kind: str) -> int:
     """Of an element of a kind: 0 for a point to 3 for a cell."""
-    if kind in FACET_KINDS.values():
-        return 2
-    return 0 if kind == "vertex" else 1 if kind.startswith("line") else 3
+    lower = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
+    return next((count for name, count in lower.items() if kind.startswith(name)), 3)
 
 
 def between(kind: str) -> tuple[tuple[int, ...], ...]:

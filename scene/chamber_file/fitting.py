@@ -14,10 +14,9 @@ from typing import Final, get_args
 import numpy as np
 
 from ringbalance.scene.arrays import FloatArray, IntArray, clipped
-from ringbalance.scene.chamber_file.contents import Body
+from ringbalance.scene.chamber_file.body import Body
 from ringbalance.scene.chamber_file.elements import corners_of, edges_of
-from ringbalance.scene.chamber_file.record import OUTER_WALL, Axis, MeshUnit
-from ringbalance.scene.chamber_file.soundness import PORT
+from ringbalance.scene.chamber_file.record import OUTER_WALL, PORT, Axis, MeshUnit
 from ringbalance.scene.keys.derivations import even_number_of_chambers
 from ringbalance.scene.keys.reading import Reading
 from ringbalance.scene.kinds import Finding, failed_checks, written
@@ -127,9 +126,9 @@ def _from_origin(first: FloatArray, last: FloatArray) -> FloatArray:
 
 def _about_axis(body: Body, inner: float, outer: float, extent: float, node: int) -> Iterator[Finding]:
     if extent > math.pi * (1 + DRAWING_ROUNDING) or inner <= 1e-6 * outer:
-        label = body.node_labels(np.array([node]))
         what = "touches the shaft's axis" if inner <= 1e-6 * outer else "reaches round the shaft's axis"
-        problem = f"the chamber {what}: it takes {written(extent, 'deg')}, nearest to the axis is {label}"
+        problem = f"the chamber {what}: it takes {written(extent, 'deg')}, and its node nearest to the axis "
+        problem += f"lies {body.at(np.array([node]))}"
         yield Finding(problem=problem, allowed="one chamber beside the axis; see mesh_axis and the origin")
 
 
@@ -257,7 +256,7 @@ def _opening_findings(body: Body, points: FloatArray, *, chambers: int) -> Itera
     if len(wrong):
         worst = wrong[np.argsort(-angle[wrong])]
         problem = f"nodes lie outside the opening angle, 360 deg / {chambers} chambers about the middle "
-        problem += f"({len(wrong)}); farthest: {body.node_labels(worst)}"
+        problem += f"({len(wrong)}); farthest: {body.at(worst)}"
         limit = written(half, "deg")
         yield Finding(problem=problem, allowed=f"within {limit} on both sides of the middle (mesh_middle)")
 

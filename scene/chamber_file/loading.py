@@ -8,24 +8,20 @@ import stat
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
 from ringbalance.scene.arrays import IntArray
-from ringbalance.scene.chamber_file.abaqus_file import read_abaqus
-from ringbalance.scene.chamber_file.contents import Body, Contents, MeshFileError
-from ringbalance.scene.chamber_file.elements import dimension
+from ringbalance.scene.chamber_file.body import Body, Contents, MeshFileError
 from ringbalance.scene.chamber_file.fitting import PORT_RADIUS, Placed, placed, port_radius, unfitting
-from ringbalance.scene.chamber_file.gmsh_file import read_gmsh
+from ringbalance.scene.chamber_file.mesh_file import FORMATS, READERS, read_mesh_file
 from ringbalance.scene.chamber_file.record import ChamberGeometry, MeshKeys
 from ringbalance.scene.chamber_file.soundness import Facets, boundaries_of, oriented
-from ringbalance.scene.chamber_file.vtu_file import read_vtu
 from ringbalance.scene.faults import Fault
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.keys.reading import Reading
@@ -40,10 +36,6 @@ _LONGEST: Final = 300
 _COARSEST, _FINEST = 1 / 6, 1 / 40
 """Size of cells over the extent of the solid."""
 _LARGEST_FILE: Final = 2**28
-_READERS: Final[Mapping[str, Callable[[bytes], Contents]]] = MappingProxyType(
-    {".msh": read_gmsh, ".inp": read_abaqus, ".vtu": read_vtu}
-)
-_FORMATS: Final = "a mesh of Gmsh 2.2 or 4.1 (.msh), Abaqus (.inp) or VTK (.vtu), or a solid (.step, .stp)"
 
 
 def with_chamber(reading: Reading, *, folder: Path) -> tuple[Reading, tuple[Fault, ...]]:
@@ -116,7 +108,7 @@ def _chamber(reading: Reading, folder: Path) -> tuple[ChamberGeometry, Placed]:
     axis, middle = reading.values["disc.mesh_axis"], reading.values.get("disc.mesh_middle")
     found, misplaced = placed(body, boundaries, facets.nodes[facets.outer], axis=axis, middle=middle)
     everything = [
-        *facets.findings(body, drawing_nodes=_drawing_nodes(contents)),
+        *facets.findings(body),
         *misshapen,
         *misnamed,
         *misplaced,
@@ -161,9 +153,9 @@ def _is_step(path: Path) -> bool:
 
 def _content_of(path: Path) -> bytes:
     """The bytes of a mesh file. Raises: MeshFileError: it cannot be read, or is larger than any mesh."""
-    if path.suffix.lower() not in (*_READERS, *_STEP_ENDINGS):
+    if path.suffix.lower() not in (*READERS, *_STEP_ENDINGS):
         raise MeshFileError.of(
-            f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", _FORMATS
+            f"a name that ends with {path.suffix[:20] or 'no .ending'} is not read", FORMATS
         )
     try:
         # Without blocking: a pipe that nobody writes to must not hold the program.
@@ -171,7 +163,7 @@ def _content_of(path: Path) -> bytes:
         with os.fdopen(handle, "rb") as stream:
             kind = os.fstat(stream.fileno())
             if not stat.S_ISREG(kind.st_mode):
-                raise MeshFileError.of("this is a folder or a device, not a file", _FORMATS)
+                raise MeshFileError.of("this is a folder or a device, not a file", FORMATS)
             content = stream.read(_LARGEST_FILE + 1)
     except FileNotFoundError as error:
         raise MeshFileError.of(
@@ -183,7 +175,7 @@ def _content_of(path: Path) -> bytes:
     if len(content) > _LARGEST_FILE:
         raise MeshFileError.of("the file is too large to be checked", f"up to {_LARGEST_FILE // 2**20} MiB")
     if not content.strip():
-        raise MeshFileError.of("the file is empty", _FORMATS)
+        raise MeshFileError.of("the file is empty", FORMATS)
     return content
 
 
@@ -194,13 +186,7 @@ def _contents_of(path: Path, content: bytes, *, tolerance: float) -> Contents:
     """
     if _is_step(path):
         return _meshed_step(content, tolerance=tolerance)
-    return _READERS[path.suffix.lower()](content)
-
-
-def _drawing_nodes(contents: Contents) -> IntArray:
-    """Numbers of nodes that points and lines of the drawing have, such as centres of arcs."""
-    lower = [block.nodes.ravel() for block in contents.blocks if dimension(block.kind) < 2]
-    return np.concatenate([np.empty(0, dtype=np.int64), *lower])
+    return read_mesh_file(content, ending=path.suffix.lower())
 
 
 def _meshed_step(content: bytes, *, tolerance: float) -> Contents:
@@ -234,4 +220,4 @@ def _meshed_step(content: bytes, *, tolerance: float) -> Contents:
             lines = child.stderr.decode("utf-8", errors="replace").strip().splitlines()
             reason = "".join(each for each in (lines or ["it ended"])[-1] if each.isprintable())[:200]
             raise MeshFileError.of(f"Gmsh cannot mesh the solid: {reason}", "one solid with a closed surface")
-        return read_gmsh(target.read_bytes())
+        return read_mesh_file(target.read_bytes(), ending=".msh")

@@ -7,6 +7,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Annotated, Final, Literal
 
 import numpy as np
@@ -54,6 +55,26 @@ CellKind = Literal["tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron
 """One kind in a mesh; names and orders of nodes are meshio's."""
 OUTER_WALL: Final = "outer_wall"
 """The boundary that every chamber has."""
+PORT: Final = "port"
+WALLS: Final = "walls"
+VOLUME: Final = "chamber"
+"""Name of the cells, where they have one."""
+MEANINGS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        OUTER_WALL: "farthest from the shaft, where the liquid lies; needed",
+        "inner_wall": "nearest to the shaft",
+        "plate_left": "radial plate at the higher angle about the shaft",
+        "plate_right": "radial plate at the lower angle",
+        "end_back": "end wall at the lower coordinate along the shaft",
+        "end_front": "end wall at the higher coordinate along the shaft",
+        "gas_tube": "outside of a tube or a pin inside the chamber",
+        "gas_hole": "mouth of the gas line, or of a gas tube",
+        PORT: "opening of the connecting tube; without `port_radius` its mean radius is used",
+        WALLS: "any other wall; facets without a name count as this",
+    }
+)
+"""Of the names of boundaries."""
+KNOWN_NAMES: Final = tuple(MEANINGS)
 STRETCHED: Final = ("outer_radius", "inner_radius", "axial_width", "central_angle")
 """Keys of [disc] that can be changed on a mesh."""
 

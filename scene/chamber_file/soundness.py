@@ -5,10 +5,9 @@ What a file has as names is compared with what a chamber needs, facet by facet.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -17,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.chamber_file.contents import Body, Elements
+from ringbalance.scene.chamber_file.body import Body, NamedFacets
 from ringbalance.scene.chamber_file.elements import (
     CORNERS,
     between,
@@ -29,7 +28,7 @@ from ringbalance.scene.chamber_file.elements import (
     shape_gradients,
     sides_of,
 )
-from ringbalance.scene.chamber_file.record import OUTER_WALL
+from ringbalance.scene.chamber_file.record import KNOWN_NAMES, OUTER_WALL, VOLUME, WALLS
 from ringbalance.scene.faults import closest, did_you_mean
 from ringbalance.scene.kinds import Finding
 from ringbalance.scene.toml import toml_text
@@ -73,30 +72,27 @@ class Facets:
             shared=counts > 2,
         )
 
-    def findings(self, body: Body, *, drawing_nodes: IntArray) -> Iterator[Finding]:
-        """What is wrong with how cells hang together.
-
-        Args: `drawing_nodes`: numbers of nodes of the drawing.
-        """
-        yield from _repeated(body)
+    def findings(self, body: Body) -> Iterator[Finding]:
+        """What is wrong with how cells hang together."""
+        ordered = np.sort(body.cells, axis=1)
+        twice = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
+        yield from _about(body, "cells have a node twice", body.corners[twice], "cells with different nodes")
         crowded = [*_same_cells(body), *_crowded_facets(body, self)]
-        yield from crowded
         doubled = [*_doubled_nodes(body, self)]
         hanging = [] if doubled else [*_hanging_nodes(body, self)]
-        yield from (*doubled, *hanging)
         parts = [*_several_volumes(body, self)]
-        yield from parts
+        yield from (*crowded, *doubled, *hanging, *parts)
         if not (crowded or doubled or hanging or parts):
             yield from _pinched(body, self)
-        yield from _unused(body, drawing_nodes)
+        unused = np.setdiff1d(np.arange(len(body.points)), np.append(body.cells.ravel(), body.drawing))
+        allowed = "nodes of cells only (export the named volume alone)"
+        yield from _about(body, "nodes belong to no cell", unused, allowed)
 
 
-def _repeated(body: Body) -> Iterator[Finding]:
-    ordered = np.sort(body.cells, axis=1)
-    wrong = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
-    if len(wrong):
-        problem = f"cells have a node twice ({len(wrong)}): {body.cell_labels(wrong)}"
-        yield Finding(problem=problem, allowed="cells with different nodes")
+def _about(body: Body, what: str, entities: IntArray, allowed: str) -> Iterator[Finding]:
+    """An error about some nodes, or about entities that are given as rows of nodes; none without any."""
+    if len(entities):
+        yield Finding(problem=f"{what} ({len(entities)}): {body.at(entities)}", allowed=allowed)
 
 
 def _same_rows(rows: IntArray) -> IntArray:
@@ -110,19 +106,15 @@ def _same_rows(rows: IntArray) -> IntArray:
 
 
 def _same_cells(body: Body) -> Iterator[Finding]:
-    wrong = _same_rows(np.sort(body.corners, axis=1))
-    if len(wrong):
-        problem = f"cells stand in the file twice ({len(wrong)}): {body.cell_labels(wrong)}"
-        yield Finding(problem=problem, allowed="each cell once")
+    again = _same_rows(np.sort(body.corners, axis=1))
+    yield from _about(body, "cells stand in the file twice", body.corners[again], "each cell once")
 
 
 def _crowded_facets(body: Body, facets: Facets) -> Iterator[Finding]:
-    wrong = np.flatnonzero(facets.shared)
-    _, first = np.unique(facets.keys[wrong], return_index=True)
-    if len(first):
-        labels = body.facet_labels(facets.nodes[wrong[first], : facets.corners])
-        problem = f"facets belong to more than two cells ({len(first)}): {labels}"
-        yield Finding(problem=problem, allowed="at most two cells at a facet")
+    shared = np.flatnonzero(facets.shared)
+    _, first = np.unique(facets.keys[shared], return_index=True)
+    rows = facets.nodes[shared[first], : facets.corners]
+    yield from _about(body, "facets belong to more than two cells", rows, "at most two cells at a facet")
 
 
 def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
@@ -130,24 +122,22 @@ def _doubled_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
     nodes = np.unique(facets.nodes[facets.outer])
     points = body.points[nodes]
     step = _SAME * (float(np.ptp(points, axis=0).max()) or 1.0)
-    found = [_same_rows(np.floor(points / step + shift).astype(np.int64)) for shift in (0.0, 0.5)]
-    twice = nodes[np.unique(np.concatenate(found))]
-    if len(twice):
-        problem = f"nodes lie where another node lies already ({len(twice)}): {body.node_labels(twice)}"
-        yield Finding(problem=problem, allowed="merged nodes (Gmsh: Coherence Mesh), so that cells meet")
+    same = [_same_rows(np.floor(points / step + shift).astype(np.int64)) for shift in (0.0, 0.5)]
+    twice = nodes[np.unique(np.concatenate(same))]
+    allowed = "merged nodes (Gmsh: Coherence Mesh), so that cells meet"
+    yield from _about(body, "nodes lie where another node lies already", twice, allowed)
 
 
 def _hanging_nodes(body: Body, facets: Facets) -> Iterator[Finding]:
     """Nodes that lie on a facet of which they are no corner."""
-    middles = np.setdiff1d(np.unique(body.cells[:, CORNERS[body.kind] :]), [])
+    middles = np.unique(body.cells[:, CORNERS[body.kind] :])
     mixed = np.intersect1d(middles, body.corners)
     outer = facets.nodes[facets.outer, : facets.corners]
     triangles = outer if facets.corners == 3 else np.concatenate([outer[:, [0, 1, 2]], outer[:, [0, 2, 3]]])
     owners = outer if facets.corners == 3 else np.concatenate([outer, outer])
     wrong = np.union1d(mixed, _on_triangles(body.points, triangles, owners))
-    if len(wrong):
-        problem = f"nodes hang, on a facet or an edge of which they are no corner ({len(wrong)}): "
-        yield Finding(problem=problem + body.node_labels(wrong), allowed="cells that meet at whole facets")
+    what = "nodes hang, on a facet or an edge of which they are no corner"
+    yield from _about(body, what, wrong, "cells that meet at whole facets")
 
 
 def _on_triangles(points: FloatArray, triangles: IntArray, owners: IntArray) -> IntArray:
@@ -191,31 +181,16 @@ def _several_volumes(body: Body, facets: Facets) -> Iterator[Finding]:
     count, part = connected_components(graph, directed=False)
     if count > 1:
         _, first = np.unique(part, return_index=True)
-        problem = f"it falls into {count} separate volumes, which begin with {body.cell_labels(first)}"
+        problem = f"it falls into {count} separate volumes, which begin {body.at(body.corners[first])}"
         yield Finding(problem=problem, allowed="one chamber, whose cells meet at facets")
 
 
 def _pinched(body: Body, facets: Facets) -> Iterator[Finding]:
     """Edges at which the outer surface meets itself."""
-    outer = facets.nodes[facets.outer, : facets.corners]
-    edges = np.sort(edges_of(outer).reshape(-1, 2), axis=1)
-    _, first, counts = np.unique(
-        edges[:, 0] * len(body.points) + edges[:, 1], return_index=True, return_counts=True
-    )
-    wrong = edges[first[counts != 2]]
-    if len(wrong):
-        problem = f"the surface is open or touches itself along edges ({len(wrong)}): "
-        labels = body.facet_labels(wrong).replace("facet", "edge")
-        yield Finding(problem=problem + labels, allowed="a closed surface, two facets at each edge")
-
-
-def _unused(body: Body, drawing_nodes: IntArray) -> Iterator[Finding]:
-    used = np.zeros(len(body.points), dtype=np.bool_)
-    used[body.cells] = True
-    wrong = np.flatnonzero(~used & ~np.isin(body.node_numbers, drawing_nodes))
-    if len(wrong):
-        problem = f"nodes belong to no cell ({len(wrong)}): {body.node_labels(wrong)}"
-        yield Finding(problem=problem, allowed="nodes of cells only (export the named volume alone)")
+    edges = np.sort(edges_of(facets.nodes[facets.outer, : facets.corners]).reshape(-1, 2), axis=1)
+    different, counts = np.unique(edges, axis=0, return_counts=True)
+    what, allowed = "the surface is open or touches itself along edges", "two facets at each edge"
+    yield from _about(body, what, different[counts != 2], f"a closed surface, {allowed}")
 
 
 _AT_ONCE: Final = 4096
@@ -236,7 +211,7 @@ def oriented(body: Body) -> tuple[Body, tuple[Finding, ...]]:
         lowest, highest = -highest, -lowest
     inverted = ~flat & (highest <= 0)
     folded = ~flat & (lowest <= _FLAT * size**3) & (highest > 0)
-    return body, (*_flat(body, np.flatnonzero(flat)), *_inverted(body, inverted), *_folded(body, folded))
+    return body, tuple(_misshapen(body, flat=flat, inverted=inverted, folded=folded))
 
 
 def _jacobians(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -259,31 +234,23 @@ def _jacobians(body: Body) -> tuple[FloatArray, FloatArray, FloatArray]:
     return found[0], found[1], found[2]
 
 
-def _flat(body: Body, cells: IntArray) -> Iterator[Finding]:
-    if len(cells):
-        problem = f"cells are degenerate, without volume ({len(cells)}): {body.cell_labels(cells)}"
-        yield Finding(problem=problem, allowed="cells whose corners do not lie in one plane")
-
-
-def _inverted(body: Body, mark: BoolArray) -> Iterator[Finding]:
-    """Cells of negative Jacobian; where they are most, the others may be the wrong ones."""
-    cells = np.flatnonzero(mark)
-    if len(cells):
-        rest = len(mark) - len(cells)
-        word = "are inverted" if len(cells) <= rest else "have another orientation than the others"
-        problem = f"cells {word} ({len(cells)} of {len(mark)}): {body.cell_labels(cells)}"
-        yield Finding(problem=problem, allowed="cells that all have the same orientation")
-
-
-def _folded(body: Body, mark: BoolArray) -> Iterator[Finding]:
-    cells = np.flatnonzero(mark)
-    if not len(cells):
-        return
-    problem = f"cells fold over ({len(cells)}): {body.cell_labels(cells)}"
-    if len(between(body.kind)) > CORNERS[body.kind]:
-        node = _farthest_middle(body, int(cells[0]))
-        problem += f"; farthest from the middle of its side is {body.node_labels(np.array([node]))}"
-    yield Finding(problem=problem, allowed="cells with a positive Jacobian everywhere")
+def _misshapen(body: Body, *, flat: BoolArray, inverted: BoolArray, folded: BoolArray) -> Iterator[Finding]:
+    yield from _about(
+        body,
+        "cells are degenerate, without volume",
+        body.corners[flat],
+        "cells whose corners do not lie in one plane",
+    )
+    # Where cells of negative Jacobian are most, the others may be the wrong ones.
+    fewer = np.count_nonzero(inverted) <= len(inverted) / 2
+    word = "are inverted" if fewer else "have another orientation than the others"
+    allowed = "cells that all have the same orientation"
+    yield from _about(body, f"cells {word}", body.corners[inverted], allowed)
+    middles = len(between(body.kind)) > CORNERS[body.kind]
+    for each in _about(body, "cells fold over", body.corners[folded], "a positive Jacobian everywhere"):
+        node = [_farthest_middle(body, int(np.flatnonzero(folded)[0]))] if middles else []
+        hint = f"; farthest from the middle of its side is the node {body.at(np.array(node))}" if node else ""
+        yield replace(each, problem=each.problem + hint)
 
 
 def _farthest_middle(body: Body, cell: int) -> int:
@@ -300,80 +267,59 @@ def _mirrored(kind: str) -> IntArray:
     return np.array([nodes.index([y, x, z]) for x, y, z in nodes], dtype=np.int64)
 
 
-PORT: Final = "port"
-_WALLS: Final = "walls"
-_VOLUME: Final = "chamber"
-MEANINGS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        OUTER_WALL: "farthest from the shaft, where the liquid lies; needed",
-        "inner_wall": "nearest to the shaft",
-        "plate_left": "radial plate at the higher angle about the shaft",
-        "plate_right": "radial plate at the lower angle",
-        "end_back": "end wall at the lower coordinate along the shaft",
-        "end_front": "end wall at the higher coordinate along the shaft",
-        "gas_tube": "outside of a tube or a pin inside the chamber",
-        "gas_hole": "mouth of the gas line, or of a gas tube",
-        PORT: "opening of the connecting tube; without `port_radius` its mean radius is used",
-        _WALLS: "any other wall; facets without a name count as this",
-    }
-)
-KNOWN_NAMES: Final = tuple(MEANINGS)
-
-
 def boundaries_of(body: Body, facets: Facets) -> tuple[dict[str, IntArray], tuple[Finding, ...]]:
     """Facets of a body by name, each as its cell has them, and what is wrong with the names."""
-    found = [*_volume_names(body), *_unknown(body), *_missing(body)]
+    wrong = [*_volume_names(body), *_unknown(body), *_missing(body)]
     sides = facets.outer[np.argsort(facets.keys[facets.outer], kind="stable")]
     held = np.zeros((len(KNOWN_NAMES), len(sides)), dtype=np.bool_)
-    for block in body.named:
-        at, real = _places(body, facets, block, facets.keys[sides])
-        found += _no_facets(body, facets, block, real)
-        found += _other_middles(body, facets.nodes[sides[at[real]]], block, real)
-        for name in set(block.names) & set(KNOWN_NAMES):
-            held[KNOWN_NAMES.index(name), at[real]] = True
-    found += _named_twice(body, facets.nodes[sides, : facets.corners], held)
-    held[KNOWN_NAMES.index(_WALLS)] |= ~held.any(axis=0)
+    for each in body.named:
+        at, real = _places(body, facets, each, facets.keys[sides])
+        wrong += _no_facets(body, facets, each, real)
+        wrong += _other_middles(body, facets.nodes[sides[at[real]]], each, real)
+        if each.name in KNOWN_NAMES:
+            held[KNOWN_NAMES.index(each.name), at[real]] = True
+    several = held.sum(axis=0) > 1
+    if several.any():
+        both = [KNOWN_NAMES[place] for place in np.flatnonzero(held[:, several][:, 0])]
+        what = f"facets have two names, {' and '.join(map(toml_text, both))}"
+        wrong += _about(body, what, facets.nodes[sides[several], : facets.corners], "one name for each facet")
+    held[KNOWN_NAMES.index(WALLS)] |= ~held.any(axis=0)
     marked = {name: facets.nodes[sides[inside]] for name, inside in zip(KNOWN_NAMES, held, strict=True)}
-    return {name: each for name, each in marked.items() if len(each)}, tuple(found)
+    return {name: each for name, each in marked.items() if len(each)}, tuple(wrong)
 
 
-def _places(body: Body, facets: Facets, block: Elements, keys: IntArray) -> tuple[IntArray, BoolArray]:
-    """Where the facets of a block stand among sorted keys, and which of them do."""
-    wanted = key_of(block.nodes[:, : CORNERS[block.kind]], len(body.points))
+def _places(body: Body, facets: Facets, named: NamedFacets, keys: IntArray) -> tuple[IntArray, BoolArray]:
+    """Where named facets stand among sorted keys, and which of them do."""
+    corners = named.corners
+    wanted = key_of(corners, len(body.points))
     at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    return at, (keys[at] == wanted) & (CORNERS[block.kind] == facets.corners)
+    return at, (keys[at] == wanted) & (corners.shape[1] == facets.corners)
 
 
 def _volume_names(body: Body) -> Iterator[Finding]:
     """All cells have the name of the volume, or none has a name."""
     for name, cells in body.cell_names:
-        if name != _VOLUME:
-            hint = did_you_mean(name, [_VOLUME])
-            problem = f"the cells of the volume {toml_text(name)} are not the chamber{hint}: "
-            labels = body.cell_labels(np.flatnonzero(cells))
-            yield Finding(problem=problem + labels, allowed=f'the name "{_VOLUME}", or no named volume')
-    marks = [cells for name, cells in body.cell_names if name == _VOLUME]
-    if marks and not marks[0].all() and len(body.cell_names) == 1:
-        problem = (
-            f'cells do not belong to the volume "{_VOLUME}": {body.cell_labels(np.flatnonzero(~marks[0]))}'
-        )
-        yield Finding(problem=problem, allowed=f'every cell in "{_VOLUME}"')
+        if name != VOLUME:
+            what = f"cells of the volume {toml_text(name)} are not the chamber{did_you_mean(name, [VOLUME])}"
+            allowed = f'the name "{VOLUME}", or no named volume'
+            yield from _about(body, what, body.corners[cells], allowed)
+    marks = [cells for name, cells in body.cell_names if name == VOLUME]
+    if marks and len(body.cell_names) == 1:
+        what = f'cells do not belong to the volume "{VOLUME}"'
+        yield from _about(body, what, body.corners[~marks[0]], f'every cell in "{VOLUME}"')
 
 
 def _unknown(body: Body) -> Iterator[Finding]:
-    for name in dict.fromkeys(name for block in body.named for name in block.names):
-        if name in KNOWN_NAMES:
-            continue
-        blocks = [block for block in body.named if name in block.names]
-        corners = blocks[0].nodes[:, : CORNERS[blocks[0].kind]]
-        labels = body.facet_labels(corners, blocks[0].numbers)
-        problem = f"unknown name of a boundary, {toml_text(name)}{did_you_mean(name, KNOWN_NAMES)}: {labels}"
-        yield Finding(problem=problem, allowed=", ".join(KNOWN_NAMES))
+    for each in body.named:
+        if each.name not in KNOWN_NAMES:
+            hint = did_you_mean(each.name, KNOWN_NAMES)
+            what = f"facets have the unknown name {toml_text(each.name)}{hint}"
+            yield from _about(body, what, each.corners, ", ".join(KNOWN_NAMES))
 
 
 def _missing(body: Body) -> Iterator[Finding]:
     """An error where no facet is the outer wall, with the names that the file does have."""
-    names = dict.fromkeys(name for block in body.named for name in block.names)
+    names = dict.fromkeys(each.name for each in body.named)
     if any(closest(name, KNOWN_NAMES) == OUTER_WALL for name in names):
         return
     volumes = [name for name, _ in body.cell_names]
@@ -383,42 +329,24 @@ def _missing(body: Body) -> Iterator[Finding]:
             problem=f'"{OUTER_WALL}" names {what}, not facets', allowed="a name of surface elements"
         )
         return
-    there = [*names, *volumes, *body.lesser, *body.other_names]
-    listed = ", ".join(toml_text(name) for name in dict.fromkeys(there)) or "none"
+    there = dict.fromkeys([*names, *volumes, *body.lesser, *body.other_names])
+    listed = ", ".join(map(toml_text, there)) or "none"
     problem = f'no facets have the name "{OUTER_WALL}"; names in the file: {listed[:300]}'
     yield Finding(problem=problem, allowed=f'a named boundary "{OUTER_WALL}" (Gmsh: Physical Surface)')
 
 
-def _no_facets(body: Body, facets: Facets, block: Elements, real: BoolArray) -> Iterator[Finding]:
+def _no_facets(body: Body, facets: Facets, named: NamedFacets, real: BoolArray) -> Iterator[Finding]:
     """Named elements that are no outer facet: between two cells, or of no cell."""
-    every = np.sort(facets.keys)
-    _, side = _places(body, facets, block, every)
-    names = " and ".join(toml_text(name) for name in block.names)
+    _, side = _places(body, facets, named, np.sort(facets.keys))
     for wrong, what in ((side & ~real, "lie between two cells"), (~side, "are no side of any cell")):
-        if wrong.any():
-            corners = block.nodes[wrong, : CORNERS[block.kind]]
-            labels = body.facet_labels(corners, block.numbers[wrong])
-            problem = f"facets named {names} {what} ({len(corners)}): {labels}"
-            yield Finding(problem=problem, allowed="facets of the chamber's surface")
+        what = f"facets named {toml_text(named.name)} {what}"
+        yield from _about(body, what, named.corners[wrong], "facets of the chamber's surface")
 
 
-def _other_middles(body: Body, cell: IntArray, block: Elements, real: BoolArray) -> Iterator[Finding]:
+def _other_middles(body: Body, cell: IntArray, named: NamedFacets, real: BoolArray) -> Iterator[Finding]:
     """Facets of second order whose mid-side nodes are not those of their cell."""
-    if cell.shape[1] != block.nodes.shape[1]:
-        return
-    nodes = block.nodes[real]
-    wrong = (np.sort(cell, axis=1) != np.sort(nodes, axis=1)).any(axis=1)
-    if wrong.any():
-        corners = nodes[wrong, : CORNERS[block.kind]]
-        labels = body.facet_labels(corners, block.numbers[real][wrong])
-        problem = f"named facets have other mid-side nodes than their cells ({len(corners)}): {labels}"
-        yield Finding(problem=problem, allowed="facets and cells with the same nodes")
-
-
-def _named_twice(body: Body, corners: IntArray, held: BoolArray) -> Iterator[Finding]:
-    wrong = held.sum(axis=0) > 1
-    if wrong.any():
-        both = held[:, np.flatnonzero(wrong)[0]]
-        names = " and ".join(toml_text(KNOWN_NAMES[place]) for place in np.flatnonzero(both))
-        problem = f"facets have two names, {names} ({wrong.sum()}): {body.facet_labels(corners[wrong])}"
-        yield Finding(problem=problem, allowed="one name for each facet")
+    nodes = named.nodes[real]
+    if cell.shape[1] == nodes.shape[1]:
+        wrong = (np.sort(cell, axis=1) != np.sort(nodes, axis=1)).any(axis=1)
+        what = "named facets have other mid-side nodes than their cells"
+        yield from _about(body, what, nodes[wrong], "facets and cells with the same nodes")

@@ -13,7 +13,7 @@ from typing import Final
 
 import gmsh
 
-from ringbalance.scene.chamber_file.soundness import KNOWN_NAMES
+from ringbalance.scene.chamber_file.record import KNOWN_NAMES
 
 if sys.platform != "win32":
     import resource

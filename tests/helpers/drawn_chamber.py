@@ -11,15 +11,30 @@ import numpy as np
 from block_discs import sector_chamber
 
 from ringbalance.scene import AnyScene, bundled_scene, load_scene
-from ringbalance.scene.chamber_file.elements import (
-    FACET_KINDS,
-    GMSH_KINDS,
-    GMSH_ORDER,
-    dimension,
-)
+from ringbalance.scene.chamber_file.elements import FACET_KINDS, dimension
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 
-GMSH_NUMBERS = {name: number for number, name in GMSH_KINDS.items()}
+GMSH_NUMBERS = {
+    "line": 1,
+    "triangle": 2,
+    "quad": 3,
+    "tetra": 4,
+    "hexahedron": 5,
+    "wedge": 6,
+    "triangle6": 9,
+    "quad9": 10,
+    "tetra10": 11,
+    "hexahedron27": 12,
+    "quad8": 16,
+    "hexahedron20": 17,
+}
+_SECOND = (0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)
+GMSH_ORDER = {
+    "tetra10": (0, 1, 2, 3, 4, 5, 6, 7, 9, 8),
+    "hexahedron20": _SECOND,
+    "hexahedron27": (*_SECOND, 22, 23, 21, 24, 20, 25, 26),
+}
+"""Places of the nodes of a Gmsh element in the order of VTK; other kinds have the same order."""
 DIVISIONS = (2, 3, 2)
 """Cells in the directions of radius, angle and shaft."""
 CHAMBER, NAMES = 7, ("inner_wall", "outer_wall", "plate_right", "plate_left", "end_back", "end_front")

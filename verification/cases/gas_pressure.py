@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
@@ -48,7 +47,7 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
 
     def priming(radius: float) -> float:
         """Gas pressure that lifts an almost empty chamber's liquid over the crest, the other side vented."""
-        return hydrostatic_pressure(density=DENSITY, angular_velocity=omega, inner=radius, outer=outer)
+        return DENSITY * omega**2 * (outer**2 - radius**2) / 2
 
     stall = paper.stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=omega)
     velocity_high = paper.velocity_from_pressures(
@@ -175,7 +174,7 @@ def _priming(scene: Scene, density: float) -> float:
     if crest is None:
         return 0.0
     level = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))
-    return max(hydrostatic_pressure(density=density, angular_velocity=omega, inner=crest, outer=level), 0.0)
+    return max(density * omega**2 * (level**2 - crest**2) / 2, 0.0)
 
 
 def _over_gas_pressure(scene: Scene, laws: Sequence[FlowLaw]) -> Series:

@@ -154,15 +154,15 @@ def _gravity_table(scene: Scene) -> Table:
         for speed in speeds
     ]
     plain = float(wall_pressure_of(scene, middle)) * np.square(_SPEEDS)
-    mean = np.array([ring.wall_pressure.value[0] for ring in rings])
+    mean, closed = np.array([(ring.wall_pressure.value[0], ring.solved[0]) for ring in rings]).T
     ripple = np.array([ring.ripple["wall_pressure"][0] for ring in rings])
     return Table(
         name="gravity across the shaft: change of the mean wall pressure, and its ripple over a turn",
         columns={
             "speed": speeds,
-            "change by gravity": (mean / plain - 1).tolist(),
+            "change by gravity": np.where(closed, mean / plain - 1, 0.0).tolist(),
             "ripple": (ripple / plain).tolist(),
-            "ring": ["closed" if bool(ring.closed[0]) else "no closed ring" for ring in rings],
+            "ring": ["closed" if each else "no closed ring" for each in closed],
         },
         units={"speed": "rad/s", "change by gravity": "1", "ripple": "1"},
     )

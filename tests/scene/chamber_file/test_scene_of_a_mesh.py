@@ -12,7 +12,7 @@ import pytest
 from drawn_chamber import drawn, loaded, msh_2, msh_4, scene_text
 
 from ringbalance.scene import Scene, SceneError, bundled_scene, load_scene, scene_table
-from ringbalance.scene.chamber_file.soundness import MEANINGS
+from ringbalance.scene.chamber_file.record import MEANINGS
 from ringbalance.scene.uncertain import with_value
 
 

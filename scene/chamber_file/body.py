@@ -1,0 +1,184 @@
+"""The one body of cells, with named facets, that a mesh file holds; entities are named by their places."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.chamber_file.elements import CELL_KINDS, CORNERS, FACET_KINDS, MOST_NODES, dimension
+from ringbalance.scene.chamber_file.record import CellKind
+from ringbalance.scene.kinds import Finding
+
+_KINDS: Final = f"cells of one kind: {', '.join(CELL_KINDS)}"
+_MOST_SHOWN: Final = 4
+"""Places that one message lists; more are counted."""
+_FARTHEST: Final = 1e9
+
+
+class MeshFileError(Exception):
+    """A mesh that cannot be used. Args: `findings`: what is wrong, at least one."""
+
+    def __init__(self, findings: Iterable[Finding]) -> None:
+        self.findings = tuple(findings)
+        super().__init__("; ".join(each.problem for each in self.findings))
+
+    @classmethod
+    def of(cls, problem: str, allowed: str = "") -> MeshFileError:
+        """The error of a file in which nothing further can be looked at."""
+        return cls([Finding(problem=problem, allowed=allowed)])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mark:
+    """A name, and the elements of one block that have it."""
+
+    name: str
+    block: int
+    where: BoolArray
+    """Shape (elements of the block,)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contents:
+    """What a mesh file holds; kinds of elements and orders of nodes are meshio's."""
+
+    points: FloatArray
+    """In the file's unit, shape (nodes, 3)."""
+    blocks: tuple[tuple[str, IntArray], ...]
+    """Kind of some elements, and places of their nodes in `points`, shape (elements, nodes of one)."""
+    marks: tuple[Mark, ...]
+    other_names: tuple[str, ...] = ()
+    """Names that perhaps no element has, for messages."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedFacets:
+    """Facets of one kind that have a name."""
+
+    name: str
+    kind: str
+    nodes: IntArray
+    """Places in the body's points, shape (facets, nodes of a facet)."""
+
+    @property
+    def corners(self) -> IntArray:
+        """Their first nodes."""
+        return self.nodes[:, : CORNERS[self.kind]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """The cells of a file, in its axes and in metres."""
+
+    kind: CellKind
+    points: FloatArray
+    cells: IntArray
+    """Places of nodes in `points`, shape (cells, nodes of a cell)."""
+    cell_names: tuple[tuple[str, BoolArray], ...]
+    """Names that cells have, and which cells."""
+    named: tuple[NamedFacets, ...]
+    lesser: tuple[str, ...]
+    """Names of lines and points."""
+    other_names: tuple[str, ...]
+    """Names that perhaps nothing has."""
+    drawing: IntArray
+    """Nodes of points and lines of the drawing, such as centres of arcs."""
+
+    @property
+    def corners(self) -> IntArray:
+        """Places of the corners of the cells."""
+        return self.cells[:, : CORNERS[self.kind]]
+
+    def at(self, nodes: IntArray) -> str:
+        """Where some nodes lie, or the middles of entities that are given as rows of nodes, for a message."""
+        places = self.points[nodes[:_MOST_SHOWN]]
+        middles = places.mean(axis=1) if places.ndim == 3 else places
+        few = ", ".join(f"({x:.4g}, {y:.4g}, {z:.4g}) mm" for x, y, z in (1e3 * middles).tolist())
+        more = len(nodes) - _MOST_SHOWN
+        return f"at {few} and {more} more" if more > 0 else f"at {few}"
+
+    @classmethod
+    def of(cls, contents: Contents, *, scale: float) -> Body:
+        """One body of what a file holds.
+
+        Args: `scale`: metres in the file's unit.
+        Raises: MeshFileError: its cells or nodes are such that nothing further can be looked at.
+        """
+        blocks, marks = contents.blocks, contents.marks
+        solid = [number for number, (kind, _) in enumerate(blocks) if dimension(kind) == 3]
+        wrong = [*_wrong_kinds(contents, solid), *_wrong_nodes(contents)]
+        if wrong:
+            raise MeshFileError(wrong)
+        lower = [nodes.ravel() for kind, nodes in blocks if dimension(kind) < 2]
+        return cls(
+            kind=next(kind for kind in CELL_KINDS if kind == blocks[solid[0]][0]),
+            points=contents.points * scale,
+            cells=np.concatenate([blocks[number][1] for number in solid]),
+            cell_names=tuple(_cell_names(contents, solid)),
+            named=tuple(_named(contents)),
+            lesser=tuple(
+                dict.fromkeys(m.name for m in marks if m.where.any() and dimension(blocks[m.block][0]) < 2)
+            ),
+            other_names=contents.other_names,
+            drawing=np.concatenate([np.empty(0, dtype=np.int64), *lower]),
+        )
+
+
+def _wrong_kinds(contents: Contents, solid: list[int]) -> Iterator[Finding]:
+    counts: dict[str, int] = {}
+    for kind, nodes in (contents.blocks[number] for number in solid):
+        if len(nodes):
+            counts[kind] = counts.get(kind, 0) + len(nodes)
+    total = sum(counts.values())
+    if max(total, len(contents.points)) > MOST_NODES:
+        problem = f"it has {len(contents.points)} nodes and {total} cells, more than can be checked"
+        yield Finding(problem=problem, allowed=f"up to {MOST_NODES} of each; a larger mesh size")
+    if not total:
+        there = "only lines and surface elements" if contents.blocks else "no elements"
+        yield Finding(problem=f"it has no cells, {there}: not a mesh of a volume", allowed=_KINDS)
+    known = (*CELL_KINDS, *FACET_KINDS.values())
+    unknown = dict.fromkeys(kind for kind, _ in contents.blocks if dimension(kind) > 1 and kind not in known)
+    for kind in unknown:
+        yield Finding(problem=f"it has elements of the kind {kind}", allowed=f"{_KINDS}, and their facets")
+    if len(counts) > 1:
+        mixture = "; ".join(f"{count} {kind}" for kind, count in counts.items())
+        yield Finding(problem=f"it mixes kinds of cells: {mixture}", allowed=_KINDS)
+
+
+def _wrong_nodes(contents: Contents) -> Iterator[Finding]:
+    points = contents.points
+    wrong = ~np.isfinite(points).all(axis=1)
+    if wrong.any():
+        yield Finding(problem=f"coordinates are no finite numbers ({wrong.sum()} nodes)", allowed="")
+    elif points.size and np.abs(points).max() > _FARTHEST:
+        yield Finding(problem=f"a coordinate is above {_FARTHEST:g}", allowed="")
+    for kind, nodes in contents.blocks:
+        lost = ((nodes < 0) | (nodes >= len(points))).any(axis=1)
+        if lost.any():
+            problem = f"{kind} elements have nodes that the file does not give ({lost.sum()})"
+            yield Finding(problem=problem, allowed="")
+
+
+def _cell_names(contents: Contents, solid: list[int]) -> Iterator[tuple[str, BoolArray]]:
+    marks = [mark for mark in contents.marks if mark.block in solid and mark.where.any()]
+    for name in dict.fromkeys(mark.name for mark in marks):
+        parts = {number: np.zeros(len(contents.blocks[number][1]), dtype=np.bool_) for number in solid}
+        for mark in marks:
+            if mark.name == name:
+                parts[mark.block] = parts[mark.block] | mark.where
+        yield name, np.concatenate(list(parts.values()))
+
+
+def _named(contents: Contents) -> Iterator[NamedFacets]:
+    """Facets by name and kind; a file has a block for each face of the drawing."""
+    parts: dict[tuple[str, str], list[IntArray]] = {}
+    for mark in contents.marks:
+        kind, nodes = contents.blocks[mark.block]
+        if dimension(kind) == 2 and mark.where.any():
+            parts.setdefault((mark.name, kind), []).append(nodes[mark.where])
+    for (name, kind), nodes_of in parts.items():
+        yield NamedFacets(name=name, kind=kind, nodes=np.concatenate(nodes_of))

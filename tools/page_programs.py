@@ -6,7 +6,8 @@ python tools/page_programs.py --write PAGE ...    writes what it prints
 A block of `python` or `sh` is run in an empty folder with the bundled `scenes`. A block after a line that
 ends in a file's name in code type and a colon becomes that file. A block of `text` straight after a block
 that was run is what that one printed; in it a line `...` stands for lines left out. A block after
-`<!-- not run: REASON -->` is not run.
+`<!-- not run: REASON -->` is not run. A picture (SVG) that a page shows is the one that its blocks write
+under that name.
 """
 
 from __future__ import annotations
@@ -31,7 +32,10 @@ RUN: Final = frozenset({"python", "sh"})
 GAP: Final = "..."
 _FILE: Final = re.compile(r"`([\w./-]+)`:$")
 _NOT_RUN: Final = re.compile(r"<!-- not run: .+ -->$")
-_NUMBER: Final = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_PICTURE: Final = re.compile(r"!\[[^\]]*\]\(([\w./-]+\.svg)\)")
+_NUMBER: Final = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d{1,2}(?!\d))?")
+_NAME: Final = re.compile(r"""id="[^"]*"|href="#[^"]*"|url\(#[^)]*\)""")
+"""Within a picture: made from the shapes that it names."""
 
 
 class PageError(ValueError):
@@ -141,24 +145,43 @@ def fresh_page(page: str, folder: Path) -> str:
     return "".join(pieces) + page[place:]
 
 
-def fresh(path: Path) -> str:
-    """A page run in a folder of its own. Raises: PageError: as of `fresh_page`."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name in ("scenes", "benchmarks"):
-            (Path(folder) / name).symlink_to(ROOT / name, target_is_directory=True)
-        return fresh_page(path.read_text(encoding="utf-8"), Path(folder))
+def fresh(path: Path) -> dict[Path, str]:
+    """A page run in a folder of its own, and the pictures that its blocks wrote.
+
+    Raises: PageError: as of `fresh_page`.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for linked in ("scenes", "benchmarks"):
+            (folder / linked).symlink_to(ROOT / linked, target_is_directory=True)
+        page = fresh_page(path.read_text(encoding="utf-8"), folder)
+        written = {each.name: each for each in folder.rglob("*.svg")}
+        pictures = [path.parent / place for place in _PICTURE.findall(page)]
+        return {path: page} | {
+            each: fresh_picture(each, written[each.name].read_text(encoding="utf-8"))
+            for each in pictures
+            if each.name in written
+        }
+
+
+def fresh_picture(path: Path, drawn: str) -> str:
+    """A picture as it was drawn, or as it is kept where no more than last digits differ."""
+    kept = path.read_text(encoding="utf-8") if path.exists() else ""
+    first, second = (_NAME.sub("", each) for each in (kept, drawn))
+    return kept if _skeleton(first) == _skeleton(second) and numbers_agree(first, second) else drawn
 
 
 def main(arguments: list[str]) -> int:
     """Run pages, and write or name what changed."""
     stale = 0
     for name in (each for each in arguments if each != "--write"):
-        path = Path(name)
-        text = fresh(path)
-        if text != path.read_text(encoding="utf-8"):
-            print(f"{name} prints something else than it shows")
+        for path, text in fresh(Path(name)).items():
+            if path.exists() and path.read_text(encoding="utf-8") == text:
+                continue
+            print(f"{name} prints or draws something else than {path.name} shows")
             stale += 1
             if "--write" in arguments:
+                path.parent.mkdir(exist_ok=True)
                 write_whole(path, text.encode())
     return int(bool(stale) and "--write" not in arguments)
 

@@ -229,7 +229,7 @@ def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, s
             yield outcome, text_of(code, law=" or ".join(filter(None, (", ".join(others[:-1]), others[-1]))))
 
 
-LEAST_SHARE: Final = 0.5
+_LEAST_SHARE: Final = 0.5
 _HIDDEN: Final = 4.0
 """Variance of the noise over that of the effect which the scene predicts, from which none is to be seen."""
 
@@ -269,7 +269,7 @@ def _shares_explained(best: Optimum) -> Iterator[_Explained]:
             share = 1 - noise / measured
             seen = block.estimated and noise < _HIDDEN * effect
             yield _Explained(
-                file=block.observations.file, share=share, fails=bool(seen and share < LEAST_SHARE)
+                file=block.observations.file, share=share, fails=bool(seen and share < _LEAST_SHARE)
             )
 
 

@@ -90,7 +90,7 @@ def fitted_scene(
     fitted: Sequence[FittedParameter],
     files: Sequence[MeasuredFile],
     findings: Sequence[MeasuredFinding] = (),
-    joint: Sequence[JointEntry] = (),
+    joint: Sequence[_JointEntry] = (),
     found: AnyScene | None = None,
 ) -> AnyScene:
     """A scene with fitted values, their uncertainties and origins, checked as a file is.
@@ -118,7 +118,7 @@ def fitted_scene(
             pulled = _fewer(pulled, error)
 
 
-def _fewer(pulled: Sequence[JointEntry], error: SceneError) -> list[JointEntry]:
+def _fewer(pulled: Sequence[_JointEntry], error: SceneError) -> list[_JointEntry]:
     """Without those that the error names, else those of the disc, else all held ones. Raises: SceneError."""
     everything = {each.key for each in pulled}
     for suspected in ({fault.key for fault in error.faults}, set(SHAPE), everything):
@@ -229,7 +229,7 @@ def _unit(here: object, path: str, dimension: str | None) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointEntry:
+class _JointEntry:
     """One quantity that was fitted together with others."""
 
     name: str
@@ -257,7 +257,7 @@ class JointEntry:
         return self.path.split(".")[-1].split("[")[0]
 
 
-def _joint_entries(result: FitResult) -> list[JointEntry]:
+def _joint_entries(result: FitResult) -> list[_JointEntry]:
     """All that was fitted together and that a scene file has; both parts of every error of k.
 
     A part that the data do not depend on is as uncertain as it was, and independent.
@@ -277,7 +277,7 @@ def _joint_entries(result: FitResult) -> list[JointEntry]:
     np.fill_diagonal(whole, 1.0)
     everything = [*((names[i], float(size[i])) for i in kept), *((name, 1.0) for name in lacking)]
     return [
-        JointEntry(
+        _JointEntry(
             name=name,
             held=name in result.held or name in lacking,
             standard_deviation=sd,
@@ -288,7 +288,7 @@ def _joint_entries(result: FitResult) -> list[JointEntry]:
 
 
 def _put_joint(
-    changes: _Changes, joint: Sequence[JointEntry], pulled: Sequence[JointEntry], found: AnyScene
+    changes: _Changes, joint: Sequence[_JointEntry], pulled: Sequence[_JointEntry], found: AnyScene
 ) -> None:
     """Values of held inputs, corrections and the joint distribution.
 

@@ -1,7 +1,7 @@
 """ringbalance: are the closed formulas of a liquid-ring balancer to be trusted, for your disc?
 
 Begin with `load_scene`, `calibrate` and `simulate`; then `tune`, `fit`, `compare`, `sweep`, `find_design`,
-`trade`, `extremes`, `plot` and `write_report`. `help(ringbalance.calibrate)` has what each takes and gives, and
+`trade`, `extremes`, `plot` and `write_report`. `help(ringbalance.calibrate)` has what it takes and gives, and
 an example. The names are loaded when they are first used, so that `import ringbalance` costs nothing.
 docs/python.md shows them at work.
 """

@@ -64,7 +64,7 @@ def test_a_sensor_stands_in_an_example() -> None:
 def test_the_page_of_names_has_their_docstrings() -> None:
     page = generated_docs.text_of("docs/api.md")
     assert generated_docs.fresh(page, generated_docs.PARTS["docs/api.md"]()) == page
-    assert all(f"### `rb.{name}`" in page for name in rb.__all__)
+    assert all(f"## `rb.{name}`" in page for name in rb.__all__)
 
 
 def test_help_leads_to_every_name() -> None:

@@ -22,7 +22,7 @@ def name_reference() -> str:
 
 def _entry(name: str, value: Any) -> str:
     text, _, example = _EXAMPLE.sub("\0", _docstring(value)).partition("\0")
-    parts = [f"### `rb.{name}`", _signature(name, value), _prose(text), _attributes(value)]
+    parts = [f"## `rb.{name}`", _signature(name, value), _prose(text), _attributes(value)]
     if example:
         parts.append(f"```pycon\n{inspect.cleandoc(example)}\n```")
     return "\n\n".join(part for part in parts if part)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pairs import Motion, PairState, Passage, pass_time
 from scipy.integrate import quad
 
 from ringbalance.physics.gas import GasLine, flow_shape
@@ -17,7 +18,6 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection import column
 from ringbalance.reduced_model.injection.column import line_rates
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage, pass_time
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw

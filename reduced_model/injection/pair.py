@@ -149,11 +149,12 @@ class Injections:
         """When lifted liquid reaches the end of the crest under a valve that stays open, s."""
         if self.dynamics.lift is None:
             return 0.0
-        early, late = 0.0, _TAIL
+        plant, early, late = self.dynamics.kept_plant(total=self.total)[0], 0.0, _TAIL
+        crest_end = plant["return_crest_end" if self.chamber else "crest_end"]
         while late - early > _TIME_ERROR:
             middle = (early + late) / 2
             end, place, _ = self._passed(2 * _TAIL, middle)
-            if end["side"] != 0 and place >= self.dynamics.column.crest_ends[self.chamber]:
+            if end["side"] != 0 and place >= crest_end:
                 late = middle
             else:
                 early = middle

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import quad
 
-from ringbalance.reduced_model.injection.dynamics import EVENTS, Column, Dynamics, Event
+from ringbalance.reduced_model.injection.dynamics import EVENTS, Dynamics, Event
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.pair import at_rest, fills_at
 from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw
@@ -132,7 +132,8 @@ class _Operation:
     def marched(self, tube: Tube, time: FloatArray) -> tuple[FloatArray, float | None]:
         """Fills by the march that every run takes, the law alone at work, and when the flow ended, s."""
         dynamics = Dynamics(
-            column=Column.of(law=self.law, tube=tube),
+            law=self.law,
+            tube=tube,
             inertia=False,
             line=None,
             valve_lag=0.0,

@@ -38,7 +38,7 @@ from ringbalance.scene.arrays import FloatArray
 def at_rest(plant: npt.NDArray[np.void], *, fill: float) -> npt.NDArray[np.void]:
     """Record of type `MOTION`, shape (1,), of a pair with vented chambers and a tube that is not primed.
 
-    Args: `plant`: of type `PLANT`, shape (1,). `fill`: x of chamber 0.
+    Args: `fill`: x of chamber 0.
     """
     known, state = plant[0], np.zeros(1, dtype=MOTION)
     ambient, total = known["ambient_pressure"], known["total"]

@@ -23,7 +23,7 @@ from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.results import Estimate
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Convergence, Found, from_half_width
+from ringbalance.verification.evidence import Convergence, Found
 from ringbalance.verification.papers import RING_RADIUS, with_plate
 from ringbalance.verification.reference.chambers import exact_moment
 
@@ -68,9 +68,9 @@ def found_of(quantities: RingQuantities, name: str, index: int) -> Found:
     """
     estimate: Estimate = getattr(quantities, name)
     converges = quantities.convergence[name][index].verdict in (GridVerdict.MONOTONE, GridVerdict.ROUND_OFF)
-    return Found(
-        value=float(estimate.value[index]),
-        numerical=from_half_width(float(estimate.uncertainty[index])),
+    return Found.within(
+        estimate.value[index],
+        estimate.uncertainty[index],
         conclusive=quantities.status.ok and converges,
     )
 

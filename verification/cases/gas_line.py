@@ -37,7 +37,6 @@ from ringbalance.verification.evidence import (
     Series,
     as_found,
     figure,
-    from_half_width,
 )
 
 _GRIDS: Final = ((30, 45, 4), (60, 90, 8))
@@ -94,9 +93,8 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
     return Evidence(
         found={
-            f"margin_{state}": Found(
-                value=safe[state] - disc.max_fill_ratio,
-                numerical=from_half_width(abs(safe[state] - rough[state])),
+            f"margin_{state}": Found.within(
+                safe[state] - disc.max_fill_ratio, abs(safe[state] - rough[state])
             )
             for state in _JUDGED
         },
@@ -328,9 +326,7 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     hole = gas_hole(with_tube, level).numbers
     return Evidence(
         found={
-            name: Found(
-                value=float(value), numerical=from_half_width((float(share) + 1e-8) * abs(float(value)))
-            ).against(exact[name])
+            name: Found.within(value, (share + 1e-8) * abs(value)).against(exact[name])
             for name, (value, share) in values.items()
         },
         numbers={

@@ -10,6 +10,7 @@ import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
+from typing import Any, Final
 from unittest.mock import patch
 
 import numpy as np
@@ -26,6 +27,8 @@ from ringbalance.scene.models import Disc, Scene
 from ringbalance.verification.evidence import Convergence, Found
 from ringbalance.verification.papers import RING_RADIUS, with_plate
 from ringbalance.verification.reference.chambers import exact_moment
+
+_COMPLEX_STEP: Final = 1e-30
 
 
 def refined_cells(disc: Disc, levels: Sequence[int], *, dimension: int) -> list[tuple[int, ...]]:
@@ -47,6 +50,16 @@ def field_error(solution: PressureSolution, exact: Callable[[FloatArray], FloatA
 def relative_rms(found: FloatArray, true: FloatArray, weights: FloatArray) -> float:
     """Root mean square of an error over that of the truth, weighted."""
     return float(np.sqrt(np.sum(weights * (found - true) ** 2) / np.sum(weights * true**2)))
+
+
+def slopes(field: Callable[[Any], FloatArray], places: FloatArray) -> FloatArray:
+    """Derivatives of an analytic field along each coordinate, shape (..., dimension, *places.shape[1:]).
+
+    By a step into the complex plane, exact to rounding. Args: `places`: shape (dimension, ...).
+    """
+    steps = 1j * _COMPLEX_STEP * np.eye(len(places)).reshape(2 * places.shape[:1] + (1,) * (places.ndim - 1))
+    along = [np.asarray(field(places + step)).imag / _COMPLEX_STEP for step in steps]
+    return np.stack(along, axis=along[0].ndim - places.ndim + 1)
 
 
 @lru_cache(maxsize=64)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import BuiltIn
@@ -31,7 +30,7 @@ from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import noise_floor
 from ringbalance.reduced_model.injection.dynamics import MOTION, WORKSPACE
 from ringbalance.reduced_model.law.flow_law import BalancerModel
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Records
 from ringbalance.scene.models import Scene
 
 CHUNK: Final = 128
@@ -42,7 +41,6 @@ ALLOWED: Final = 0.01
 """Fraction of the samples in that time that may be above the limit."""
 IDLE_OPERATIONS: Final = 3
 """Commands in a row, beyond one for each chamber, whose longest injection may move nothing."""
-Records = npt.NDArray[np.void]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import ClassVar, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
 from ringbalance.controller.loop_records import (
-    LOOP,
     NO_PHASE,
-    RUN,
     TARGET_VECTOR,
     TOO_SHORT,
     TRIAL,
     UNUSABLE,
     USABLE,
-    Record,
 )
+from ringbalance.controller.rotor import chamber_letters
 from ringbalance.reduced_model.injection.dynamics import MOTION
+from ringbalance.scene.arrays import Record, Records
+from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.compiled import in_place
 
 NO_SAMPLE: Final = "no usable sample"
@@ -32,74 +31,21 @@ BELOW_MINIMUM: Final = "the valve-open time is below the minimum"
 REASONS: Final = {0: "", UNUSABLE: NO_SAMPLE, TOO_SHORT: BELOW_MINIMUM}
 
 
-@dataclass(frozen=True, eq=False)
-class Memory:
-    """State of an algorithm of the program between two samples; arrays of one element, never changed."""
-
-    run: npt.NDArray[np.void]
-    """What it remembers, type `RUN`."""
-    liquid: npt.NDArray[np.void]
-    """Of the law-based algorithm: the pairs as it believes them to be, type `MOTION`; empty for others."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Memory) and all(
-            mine.tobytes() == yours.tobytes()
-            for mine, yours in ((self.run, other.run), (self.liquid, other.liquid))
-        )
-
-    __hash__ = None  # type: ignore[assignment]
-
-
-class BuiltIn:
-    """An algorithm of the program: frozen settings, with its step compiled.
-
-    `simulate` runs that step within the compiled loop; `start` and `step` are the same for one sample, so
-    that an algorithm of a user's own can build on it.
-    """
-
-    needs: ClassVar[int] = USABLE
-    """What it reads of a sample."""
+class BuiltIn(ABC):
+    """An algorithm of the program: frozen settings, whose step is compiled within the loop."""
 
     @property
     def rises_tolerated(self) -> int:
-        """As `Controller` has it."""
-        raise NotImplementedError
+        """As `Controller` has it: a rise, and another after what was assumed has been corrected."""
+        return 2
 
+    @abstractmethod
     def fill(self, loop: Record, run: Record) -> None:
         """Write the settings into an element of type `LOOP`, and the first memory into one of type `RUN`."""
-        raise NotImplementedError
 
-    def liquid(self) -> npt.NDArray[np.void]:
+    def liquid(self) -> Records:
         """The pairs as the algorithm believes them to be at the start; empty where it has no belief."""
         return np.zeros(0, dtype=MOTION)
-
-    def react(self, loop: Record, memory: Memory) -> None:
-        """Call the compiled step on a memory that shows a usable sample."""
-        raise NotImplementedError
-
-    @cached_property
-    def _filled(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-        """Settings and first memory, shape (1,) each."""
-        loop, run = np.zeros(1, dtype=LOOP), np.zeros(1, dtype=RUN)
-        self.fill(loop[0], run[0])
-        return loop, run
-
-    def start(self) -> Memory:
-        """The state before the first sample."""
-        return Memory(self._filled[1], self.liquid())
-
-    def step(self, state: Memory, measurement: Measurement | None) -> tuple[Memory, Command]:
-        """Next state and command after one sample (None: dropped); a pure function."""
-        seen = state.run.copy()
-        show(seen[0], measurement)
-        if measurement is None or seen["usable"][0] < self.needs:
-            return state, Command(reason=NO_SAMPLE)
-        seen["time"], seen["asked"], seen["resting"], seen["reason"] = measurement.time, 0.0, 0, 0
-        seen["at_residual"][0, : len(measurement.at_residual)] = measurement.at_residual
-        after = Memory(seen, state.liquid.copy())
-        self.react(self._filled[0][0], after)
-        seen["reason"] = 0 if seen["resting"][0] or np.any(seen["asked"]) else TOO_SHORT
-        return after, command_of(seen[0], int(self._filled[0]["chambers"][0]))
 
 
 @in_place
@@ -177,10 +123,21 @@ class TargetVector(BuiltIn):
     on_reversal: OnReversal = "reset"
     """What becomes of the integral when the residual turns round."""
 
-    @property
-    def rises_tolerated(self) -> int:
-        """Two: this algorithm lowers the amplitude with every operation unless its beliefs are wrong."""
-        return 2
+    @classmethod
+    def of(cls, scene: Scene) -> TargetVector:
+        """With a scene's settings."""
+        settings, chambers = scene.controller, scene.disc.chambers
+        return cls(
+            chambers=chambers,
+            lag_angle=settings.assumed_lag_angle,
+            limit=settings.limit,
+            proportional=settings.proportional,
+            integral_time=settings.integral_time,
+            derivative_time=settings.derivative_time,
+            minimum_gas_time=settings.minimum_gas_time,
+            maximum_gas_time=settings.maximum_gas_time,
+            offsets=settings.offsets(chambers),
+        )
 
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
@@ -191,10 +148,6 @@ class TargetVector(BuiltIn):
         loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
         loop["offset"][: len(self.offsets)] = self.offsets
         run["proportional"], run["before_time"] = self.proportional, math.inf
-
-    def react(self, loop: Record, memory: Memory) -> None:
-        """As `BuiltIn.react`."""
-        target_vector_step(loop, memory.run[0])
 
 
 @in_place
@@ -303,7 +256,6 @@ class Trial(BuiltIn):
     Source: section 4.1 of the liquid-ring paper.
     """
 
-    needs: ClassVar[int] = NO_PHASE
     chambers: int
     """n, even."""
     sequence: tuple[int, ...]
@@ -328,6 +280,22 @@ class Trial(BuiltIn):
         """One round through the sequence: a rise is how this algorithm learns."""
         return len(self.sequence)
 
+    @classmethod
+    def of(cls, scene: Scene) -> Trial:
+        """With a scene's settings."""
+        settings, letters = scene.controller, chamber_letters(scene.disc.chambers)
+        return cls(
+            chambers=scene.disc.chambers,
+            sequence=tuple(letters.index(letter) for letter in settings.sequence),
+            limit=settings.limit,
+            first_trial=settings.first_trial,
+            long_step=settings.long_step,
+            short_step=settings.short_step,
+            fine_below=settings.fine_below,
+            minimum_gas_time=settings.minimum_gas_time,
+            maximum_gas_time=settings.maximum_gas_time,
+        )
+
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
         run["position"] = 0
@@ -336,10 +304,6 @@ class Trial(BuiltIn):
         for name in ("first_trial", "long_step", "short_step", "fine_below"):
             loop[name] = getattr(self, name)
         loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
-
-    def react(self, loop: Record, memory: Memory) -> None:
-        """As `BuiltIn.react`."""
-        trial_step(loop, memory.run[0])
 
 
 @in_place

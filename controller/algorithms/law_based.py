@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.algorithms.built_in import BuiltIn, Memory, open_valve
+from ringbalance.controller.algorithms.built_in import BuiltIn, open_valve
 from ringbalance.controller.liquid_ring.plant import LiquidRing
-from ringbalance.controller.loop_records import LAW_BASED, MomentTable, Record, pair_moment
+from ringbalance.controller.loop_records import LAW_BASED, MomentTable, pair_moment
 from ringbalance.controller.rotor import chamber_directions
+from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.injection.column import steady
-from ringbalance.reduced_model.injection.dynamics import EVENTS, WORKSPACE, Event, X
+from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR, Event, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance
 from ringbalance.reduced_model.injection.pair import Motion, packed
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
+from ringbalance.scene.arrays import ComplexArray, FloatArray, Record
+from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.compiled import in_place
 
 PRIOR_STANDARD_DEVIATION: Final = 0.5
@@ -76,10 +80,32 @@ class LawBased(BuiltIn):
     offsets: tuple[float, ...] = ()
     """Added to a valve's time, one for each chamber, s: what the law does not know; empty: none."""
 
-    @property
-    def rises_tolerated(self) -> int:
-        """Two: the first response corrects a belief that was wrong."""
-        return 2
+    @classmethod
+    def of(cls, scene: Scene, model: BalancerModel, *, relative_error: float = RELATIVE_ERROR) -> LawBased:
+        """With a scene's settings.
+
+        Args: `model`: as the algorithm assumes it, which need not be the one that is controlled.
+            `relative_error`: allowed to a step of the liquid that it follows.
+        """
+        settings, chambers = scene.controller, scene.disc.chambers
+        residual = residual_fill_ratio(scene, law=model.flow)
+        dynamics = dynamics_of(scene=scene, model=model, modelled=(), residual_fill=residual)
+        return cls(
+            ring=LiquidRing(
+                model=model,
+                chambers=chambers,
+                total=2 * scene.disc.initial_fill,
+                dynamics=replace(dynamics, relative_error=relative_error),
+            ),
+            influence=settings.assumed_influence,
+            limit=settings.limit,
+            amplitude_noise=scene.sensor.amplitude_noise,
+            phase_noise=scene.sensor.phase_noise,
+            probe=settings.period,
+            minimum_gas_time=settings.minimum_gas_time,
+            maximum_gas_time=settings.maximum_gas_time,
+            offsets=settings.offsets(chambers),
+        )
 
     @property
     def plant(self) -> npt.NDArray[np.void]:
@@ -125,11 +151,6 @@ class LawBased(BuiltIn):
     def _liquid(self) -> npt.NDArray[np.void]:
         level = packed(self.plant, fill=self.ring.total / 2, primed=False, motion=Motion())
         return np.repeat(level, self.ring.chambers // 2 + 1)
-
-    def react(self, loop: Record, memory: Memory) -> None:
-        """As `BuiltIn.react`."""
-        room = np.zeros(WORKSPACE)
-        law_based_step(loop, self.plant[0], memory.run[0], memory.liquid, np.zeros((2, 1)), room)
 
 
 @in_place

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.imbalance_filter import Record
+from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import in_place
 
 

@@ -17,17 +17,14 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Record, Records
 from ringbalance.scene.platform.compiled import compiled, in_place
 
-Record = Any
-"""One element of a structured array, which compiled code changes in place."""
-Records = npt.NDArray[np.void]
 Numbers = Sequence[float] | FloatArray
 
 _GAUSS_POINTS: FloatArray

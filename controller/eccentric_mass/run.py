@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ringbalance.controller.balancer import Progress
-from ringbalance.controller.eccentric_mass.imbalance_filter import Record, Records
 from ringbalance.controller.eccentric_mass.integration import check_substeps, plant_step, stretches
 from ringbalance.controller.eccentric_mass.memory import (
     HISTORY,
@@ -32,7 +31,7 @@ from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
-from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
+from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, Record, Records
 from ringbalance.scene.platform.compiled import compiled, in_place
 
 Seed = int | np.random.Generator | None

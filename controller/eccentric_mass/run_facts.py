@@ -10,7 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.imbalance_filter import Records
 from ringbalance.controller.eccentric_mass.memory import (
     BALANCED,
     CAUSE_NAMES,
@@ -32,7 +31,7 @@ from ringbalance.controller.eccentric_mass.resolution import rotor_covariance
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.supervisor import STALLED_SHARE
 from ringbalance.controller.eccentric_mass.targets import Targets, target_angles
-from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Records
 
 _NOTHING: Final = 1e-6
 """Share of the limit below which a vibration is round-off."""

@@ -22,7 +22,6 @@ from ringbalance.controller.eccentric_mass.drive_law import (
 from ringbalance.controller.eccentric_mass.friction_filter import friction_restart, friction_step
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
     MassInput,
-    Record,
     begin_filter,
     begin_whirl,
     correct,
@@ -43,6 +42,7 @@ from ringbalance.controller.eccentric_mass.memory import (
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.supervisor import arm_deviation, enter, is_constant, supervise
 from ringbalance.controller.eccentric_mass.targets import set_pair, wrapped
+from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import compiled, in_place
 
 _LARGEST_TURN: Final = 0.05

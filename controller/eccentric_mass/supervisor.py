@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import Final
 
 from ringbalance.controller.eccentric_mass.drive_law import DriveLaw, Motion, friction_needed
-from ringbalance.controller.eccentric_mass.imbalance_filter import Record
 from ringbalance.controller.eccentric_mass.memory import (
     BALANCED,
     CHECK,
@@ -55,6 +54,7 @@ from ringbalance.controller.eccentric_mass.targets import (
     target_angles,
     tuning_place,
 )
+from ringbalance.scene.arrays import Record
 from ringbalance.scene.platform.compiled import in_place
 
 _HOLDS_FOR_SURE: Final = 0.7

@@ -19,11 +19,10 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from ringbalance.controller.eccentric_mass.imbalance_filter import Record
 from ringbalance.controller.eccentric_mass.memory import Pair
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Record
 from ringbalance.scene.platform.compiled import in_place
 
 

@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.algorithms.built_in import TargetVector
+from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, split_change
 from ringbalance.controller.loop_records import RUN, MomentTable
@@ -62,7 +62,7 @@ class LoopFactor:
         return self.fixed and self.value is not None and self.value >= self.limit
 
 
-def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any]) -> LoopFactor:
+def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] | BuiltIn) -> LoopFactor:
     """The loop of a scene under a law and a controller.
 
     The law-based algorithm removes kappa/kappa' of a residual, kappa' its assumed influence coefficient, and

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 
-from ringbalance.controller.algorithms.algorithm import Command, Measurement
-from ringbalance.controller.algorithms.built_in import Memory, Trial
+from algorithm_steps import Memory, Stepped
 
-TRIAL = Trial(
-    chambers=4,
-    sequence=(0, 2, 1, 3),
-    limit=0.05e-6,
-    first_trial=0.05,
-    long_step=0.2,
-    short_step=0.01,
-    fine_below=0.8e-6,
-    minimum_gas_time=1e-3,
-    maximum_gas_time=5.0,
+from ringbalance.controller.algorithms.algorithm import Command, Measurement
+from ringbalance.controller.algorithms.built_in import Trial
+
+TRIAL = Stepped(
+    Trial(
+        chambers=4,
+        sequence=(0, 2, 1, 3),
+        limit=0.05e-6,
+        first_trial=0.05,
+        long_step=0.2,
+        short_step=0.01,
+        fine_below=0.8e-6,
+        minimum_gas_time=1e-3,
+        maximum_gas_time=5.0,
+    )
 )
 
 

@@ -12,7 +12,6 @@ from scipy.linalg import expm
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
     FilterSettings,
     MassInput,
-    Records,
     WhirlModel,
     correct,
     imbalance_deviation,
@@ -23,7 +22,7 @@ from ringbalance.controller.eccentric_mass.imbalance_filter import (
     predict,
     whirl_transition,
 )
-from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.arrays import FloatArray, Records
 
 MODEL = WhirlModel(5.36, 10.0, 1000.0)
 SPEED = 100 * math.pi / 30

@@ -11,7 +11,7 @@ import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Command, Controller, Measurement
 from ringbalance.controller.algorithms.built_in import BuiltIn, command_of, show
-from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.document import command_document, simulation_rows
 from ringbalance.controller.liquid_ring.loop_factor import loop_factor
 from ringbalance.controller.liquid_ring.plant import LiquidRing

@@ -14,8 +14,7 @@ from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_a
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import Along, searched
-from ringbalance.controller.judging.tuning import Tuning
-from ringbalance.controller.judging.tuning_rows import setting_text
+from ringbalance.controller.judging.tuning import Tuning, setting_text
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
 from ringbalance.results.proportion import Proportion

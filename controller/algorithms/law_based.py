@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.controller.algorithms.built_in import BuiltIn, open_valve
+from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector, Trial, open_valve
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_records import LAW_BASED, MomentTable, pair_moment
 from ringbalance.controller.rotor import chamber_directions
@@ -151,6 +151,14 @@ class LawBased(BuiltIn):
     def _liquid(self) -> npt.NDArray[np.void]:
         level = packed(self.plant, fill=self.ring.total / 2, primed=False, motion=Motion())
         return np.repeat(level, self.ring.chambers // 2 + 1)
+
+
+def controller_of(scene: Scene, model: BalancerModel, *, relative_error: float = RELATIVE_ERROR) -> BuiltIn:
+    """The control algorithm that a scene asks for. Args: as `LawBased.of`, for that alone."""
+    kind = scene.controller.kind
+    if kind == "law_based":
+        return LawBased.of(scene, model, relative_error=relative_error)
+    return TargetVector.of(scene) if kind == "target_vector" else Trial.of(scene)
 
 
 @in_place

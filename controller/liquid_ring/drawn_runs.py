@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.built_in import BuiltIn
-from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.balancer import FURTHER, Draws, Outcomes, RunResult, Settings
 from ringbalance.controller.liquid_ring.devices import Device, Spread, devices
 from ringbalance.controller.liquid_ring.plant import LiquidRing

@@ -23,8 +23,7 @@ import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector
-from ringbalance.controller.algorithms.by_name import controller_of
-from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, split_change
+from ringbalance.controller.algorithms.law_based import LawBased, controller_of, fill_for_moment, split_change
 from ringbalance.controller.loop_records import RUN, MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import run_models

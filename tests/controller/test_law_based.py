@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement
 from ringbalance.controller.algorithms.built_in import TargetVector
-from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.algorithms.law_based import (
     LawBased,
     _gas_time,
+    controller_of,
     fill_for_moment,
     learnt,
     split_change,

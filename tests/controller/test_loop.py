@@ -13,7 +13,7 @@ import pytest
 from algorithm_steps import Stepped
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
-from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.balancer import FURTHER
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate

@@ -28,9 +28,11 @@ from ringbalance.controller.eccentric_mass.plant import (
     turned,
 )
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
+from ringbalance.controller.eccentric_mass.run_rows import eccentric_document, eccentric_rows
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
+from ringbalance.results.result import Presentation
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, Record, Records
 from ringbalance.scene.platform.compiled import compiled, in_place
 
@@ -204,7 +206,8 @@ def simulate_eccentric(
     history, memory = _recorded(
         scene, seed, progress or (lambda _, __: None), settings or StrategySettings.of(scene)
     )
-    return EccentricRun(scene=scene, history=history, memory=memory[0])
+    presentation = Presentation(document=eccentric_document, rows=eccentric_rows)
+    return EccentricRun(scene=scene, history=history, memory=memory[0], presentation=presentation)
 
 
 def locked_run(scene: EccentricScene) -> EccentricRun:

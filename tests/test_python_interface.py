@@ -92,7 +92,7 @@ class Wrapped:
 
     def __init__(self, weaker: float) -> None:
         settings = {"controller.proportional": short().controller.proportional * weaker}
-        self.inner = Stepped(TargetVector.of(short().with_values(settings)))
+        self.inner = Stepped(TargetVector(scene=liquid_ring_scene(short().with_values(settings))))
         self.rises_tolerated = self.inner.rises_tolerated
 
     def start(self) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -31,17 +30,25 @@ BELOW_MINIMUM: Final = "the valve-open time is below the minimum"
 REASONS: Final = {0: "", UNUSABLE: NO_SAMPLE, TOO_SHORT: BELOW_MINIMUM}
 
 
-class BuiltIn(ABC):
-    """An algorithm of the program: frozen settings, whose step is compiled within the loop."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BuiltIn:
+    """An algorithm of the program, whose step is compiled within the loop."""
+
+    scene: Scene
+    """Whose settings it has."""
 
     @property
     def rises_tolerated(self) -> int:
         """As `Controller` has it: a rise, and another after what was assumed has been corrected."""
         return 2
 
-    @abstractmethod
-    def fill(self, loop: Record, run: Record) -> None:
+    def fill(self, loop: Record, run: Record) -> None:  # noqa: ARG002
         """Write the settings into an element of type `LOOP`, and the first memory into one of type `RUN`."""
+        settings, chambers = self.scene.controller, self.scene.disc.chambers
+        loop["chambers"], loop["rest_limit"] = chambers, settings.limit
+        loop["minimum_gas_time"] = settings.minimum_gas_time
+        loop["maximum_gas_time"] = settings.maximum_gas_time
+        loop["offset"][:chambers] = settings.offsets(chambers)
 
     def liquid(self) -> Records:
         """The pairs as the algorithm believes them to be at the start; empty where it has no belief."""
@@ -78,7 +85,7 @@ def command_of(sample: Record, chambers: int) -> Command:
 OnReversal = Literal["reset", "accumulate"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class TargetVector(BuiltIn):
     """Valve-open time of the correction *vector*, T = Kc (e + 1/Ti int e dt + Td de/dt), split over two
     chambers.
@@ -102,52 +109,17 @@ class TargetVector(BuiltIn):
         Clegg, "A nonlinear integrator for servomechanisms", Trans. AIEE 77 (1958).
     """
 
-    chambers: int
-    """n, even."""
-    lag_angle: float
-    """What the algorithm assumes, rad."""
-    limit: float
-    """m."""
-    proportional: float
-    """Kc, s/m."""
-    integral_time: float | None
-    """Ti, s; None: no integral part."""
-    derivative_time: float
-    """Td, s."""
-    minimum_gas_time: float
-    """s."""
-    maximum_gas_time: float
-    """s."""
-    offsets: tuple[float, ...] = ()
-    """Added to a valve's share, one for each chamber, s; empty: none."""
     on_reversal: OnReversal = "reset"
     """What becomes of the integral when the residual turns round."""
 
-    @classmethod
-    def of(cls, scene: Scene) -> TargetVector:
-        """With a scene's settings."""
-        settings, chambers = scene.controller, scene.disc.chambers
-        return cls(
-            chambers=chambers,
-            lag_angle=settings.assumed_lag_angle,
-            limit=settings.limit,
-            proportional=settings.proportional,
-            integral_time=settings.integral_time,
-            derivative_time=settings.derivative_time,
-            minimum_gas_time=settings.minimum_gas_time,
-            maximum_gas_time=settings.maximum_gas_time,
-            offsets=settings.offsets(chambers),
-        )
-
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
-        loop["algorithm"], loop["chambers"], loop["rest_limit"] = TARGET_VECTOR, self.chambers, self.limit
-        loop["assumed_lag"], loop["resets"] = self.lag_angle, self.on_reversal == "reset"
-        loop["integral_time"] = math.inf if self.integral_time is None else self.integral_time
-        loop["derivative_time"] = self.derivative_time
-        loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
-        loop["offset"][: len(self.offsets)] = self.offsets
-        run["proportional"], run["before_time"] = self.proportional, math.inf
+        super().fill(loop, run)
+        settings = self.scene.controller
+        loop["algorithm"], loop["resets"] = TARGET_VECTOR, self.on_reversal == "reset"
+        loop["assumed_lag"], loop["derivative_time"] = settings.assumed_lag_angle, settings.derivative_time
+        loop["integral_time"] = math.inf if settings.integral_time is None else settings.integral_time
+        run["proportional"], run["before_time"] = settings.proportional, math.inf
 
 
 @in_place
@@ -243,7 +215,7 @@ def vector_shares(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Trial(BuiltIn):
     """Gas into one chamber at a time, with a step that shrinks near the goal; the phase is not read.
 
@@ -256,54 +228,19 @@ class Trial(BuiltIn):
     Source: section 4.1 of the liquid-ring paper.
     """
 
-    chambers: int
-    """n, even."""
-    sequence: tuple[int, ...]
-    """Chamber indices in the order of trial."""
-    limit: float
-    """m."""
-    first_trial: float
-    """s."""
-    long_step: float
-    """s."""
-    short_step: float
-    """s."""
-    fine_below: float
-    """m."""
-    minimum_gas_time: float
-    """s."""
-    maximum_gas_time: float
-    """s."""
-
     @property
     def rises_tolerated(self) -> int:
         """One round through the sequence: a rise is how this algorithm learns."""
-        return len(self.sequence)
-
-    @classmethod
-    def of(cls, scene: Scene) -> Trial:
-        """With a scene's settings."""
-        settings, letters = scene.controller, chamber_letters(scene.disc.chambers)
-        return cls(
-            chambers=scene.disc.chambers,
-            sequence=tuple(letters.index(letter) for letter in settings.sequence),
-            limit=settings.limit,
-            first_trial=settings.first_trial,
-            long_step=settings.long_step,
-            short_step=settings.short_step,
-            fine_below=settings.fine_below,
-            minimum_gas_time=settings.minimum_gas_time,
-            maximum_gas_time=settings.maximum_gas_time,
-        )
+        return len(self.scene.controller.sequence)
 
     def fill(self, loop: Record, run: Record) -> None:
         """As `BuiltIn.fill`."""
-        run["position"] = 0
-        loop["algorithm"], loop["chambers"], loop["rest_limit"] = TRIAL, self.chambers, self.limit
-        loop["trials"], loop["sequence"][: len(self.sequence)] = len(self.sequence), self.sequence
+        super().fill(loop, run)
+        settings, letters = self.scene.controller, chamber_letters(self.scene.disc.chambers)
+        sequence = [letters.index(letter) for letter in settings.sequence]
+        loop["algorithm"], loop["trials"], loop["sequence"][: len(sequence)] = TRIAL, len(sequence), sequence
         for name in ("first_trial", "long_step", "short_step", "fine_below"):
-            loop[name] = getattr(self, name)
-        loop["minimum_gas_time"], loop["maximum_gas_time"] = self.minimum_gas_time, self.maximum_gas_time
+            loop[name] = getattr(settings, name)
 
 
 @in_place

@@ -200,11 +200,8 @@ def _goal(gates: Gates, angle: Sequence[float], imbalance: complex) -> tuple[Pai
     Returns: Goal, whether it is saturated, and the imbalance that it leaves, kg m.
     """
     targets = target_angles(abs(imbalance), cmath.phase(imbalance), gates.moment, gates.gap)
-    travel = assign(angle[0], angle[1], targets.first, targets.second)
-    goal = (
-        angle[0] + travel.first + gates.target_error[0],
-        angle[1] + travel.second + gates.target_error[1],
-    )
+    one, two = assign(angle[0], angle[1], targets.first, targets.second)
+    goal = (angle[0] + one + gates.target_error[0], angle[1] + two + gates.target_error[1])
     return goal, 1 if targets.saturated else 0, targets.residual
 
 

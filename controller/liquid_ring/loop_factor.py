@@ -72,13 +72,14 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] 
     error = 0.0
     value: float | None = None
     integral = derivative = 0.0
+    settings = scene.controller
     if isinstance(controller, TargetVector):
-        value = controller.proportional * rate
-        error = controller.lag_angle - scene.rotor.lag_angle
-        integral = scene.controller.period / (controller.integral_time or math.inf)
-        derivative = controller.derivative_time / scene.controller.period
+        value = settings.proportional * rate
+        error = settings.assumed_lag_angle - scene.rotor.lag_angle
+        integral = settings.period / (settings.integral_time or math.inf)
+        derivative = settings.derivative_time / settings.period
     if isinstance(controller, LawBased):
-        value = scene.rotor.influence_coefficient / abs(controller.influence)
+        value = scene.rotor.influence_coefficient / abs(settings.assumed_influence)
     deviation = _stationary_deviation(
         loop_factor=1.0 if value is None or isinstance(controller, LawBased) else value,
         noise=noise,

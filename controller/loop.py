@@ -15,8 +15,7 @@ from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.document import command_document, simulation_rows
 from ringbalance.controller.liquid_ring.loop_factor import loop_factor
 from ringbalance.controller.liquid_ring.plant import LiquidRing
-from ringbalance.controller.loop_plan import CHUNK, LoopPlan, RunsInHand, Trace, joined
-from ringbalance.controller.loop_records import NONE
+from ringbalance.controller.loop_plan import LoopPlan, Trace
 from ringbalance.controller.outcome import run_findings
 from ringbalance.controller.rotor import Sensor, chamber_letters, disc_unbalance, noisy_sensor
 from ringbalance.controller.simulation import Injection, Sample, Simulation
@@ -94,8 +93,19 @@ def simulate(
     if own is not None or sensor is not None:
         used_sensor = sensor or noisy_sensor(sensor=scene.sensor, seed=scene.run.seed)
         outside = _Outside(sensor=used_sensor, controller=own, chambers=scene.disc.chambers)
-    random = noise or np.random.default_rng(scene.run.seed)
-    trace = _carried(plan.begin(runs), random, scene.run.time_limit, outside, progress)
+
+    def watch() -> None:
+        if progress is not None:
+            progress(float(runs[0]["time"]), scene.run.time_limit)
+        if outside is not None:
+            outside.answer(runs[0])
+
+    trace = plan.carry(
+        runs,
+        [noise or np.random.default_rng(scene.run.seed)],
+        traced=True,
+        watch=None if progress is None and outside is None else watch,
+    )
     time, vibration, fills = _histories(scene, balancer, trace)
     run = Simulation(
         scene=scene,
@@ -129,26 +139,6 @@ def _one_of(model: BalancerModel | None, flow_law: CompleteLaw | None) -> Balanc
     if flow_law is not None and model is None:
         return BalancerModel.of(flow_law)
     raise ValueError("give a model or a flow_law, such as calibrate(scene).flow_law; not both, not neither")
-
-
-def _carried(
-    hand: RunsInHand,
-    random: np.random.Generator,
-    limit: float,
-    outside: _Outside | None,
-    progress: Progress | None,
-) -> Trace:
-    """Carry a run to its end, by one sample where anybody looks on. Returns: its trace."""
-    run = hand.runs[0]
-    parts = [hand.go_on(np.zeros((1, 0, 2)), traced=True)]
-    while run["cause"] == NONE:
-        if progress is not None:
-            progress(float(run["time"]), limit)
-        if outside is not None:
-            outside.answer(run)
-        size = CHUNK if progress is None and outside is None else 1
-        parts.append(hand.go_on(random.standard_normal((1, size, 2)), traced=True))
-    return joined(parts)
 
 
 @dataclass(kw_only=True)

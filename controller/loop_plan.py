@@ -166,7 +166,7 @@ class LoopPlan:
         while np.any(running := runs["cause"] == NONE):
             if watch is not None:
                 watch()
-            for i in np.flatnonzero(running) if random else ():
+            for i in np.flatnonzero(running).tolist() if random else ():
                 noise[i] = random[i].standard_normal(shape[1:])
             parts.append(self._continued(runs, motions, liquid, noise, *room, traced=traced))
         return Trace.joined(parts)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.controller.algorithms.by_name import controller_of
+from ringbalance.controller.algorithms.law_based import controller_of
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.liquid_ring.loop_factor import (
     LoopFactor,

@@ -184,7 +184,7 @@ def _settling(found: Record) -> Drawing | None:
 def settling(curves: Sequence[tuple[dict[str, Any], Record]], asked: float) -> Drawing | None:
     """Fraction of drawn devices that has settled by a time, with its bounds; None where none settles.
 
-    Args: `curves`: looks, and times, fractions and bounds as in the evidence. `asked`: fraction.
+    Args: `curves`: looks, and times, fractions and bounds as in the evidence. `asked`: of the devices.
     """
     if not any(each["time_s"] for _, each in curves):
         return None

@@ -78,9 +78,8 @@ class Answer(Result):
 
     def rows(self) -> Rows:
         mass = Quantity(key="mass", name="mass of the disc", value=2.0, unit="kg", upper=3.0)
-        return Rows(
-            title="An answer", quantities=(mass, Quantity(key="time", name="time", value=None, unit="s"))
-        )
+        time = Quantity(key="time", name="time", value=None, unit="s")
+        return Rows(title="An answer", quantities=(mass, time))
 
 
 def test_what_has_no_figure_says_so() -> None:

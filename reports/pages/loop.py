@@ -184,7 +184,8 @@ def _settling(found: Record) -> Drawing | None:
 def settling(curves: Sequence[tuple[dict[str, Any], Record]], asked: float) -> Drawing | None:
     """Fraction of drawn devices that has settled by a time, with its bounds; None where none settles.
 
-    Args: `curves`: looks, and times, fractions and bounds as in the evidence. `asked`: of the devices.
+    Args: `curves`: looks, and times, fractions and bounds as in the evidence. `asked`: share of the
+        devices that a scene asks to settle.
     """
     if not any(each["time_s"] for _, each in curves):
         return None

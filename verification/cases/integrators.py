@@ -39,7 +39,6 @@ from ringbalance.verification.evidence import (
     Series,
     as_found,
     figure,
-    from_half_width,
 )
 
 _SHARE: Final = 0.9
@@ -188,12 +187,11 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         log=True,
     )
     return Evidence(
-        found={
-            "moved_fill": Found(value=limit, numerical=from_half_width(abs(limit - moved[-1]) / 2)).against(
-                exact
-            ),
-            **as_found(order=study.settled_order, finest_error=study.finest_error),
-        },
+        found=as_found(
+            moved_fill=Found.within(limit, abs(limit - moved[-1]) / 2).against(exact),
+            order=study.settled_order,
+            finest_error=study.finest_error,
+        ),
         numbers={
             "duration": duration,
             "moved": exact,

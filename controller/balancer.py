@@ -1,22 +1,24 @@
 """What every command knows of a balancer: one interface, and how a scene comes to its own.
 
 `simulate`, `tune`, `compare` and the first half of `fit` are written against `Balancer` alone.  A further one
-is a sub-package with its scene's keys and a class of this shape, and one line that registers it
+is a sub-package with its scene's keys and a subclass, and one line that registers it
 (`ringbalance.scene.registry`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
 from ringbalance.controller.rotor import CommonRotor, Rotors
-from ringbalance.controller.trials import DrawnInput, Trials
-from ringbalance.reduced_model.law.flow_law import CALIBRATED
+from ringbalance.controller.trials import DrawnInput, Information, Trials, drawn_key
+from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -111,68 +113,92 @@ class Run(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TracedRun:
-    """One run and what it comes to."""
+class RunResult:
+    """What one run comes to."""
 
-    run: Run
-    settling_time: float | None
-    """s, from the start of balancing; None: not settled."""
+    settling_time: float
+    """s, from the start of balancing; infinite where not settled."""
     final_amplitude: float
     """m zero-to-peak."""
     energy: float
     """That it took, J."""
-    worst_amplitude: float
-    """Largest while balancing, m zero-to-peak."""
-    ended: str
-    """Code of the finding that says how."""
     usable_moment: float
     """Largest unbalance that the device cancels where its own lies, kg m."""
     unbalance: float
     """Of its rotor, kg m."""
+    ended: str
+    """What stopped it: code of the finding that says so."""
+    run: Any = None
+    """A `Run`; None: it left no trace."""
+    worst_amplitude: float = math.nan
+    """Largest while balancing, m zero-to-peak, of a run with a trace."""
+
+    @property
+    def settled(self) -> bool:
+        """Whether it has."""
+        return math.isfinite(self.settling_time)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcomes:
-    """Of runs, in the order of the draws; arrays of shape (n,)."""
+    """Of runs, in the order of the draws: the numbers of `RunResult` as arrays of shape (n,)."""
 
-    settled: BoolArray
     settling_time: FloatArray
-    """s, from the start of balancing; infinite where not settled."""
     final_amplitude: FloatArray
-    """m zero-to-peak."""
     energy: FloatArray
-    """That each took, J."""
     usable_moment: FloatArray
-    """Largest unbalance that the device cancels where its own lies, kg m."""
     unbalance: FloatArray
-    """Of the device's rotor, kg m."""
     ended: tuple[str, ...]
-    """What stopped each: code of the finding that says so."""
     numbers: tuple[int, ...] = ()
     """Of the draws."""
     inputs: Mapping[str, FloatArray] = field(default_factory=dict)
     """Place of every drawn input in its distribution, in (0, 1); empty where no device is drawn."""
     clipped: Mapping[str, int] = field(default_factory=dict)
     """Number of devices by input that cannot have it as drawn."""
-    traced: tuple[TracedRun, ...] = ()
+    traced: tuple[RunResult, ...] = ()
+
+    @property
+    def settled(self) -> BoolArray:
+        """Whether each has."""
+        return np.isfinite(self.settling_time)
+
+    @classmethod
+    def of(
+        cls,
+        results: Sequence[RunResult],
+        *,
+        numbers: tuple[int, ...] = (),
+        inputs: Sequence[Mapping[str, float]] = ({},),
+        clipped: Iterable[str] = (),
+        trace: bool = False,
+    ) -> Outcomes:
+        """Of runs one by one.
+
+        Args: `inputs`: place of every drawn input, by device. `clipped`: inputs that some device cannot have
+            as drawn, for each. `trace`: whether the runs are kept.
+        """
+        return cls(
+            **{name: np.array([getattr(each, name) for each in results]) for name in _ARRAYS},
+            ended=tuple(each.ended for each in results),
+            numbers=numbers,
+            inputs={name: np.array([each[name] for each in inputs]) for name in inputs[0]},
+            clipped=Counter(clipped),
+            traced=tuple(results) if trace else (),
+        )
 
     def joined(self, more: Outcomes) -> Outcomes:
         """These draws and further ones."""
-        arrays = ("settled", "settling_time", "final_amplitude", "energy", "usable_moment", "unbalance")
-        both = {name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in arrays}
         return Outcomes(
-            **both,
+            **{name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in _ARRAYS},
             ended=self.ended + more.ended,
             numbers=self.numbers + more.numbers,
-            inputs={
-                name: np.concatenate([places, more.inputs[name]]) for name, places in self.inputs.items()
-            },
-            clipped={
-                name: self.clipped.get(name, 0) + more.clipped.get(name, 0)
-                for name in {**self.clipped, **more.clipped}
-            },
+            inputs={name: np.concatenate([at, more.inputs[name]]) for name, at in self.inputs.items()},
+            clipped=Counter(self.clipped) + Counter(more.clipped),
             traced=self.traced + more.traced,
         )
+
+
+_ARRAYS: Final = ("settling_time", "final_amplitude", "energy", "usable_moment", "unbalance")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,67 +237,39 @@ class Remedy:
     """Whether a value between this and another of its kind can be had as well."""
 
 
-class _Recommendation(Protocol):
-    """What `tune` answers with."""
+class Balancer(ABC):
+    """A balancer on its rotor, as a scene describes both; what every command knows of it.
 
-    @property
-    def status(self) -> str:
-        """What was recommended, and whether the runs under it settle."""
-        ...
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether what the scene requires is met."""
-        ...
-
-    def rows(self) -> Rows:
-        """What was recommended, for every output."""
-        ...
-
-    @property
-    def recommended_scene(self) -> SceneFile:
-        """The scene with the recommended settings, checked."""
-        ...
-
-    def to_dict(self) -> dict[str, Any]:
-        """As a JSON document in SI."""
-        ...
-
-
-class Balancer(Protocol):
-    """A balancer on its rotor, as a scene describes both.
-
-    Made by `balancer_of`; immutable, so that the same balancer gives the same rows in every process.
+    Made by `balancer_of`; immutable, so that the same balancer gives the same rows in every process.  What is
+    not abstract here suits a balancer whose runs are watched to their end and whose scene states nothing
+    else.
     """
 
-    options: frozenset[str]
+    scene: Any
+    """That it was made of, of the type of its kind."""
+    options: frozenset[str] = frozenset()
     """Arguments besides the scene that it can be made with, such as "flow_law"."""
-
-    verdict_draws: tuple[int, int]
+    verdict_draws: tuple[int, int] = (16, 64)
     """Devices of a verdict, at first and at the most."""
     energy_kind: str
     """Code of the sentence that says what its runs count as energy."""
-    watched_to_end: bool
+    watched_to_end: bool = True
     """Whether every run is watched to its time limit, whatever is asked for."""
-
-    @property
-    def scene(self) -> SceneFile:
-        """The scene that it was made of."""
-        ...
 
     @property
     def models_used(self) -> tuple[Any, ...]:
         """Every physical term, with its model and its estimated contribution; empty: one model has all."""
-        ...
+        return ()
 
     def inputs(self) -> tuple[Input, ...]:
         """Every quantity that may be uncertain."""
-        ...
+        return inputs_of(self.scene)
 
+    @abstractmethod
     def settings(self) -> tuple[Setting, ...]:
         """What `run` takes, each at the scene's value and within its bounds."""
-        ...
 
+    @abstractmethod
     def run(
         self,
         settings: Settings,
@@ -284,55 +282,63 @@ class Balancer(Protocol):
 
         `trace`: whether the runs themselves are kept; what they come to is the same.
         """
-        ...
 
     def run_all(
-        self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
+        self,
+        settings: Sequence[Settings],
+        draws: Draws,
+        *,
+        further: float = FURTHER,  # noqa: ARG002
     ) -> tuple[Outcomes, ...]:
-        """The same for several settings, without traces: a device is made once for all of them.
+        """The same for several settings, without traces.
 
-        Args: `further`: s, for which a run is watched after it has held its limit.
+        Args: `further`: s, for which a run is watched after it has held its limit, unless to its end.
         """
-        ...
+        return tuple(self.run(each, draws) for each in settings)
 
     def asked_fraction(self) -> float:
         """Fraction of the devices that must meet every demand."""
-        ...
+        return REQUIRED_FRACTION
 
     def demands(self) -> tuple[Demand, ...]:
         """What is asked of every device: first that it settles in time, then what else the scene states."""
-        ...
+        return (settles_within(self.span(), stated=False),)
 
     def trials(self) -> tuple[Trials, ...]:
         """Settings to try, of the scene's kind of controller first; empty: there are none."""
-        ...
+        return ()
 
     def remedies(self) -> tuple[Remedy, ...]:
         """Changes of the scene to try where too few devices meet its demands, each by itself.
 
         Those of one kind follow each other with the smallest change first.
         """
-        ...
+        return ()
 
     def choices(self) -> tuple[Remedy, ...]:
         """Things that can be bought for what the scene leaves open; it is answered without them."""
-        ...
+        return ()
+
+    def information(self, scene: SceneFile) -> Information:  # noqa: ARG002
+        """What is known without a run of its loop under a scene with other settings."""
+        return Information()
 
     def drawn_input(self, name: str) -> DrawnInput:
         """What kind of thing an input of `Outcomes.inputs` is."""
-        ...
+        return drawn_key(self.scene, name)
 
+    @abstractmethod
     def on_scene(self, scene: SceneFile) -> Self:
         """The same, with the same options, of another scene of its kind."""
-        ...
 
+    @abstractmethod
     def rotor(self, number: int | None = None) -> CommonRotor:
         """The rotor alone. Args: `number`: of a drawn device; default as the scene says.
 
         Raises: SceneError: it stands still, or never vibrates steadily.
         """
-        ...
 
+    @abstractmethod
     def on_rotor(self, rotor: CommonRotor, rotors: Rotors | None = None) -> Self:
         """This balancer on a rotor at constant speed in its steady vibration, with nothing required but to
         come below that rotor's limit.
@@ -340,50 +346,34 @@ class Balancer(Protocol):
         Args: `rotors`: of the drawn devices; default its own. Raises: SceneError: the rotor cannot be this
             balancer's.
         """
-        ...
 
+    @abstractmethod
     def sampling_time(self) -> float:
         """Time from one sample of the vibration to the next, s."""
-        ...
 
     def span(self) -> float:
         """Time from the start of balancing to the end of a run, s."""
-        ...
+        return float(self.scene.run.time_limit)
 
+    @abstractmethod
     def lasting(self, span: float) -> Self:
         """The same with runs that balance for so long, s, and go on when they have settled."""
-        ...
 
-    def recommend(
-        self,
-        *,
-        pressure: bool = False,
-        remedies: bool | None = False,
-        progress: Callable[[str], None] | None = None,
-    ) -> _Recommendation:
-        """Settings, judged by runs over the draws.
-
-        Args: `pressure`: whether what `Trials.along` names, such as the supply's pressure, is searched even
-            where the scene's own suffices. `remedies`: whether `remedies` are tried where what is required is
-            not met, and `choices`; None: the former alone.
-        """
-        ...
-
+    @abstractmethod
     def quantities(self) -> tuple[Quantity, ...]:
         """What is known of it without a run; among them "reach", the largest unbalance, kg m, that it cancels
         wherever that lies."""
-        ...
 
+    @abstractmethod
     def rows(self, run: Any) -> Rows:
         """One of its traced runs as `simulate` prints it.
 
         A finding has the changes of the scene that would mend it (`Finding.changes`).
         """
-        ...
 
+    @abstractmethod
     def history(self, run: Any) -> Mapping[str, Sequence[Any]]:
         """Every instant of one of its traced runs by name of its column, with the unit in the name."""
-        ...
 
 
 def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
@@ -403,6 +393,11 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
 def takes(scene: SceneFile, option: str) -> bool:
     """Whether the balancer of a scene has an option, such as "flow_law"."""
     return option in registered("balancer", scene.balancer).options
+
+
+def quick_balancer(scene: SceneFile) -> Balancer:
+    """The same for runs of many designs: under a law that nothing else has checked, where it has one."""
+    return balancer_of(scene, flow_law=UNCHECKED) if takes(scene, "flow_law") else balancer_of(scene)
 
 
 def balancer_under(law: str, scene: SceneFile) -> Balancer:
@@ -456,24 +451,4 @@ def settles_within(time: float, *, stated: bool) -> Demand:
         required=time,
         unit="s",
         stated=stated,
-    )
-
-
-def one_by_one(balancer: Balancer, settings: Sequence[Settings], draws: Draws) -> tuple[Outcomes, ...]:
-    """`Balancer.run_all` of a balancer that makes its devices for every setting again."""
-    return tuple(balancer.run(each, draws) for each in settings)
-
-
-def outcomes_of(runs: Sequence[TracedRun], *, trace: bool) -> Outcomes:
-    """Of runs one by one. Args: `trace`: whether they are kept."""
-    times = [math.inf if each.settling_time is None else each.settling_time for each in runs]
-    return Outcomes(
-        settled=np.isfinite(times),
-        settling_time=np.array(times),
-        final_amplitude=np.array([each.final_amplitude for each in runs]),
-        energy=np.array([each.energy for each in runs]),
-        usable_moment=np.array([each.usable_moment for each in runs]),
-        unbalance=np.array([each.unbalance for each in runs]),
-        ended=tuple(each.ended for each in runs),
-        traced=tuple(runs) if trace else (),
     )

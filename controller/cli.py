@@ -8,6 +8,7 @@ from typing import Literal
 
 from ringbalance.controller.balancer import balancer_of, balancer_under, takes
 from ringbalance.controller.compare import compare as compare_balancers
+from ringbalance.controller.judging.tune import tuned
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import print_rows
 from ringbalance.scene.changes import file_text
@@ -53,7 +54,7 @@ def tune(
         check_file(save, apart_from=scene)
     balancer = balancer_under(law, with_tolerance(load_scene(scene), tolerance=tolerance, models=models))
     with activity("tune", "runs ...") as shown:
-        found = balancer.recommend(pressure=pressure, remedies=remedies or None, progress=shown.show)
+        found = tuned(balancer, along=pressure, remedies=remedies or None, progress=shown.show)
     if save is not None:
         write_whole(save, file_text(found.recommended_scene, to=save.parent))
     if json:

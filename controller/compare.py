@@ -322,7 +322,7 @@ def _paired(outcomes: Sequence[Outcomes]) -> Paired:
 def _side(balancer: Balancer, settings: Settings, outcomes: Outcomes, rotors: Rotors) -> Side:
     before = np.array([rotors(FRESH + number).amplitude for number in range(outcomes.settled.size)])
     traced = balancer.run(settings, Draws.block(FRESH, _TRACED), trace=True).traced
-    told = next((each for each in traced if each.settling_time is None), traced[0])
+    told = next((each for each in traced if not each.settled), traced[0])
     ready = balancer.on_scene(with_values_at(balancer.scene, settings))
     return Side(
         scene=ready.scene,

@@ -8,9 +8,11 @@ not the yield of a production.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
+from ringbalance.results.result import Facts
+from ringbalance.results.rows import Quantity
 from ringbalance.scene.kinds import scene_kind
 from ringbalance.scene.origins import SceneFile
 
@@ -84,3 +86,12 @@ def drawn_key(scene: SceneFile, path: str) -> DrawnInput:
     table, _, key = path.split("[")[0].partition(".")
     declared = scene_kind(scene.balancer).schema.key_at((table, key))
     return DrawnInput(common=declared.common, measure=MEASURE_INPUT, path=path)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Information:
+    """What is known of a loop without a run; nothing is judged by it."""
+
+    quantities: tuple[Quantity, ...] = ()
+    facts: Facts = ()
+    document: Mapping[str, Any] = field(default_factory=dict)

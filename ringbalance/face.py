@@ -11,6 +11,7 @@ from ringbalance.controller.compare import Comparison
 from ringbalance.controller.compare import compare as run_comparison
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
+from ringbalance.controller.judging.tune import tuned
 from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.loop import Progress
 from ringbalance.controller.rotor import Sensor
@@ -125,7 +126,5 @@ def tune(
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a flow law for eccentric masses.
     """
-    tuning = balancer_of(checked_scene(scene), flow_law=flow_law).recommend(
-        pressure=pressure, remedies=remedies, progress=progress
-    )
-    return cast("Tuning", tuning)
+    balancer = balancer_of(checked_scene(scene), flow_law=flow_law)
+    return tuned(balancer, along=pressure, remedies=remedies, progress=progress)

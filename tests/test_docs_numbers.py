@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ringbalance.controller.eccentric_mass.drive_law import believed_whirl
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
-from ringbalance.controller.eccentric_mass.settings import believed_whirl
 from ringbalance.physics.sloshing import resonant_fills, sloshing_response
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.models import Scene

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -13,17 +13,15 @@ import numpy as np
 from ringbalance.controller.balancer import (
     AS_GIVEN,
     FURTHER,
+    Balancer,
     Demand,
     Draws,
-    Input,
     Outcomes,
     Progress,
     Remedy,
+    RunResult,
     Setting,
     Settings,
-    TracedRun,
-    inputs_of,
-    outcomes_of,
     settles_within,
 )
 from ringbalance.controller.eccentric_mass.devices import FITTED, PHASE, Device, device, on_rotor
@@ -46,10 +44,8 @@ from ringbalance.controller.eccentric_mass.scene_records import (
 )
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
 from ringbalance.controller.eccentric_mass.targets import reach_of
-from ringbalance.controller.judging.tune import tuned
-from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
-from ringbalance.controller.trials import MEASURE_INPUT, Axis, DrawnInput, Trials, drawn_key
+from ringbalance.controller.trials import MEASURE_INPUT, Axis, DrawnInput, Information, Trials
 from ringbalance.results.requirements import AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -68,7 +64,7 @@ _SIZING: Final = 256
 """Devices whose imbalance, without a run, sizes the masses."""
 
 
-class EccentricMassBalancer:
+class EccentricMassBalancer(Balancer):
     """Two masses that motors drive along one track.
 
     A scene gives the rotor by mass, stiffness and damping, alpha = W^2/(K_B - M W^2 + j C_B W), and takes a
@@ -76,18 +72,11 @@ class EccentricMassBalancer:
     balancer together, which alpha at one speed leaves open.
     """
 
-    options = frozenset[str]()
-    verdict_draws = (16, 64)
     energy_kind = "energy_electrical"
-    watched_to_end = True
-    models_used: tuple[Any, ...] = ()
+    scene: EccentricScene
 
     def __init__(self, scene: EccentricScene, rotors: Rotors | None = None) -> None:
         self.scene, self._rotors = scene, rotors
-
-    def inputs(self) -> tuple[Input, ...]:
-        """Those of the scene."""
-        return inputs_of(self.scene)
 
     def settings(self) -> tuple[Setting, ...]:
         """Gains of the drives."""
@@ -133,19 +122,18 @@ class EccentricMassBalancer:
         progress: Progress | None = None,
     ) -> tuple[Outcomes, ...]:
         drawn = [self._device(number, drawn=draws.devices) for number in draws.numbers]
-        inputs = {name: np.array([each.inputs[name] for each in drawn]) for name in drawn[0].inputs}
-        found = []
+        outcomes = []
         for asked in settings:
             scene = with_values_at(self.scene, asked)
-            strategy = StrategySettings.of(scene)
-            runs = []
+            strategy, results = StrategySettings.of(scene), []
             for number, each in zip(draws.numbers, drawn, strict=True):
                 seed = run_noise(scene.run.seed, number) if draws.devices else scene.run.seed + number
                 plant = with_values_at(each.scene, asked)
                 run = simulate_eccentric(plant, seed=seed, settings=strategy, progress=progress)
-                runs.append(_traced(run, plant))
-            found.append(replace(outcomes_of(runs, trace=trace), numbers=draws.numbers, inputs=inputs))
-        return tuple(found)
+                results.append(_result(run, plant))
+            inputs = [each.inputs for each in drawn]
+            outcomes.append(Outcomes.of(results, numbers=draws.numbers, inputs=inputs, trace=trace))
+        return tuple(outcomes)
 
     def _device(self, number: int, *, drawn: bool) -> Device:
         return device(self.scene, number, self._rotors) if drawn else Device(scene=self.scene, inputs={})
@@ -188,17 +176,13 @@ class EccentricMassBalancer:
         shares = [_needed_share(self._device(number, drawn=True).scene) for number in range(_SIZING)]
         return remedies_of(self.scene, drawn, own, shares)
 
-    def choices(self) -> tuple[Remedy, ...]:
-        """See `Balancer`."""
-        return ()
-
     def drawn_input(self, name: str) -> DrawnInput:
         """See `Balancer`."""
         if name == PHASE:
             return DrawnInput(common=False, measure="", path=PHASE)
         if name.startswith(FITTED):
             return DrawnInput(common=True, measure=MEASURE_INPUT)
-        return drawn_key(self.scene, name)
+        return super().drawn_input(name)
 
     def on_scene(self, scene: SceneFile) -> EccentricMassBalancer:
         """See `Balancer`."""
@@ -265,15 +249,14 @@ class EccentricMassBalancer:
             replace(self.scene, run=replace(self.scene.run, time_limit=limit)), self._rotors
         )
 
-    def recommend(
-        self,
-        *,
-        pressure: bool = False,
-        remedies: bool | None = False,
-        progress: Callable[[str], None] | None = None,
-    ) -> Tuning:
-        """See `Balancer`."""
-        return tuned(self, information=_information, along=pressure, remedies=remedies, progress=progress)
+    def information(self, scene: SceneFile) -> Information:
+        """Loops of the drives."""
+        gains = RecommendedGains.of(eccentric_scene(scene))
+        return Information(
+            quantities=loops_quantities(gains),
+            facts=(("loops of the drives", loops_status(gains)),),
+            document=loops_document(gains),
+        )
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Reach, and the largest gains of the drives; see `Balancer`."""
@@ -291,21 +274,12 @@ class EccentricMassBalancer:
         return eccentric_history(run)
 
 
-def _information(scene: SceneFile) -> Information:
-    gains = RecommendedGains.of(eccentric_scene(scene))
-    return Information(
-        quantities=loops_quantities(gains),
-        facts=(("loops of the drives", loops_status(gains)),),
-        document=loops_document(gains),
-    )
-
-
-def _traced(run: EccentricRun, scene: EccentricScene) -> TracedRun:
+def _result(run: EccentricRun, scene: EccentricScene) -> RunResult:
     start = scene.supervisor.start
     balancing = run.amplitude[run.time >= start]
-    return TracedRun(
+    return RunResult(
         run=run,
-        settling_time=None if run.settling_time is None else max(0.0, run.settling_time - start),
+        settling_time=math.inf if run.settling_time is None else max(0.0, run.settling_time - start),
         final_amplitude=run.final_amplitude,
         energy=run.electrical_energy,
         worst_amplitude=float(np.max(balancing)) if balancing.size else run.worst_amplitude,

@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plan import HELD, STAGE_NAMES
+from ringbalance.controller.eccentric_mass.drive_law import believed_whirl
+from ringbalance.controller.eccentric_mass.memory import HELD, STAGE_NAMES
 from ringbalance.controller.eccentric_mass.run_facts import EccentricOutcome, RunFacts
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.settings import believed_whirl
 from ringbalance.results.rows import Finding, Value, sentences
 
 _NOTICEABLE_STALL: Final = 0.05
@@ -82,18 +82,18 @@ def _due(facts: RunFacts) -> dict[str, bool]:
         "voltage_at_limit": facts.saturation > 0,
         "euler_too_coarse": _by_euler(facts),
         "innovations_unlike_model": unlike and not _by_euler(facts),
-        "drives_stay_on": facts.hold == HELD,
+        "drives_stay_on": int(facts.history["hold"][-1]) == HELD,
         "masses_meet": facts.least_gap < _own_angle(facts.scene),
     }
 
 
 def _stalled(facts: RunFacts) -> float:
-    return facts.findings.stalled / max(facts.findings.driven, 1)
+    return int(facts.memory["stalled"]) / max(int(facts.memory["driven"]), 1)
 
 
 def _deviation(facts: RunFacts) -> float:
     """Standard deviation of the imbalance by noise, kg m."""
-    return float(np.sqrt(np.max(np.linalg.eigvalsh(facts.estimates.imbalance_covariance[-1]))))
+    return float(np.sqrt(np.max(np.linalg.eigvalsh(facts.history["imbalance_covariance"][-1]))))
 
 
 def _own_angle(scene: EccentricScene) -> float:
@@ -113,7 +113,7 @@ def _numbers(facts: RunFacts) -> dict[str, Value]:
         "later_speed": None if left is None else float(facts.speed[left]),
         "imbalance": abs(facts.imbalance),
         "reach": 2 * scene.masses.mass * scene.masses.guide_radius,
-        "residual": float(facts.findings.residual),
+        "residual": float(facts.memory["left"]),
         "lowest_speed": supervisor.lowest_speed,
         "imbalance_time": supervisor.imbalance_time,
         "deviation_ratio": _deviation(facts) / abs(facts.imbalance) if facts.imbalance else None,

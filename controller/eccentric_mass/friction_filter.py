@@ -11,9 +11,12 @@ Friction at rest is a set, not a number, so nothing is learnt from a mass that s
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from ringbalance.scene.platform.compiled import compiled
+import numpy as np
+
+from ringbalance.controller.eccentric_mass.imbalance_filter import Record
+from ringbalance.scene.platform.compiled import in_place
 
 
 class TrackModel(NamedTuple):
@@ -38,38 +41,29 @@ class FrictionNoise(NamedTuple):
     """How fast the friction arm may wander, m^2/s."""
 
 
-class FrictionEstimate(NamedTuple):
-    """Estimate of one mass's state."""
-
-    rate: float
-    """w, rad/s."""
-    arm: float
-    """Friction arm mu, m."""
-    rate_variance: float
-    covariance: float
-    """Of rate and arm, rad m/s."""
-    arm_variance: float
-
-
-class _FrictionFlow(NamedTuple):
-    """The motion of a mass over one step and how it hangs on rate and arm."""
-
-    rate: float
-    """w one step later, rad/s."""
-    by_rate: float
-    """d w_k/d w_(k-1)."""
-    by_arm: float
-    """d w_k/d mu, rad/(s m)."""
+FRICTION_FILTER: Final = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            "rate",  # w, rad/s
+            "arm",  # friction arm mu, m
+            "rate_variance",
+            "covariance",  # of rate and arm, rad m/s
+            "arm_variance",
+        )
+    ]
+)
+"""Estimate of one mass's state."""
 
 
-@compiled
-def _friction_flow(
+@in_place
+def friction_flow(
     model: TrackModel, rate: float, arm: float, speed: float, torque: float, step: float, euler: bool
-) -> _FrictionFlow:
+) -> tuple[float, float, float]:
     """Carry a moving mass one step on, by the exponential Rosenbrock-Euler rule, which bears any step.
 
-    Returns: The flow and its derivatives; the printed Jacobian carries the arm once too often in d/d mu, and
-    leaves the drive's inertia and back-EMF out.
+    Returns: w one step later, rad/s, d w/d w before, and d w/d mu, rad/(s m); the printed Jacobian carries
+        the arm once too often in d/d mu, and leaves the drive's inertia and back-EMF out.
     Source: Eqs. 31 to 36 of the paper on eccentric masses, rederived.
     """
     direction = math.copysign(1.0, rate)
@@ -77,15 +71,15 @@ def _friction_flow(
     slope = (model.damping + 2 * direction * arm * model.moment * (speed + rate)) / model.inertia
     acceleration = (torque - model.damping * rate - arm * load) / model.inertia
     if euler:
-        return _FrictionFlow(rate + step * acceleration, 1 - slope * step, -step * load / model.inertia)
+        return rate + step * acceleration, 1 - slope * step, -step * load / model.inertia
     decay = math.exp(-slope * step)
     span = step if abs(slope * step) < 1e-9 else -math.expm1(-slope * step) / slope
-    return _FrictionFlow(rate + span * acceleration, decay, -span * load / model.inertia)
+    return rate + span * acceleration, decay, -span * load / model.inertia
 
 
-@compiled
+@in_place
 def friction_step(
-    estimate: FrictionEstimate,
+    known: Record,
     model: TrackModel,
     noise: FrictionNoise,
     measured_rate: float,
@@ -93,38 +87,32 @@ def friction_step(
     torque: float,
     step: float,
     euler: bool,
-) -> FrictionEstimate:
+) -> None:
     """Predict by the flow, its covariance by the flow's derivatives, and take in the encoder's rate.
 
     Source: Eqs. 32 to 38 of the paper on eccentric masses, with the flow as transition and Joseph's update.
     """
-    flow = _friction_flow(model, estimate.rate, estimate.arm, speed, torque, step, euler)
-    wander = noise.arm * step
+    rate, by_rate, by_arm = friction_flow(model, known.rate, known.arm, speed, torque, step, euler)
+    wander, r = noise.arm * step, noise.rate_variance
     p11 = (
-        flow.by_rate**2 * estimate.rate_variance
-        + 2 * flow.by_rate * flow.by_arm * estimate.covariance
-        + flow.by_arm**2 * (estimate.arm_variance + wander / 3)
+        by_rate**2 * known.rate_variance
+        + 2 * by_rate * by_arm * known.covariance
+        + by_arm**2 * (known.arm_variance + wander / 3)
         + noise.acceleration * step
     )
-    p12 = flow.by_rate * estimate.covariance + flow.by_arm * (estimate.arm_variance + wander / 2)
-    p22 = estimate.arm_variance + wander
-    total = p11 + noise.rate_variance
-    if not (total > 0 and math.isfinite(measured_rate)):
-        return FrictionEstimate(flow.rate, estimate.arm, p11, p12, p22)
-    k1, k2, r = p11 / total, p12 / total, noise.rate_variance
-    innovation = measured_rate - flow.rate
-    return FrictionEstimate(
-        flow.rate + k1 * innovation,
-        estimate.arm + k2 * innovation,
-        (1 - k1) ** 2 * p11 + r * k1 * k1,
-        (1 - k1) * (p12 - k2 * p11) + r * k1 * k2,
-        p22 - 2 * k2 * p12 + k2 * k2 * p11 + r * k2 * k2,
-    )
+    p12 = by_rate * known.covariance + by_arm * (known.arm_variance + wander / 2)
+    p22 = known.arm_variance + wander
+    seen = p11 + r > 0 and math.isfinite(measured_rate)
+    k1, k2 = (p11 / (p11 + r), p12 / (p11 + r)) if seen else (0.0, 0.0)
+    innovation = measured_rate - rate if seen else 0.0
+    known.rate = rate + k1 * innovation
+    known.arm += k2 * innovation
+    known.rate_variance = (1 - k1) ** 2 * p11 + r * k1 * k1
+    known.covariance = (1 - k1) * (p12 - k2 * p11) + r * k1 * k2
+    known.arm_variance = p22 - 2 * k2 * p12 + k2 * k2 * p11 + r * k2 * k2
 
 
-@compiled
-def friction_restart(
-    estimate: FrictionEstimate, noise: FrictionNoise, measured_rate: float
-) -> FrictionEstimate:
+@in_place
+def friction_restart(known: Record, noise: FrictionNoise, measured_rate: float) -> None:
     """Rate from the encoder alone, arm as known, of a mass that sticks or turns: no flow holds there."""
-    return FrictionEstimate(measured_rate, estimate.arm, noise.rate_variance, 0.0, estimate.arm_variance)
+    known.rate, known.rate_variance, known.covariance = measured_rate, noise.rate_variance, 0.0

@@ -16,13 +16,19 @@ from __future__ import annotations
 
 import cmath
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import FloatArray
-from ringbalance.scene.platform.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled, in_place
+
+Record = Any
+"""One element of a structured array, which compiled code changes in place."""
+Records = npt.NDArray[np.void]
+Numbers = Sequence[float] | FloatArray
 
 _GAUSS_POINTS: FloatArray
 _GAUSS_WEIGHTS: FloatArray
@@ -54,35 +60,45 @@ class WhirlModel(NamedTuple):
         return np.asarray(np.minimum(*limits), dtype=np.float64)
 
 
-class ProcessNoise(NamedTuple):
-    """White noise that drives the state, as power per unit time."""
+class FilterSettings(NamedTuple):
+    """What the filter assumes; noises are white and given as power per unit time."""
 
-    acceleration: float
+    model: WhirlModel
+    acceleration_noise: float
     """Of the rotor along each axis, m^2/s^3."""
-    imbalance: float
+    imbalance_noise: float
     """Of the imbalance along each axis, kg^2 m^2/s: how fast it may wander."""
+    start: tuple[float, float, float]
+    """Standard deviations before the first sample of displacement, m, velocity, m/s, and imbalance, kg m."""
+    step: float
+    """s."""
+    laboratory: bool
+    """Whether the sensor stands still, its sample turned back by the rotor's angle."""
+    euler: bool
+    """The paper's transition in place of the exact one."""
 
 
-class FilterMatrices(NamedTuple):
-    """Everything that one step of the imbalance filter multiplies with, at one speed."""
-
-    speed: float
-    """W that they belong to, rad/s."""
-    transition: FloatArray
-    """Shape (6, 6): the state one step later."""
-    process: FloatArray
-    """Shape (6, 6): covariance that the process noise adds in one step."""
-    observation: FloatArray
-    """Shape (4, 6): what the sensor would show of a state."""
+IMBALANCE_FILTER: Final = np.dtype(
+    [
+        ("state", np.float64, (6,)),  # z, v and the imbalance along x and y; v is z' while the masses rest
+        ("covariance", np.float64, (6, 6)),
+        ("speed", np.float64),  # W that the matrices belong to, rad/s
+        ("transition", np.float64, (6, 6)),  # to the state one step later
+        ("process", np.float64, (6, 6)),  # covariance that the process noise adds in one step
+        ("observation", np.float64, (4, 6)),  # what the sensor would show of a state
+        ("half", np.float64, (6, 6)),  # room for products
+        ("cross", np.float64, (6,)),
+    ]
+)
+"""The estimate, and everything that one step of the filter multiplies with."""
 
 
 @compiled
-def whirl_transition(model: WhirlModel, angular_velocity: float, step: float) -> FloatArray:
+def _write_transition(model: WhirlModel, angular_velocity: float, step: float, out: FloatArray) -> None:
     """The state one step later, exactly: exp(A dt) in closed form.
 
     The whirl is an oscillator in the fixed frame, seen from the rotor; the imbalance adds what lies between
     the steady whirl and where the oscillator would take it.
-    Returns: Transition, shape (6, 6).
     Source: solution of Eq. 13 of the paper on eccentric masses.
     """
     mass, damping, stiffness = model
@@ -102,67 +118,79 @@ def whirl_transition(model: WhirlModel, angular_velocity: float, step: float) ->
     e11 = turn * complex(c - half * s, -w * s)
     gain = w * w / complex(stiffness - mass * w * w, damping * w)
     blocks = ((e00, e01, (1 - e00) * gain), (e10, e11, -e10 * gain))
-    found = np.zeros((6, 6))
+    _write_identity(out)
     for i in range(2):
         for k in range(3):
             value = blocks[i][k]
-            found[2 * i, 2 * k] = found[2 * i + 1, 2 * k + 1] = value.real
-            found[2 * i, 2 * k + 1] = -value.imag
-            found[2 * i + 1, 2 * k] = value.imag
-    found[4, 4] = found[5, 5] = 1.0
-    return found
+            out[2 * i, 2 * k] = out[2 * i + 1, 2 * k + 1] = value.real
+            out[2 * i, 2 * k + 1] = -value.imag
+            out[2 * i + 1, 2 * k] = value.imag
 
 
-@compiled
-def _euler_transition(model: WhirlModel, angular_velocity: float, step: float) -> FloatArray:
-    """The paper's transition I + A dt, shape (6, 6), which keeps the steady whirl but not the way there.
+def whirl_transition(model: WhirlModel, angular_velocity: float, step: float) -> FloatArray:
+    """exp(A dt) of the filter's state, shape (6, 6)."""
+    out = np.empty((6, 6))
+    _write_transition(model, angular_velocity, step, out)
+    return out
+
+
+@in_place
+def _write_identity(out: FloatArray) -> None:
+    for i in range(out.shape[0]):
+        for k in range(6):
+            out[i, k] = 1.0 if i == k else 0.0
+
+
+@in_place
+def _write_euler_transition(model: WhirlModel, angular_velocity: float, step: float, out: FloatArray) -> None:
+    """The paper's transition I + A dt, which keeps the steady whirl but not the way there.
 
     Source: Eq. 14 of the paper on eccentric masses.
     """
     mass, damping, stiffness = model
     w = angular_velocity
-    found = np.zeros((6, 6))
-    for i in range(6):
-        found[i, i] = 1.0
-    found[0, 2] = found[1, 3] = step
-    found[2, 0] = found[3, 1] = (w * w - stiffness / mass) * step
-    found[2, 1], found[3, 0] = damping * w / mass * step, -damping * w / mass * step
-    found[2, 2] = found[3, 3] = 1.0 - damping / mass * step
-    found[2, 3], found[3, 2] = 2 * w * step, -2 * w * step
-    found[2, 4] = found[3, 5] = w * w / mass * step
-    return found
+    _write_identity(out)
+    out[0, 2] = out[1, 3] = step
+    out[2, 0] = out[3, 1] = (w * w - stiffness / mass) * step
+    out[2, 1], out[3, 0] = damping * w / mass * step, -damping * w / mass * step
+    out[2, 2] = out[3, 3] = 1.0 - damping / mass * step
+    out[2, 3], out[3, 2] = 2 * w * step, -2 * w * step
+    out[2, 4] = out[3, 5] = w * w / mass * step
 
 
 @compiled
-def _process_covariance(
-    model: WhirlModel, noise: ProcessNoise, angular_velocity: float, step: float
-) -> FloatArray:
-    """Covariance that white noise builds up within one step.
+def _write_process(settings: FilterSettings, angular_velocity: float, out: FloatArray) -> None:
+    """Covariance that white noise builds up within one step, positive semidefinite.
 
     Integral of E(s) diag(0, 0, q_a, q_a, q_m, q_m) E(s)^T over 0 to dt, by eight Gauss points.
-    Returns: Covariance, shape (6, 6), positive semidefinite.
     Source: Van Loan, "Computing integrals involving the matrix exponential", IEEE Trans. Automat. Contr. 23
     (1978), whose integral this is; in place of the paper's diag(O randn), which is no covariance.
     """
-    power = np.zeros((6, 6))
-    power[2, 2] = power[3, 3] = noise.acceleration
-    power[4, 4] = power[5, 5] = noise.imbalance
-    found = np.zeros((6, 6))
-    for i in range(_GAUSS_POINTS.size):
-        part = whirl_transition(model, angular_velocity, 0.5 * step * (1.0 + _GAUSS_POINTS[i]))
-        grown, weight = _sandwich(part, power), 0.5 * step * _GAUSS_WEIGHTS[i]
-        # An element at a time: numba compiles expressions of arrays ten times as long.
-        for j in range(6):
-            for k in range(6):
-                found[j, k] += weight * grown[j, k]
-    return found
-
-
-@compiled
-def _sandwich(a: FloatArray, p: FloatArray) -> FloatArray:
-    """A P A^T, symmetric to the last bit, by plain sums: too small for a library call to pay."""
-    half, full = np.zeros((6, 6)), np.zeros((6, 6))
+    part, half, grown, step = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 6)), settings.step
     for i in range(6):
+        for k in range(6):
+            out[i, k] = 0.0
+    for point in range(_GAUSS_POINTS.size):
+        time = 0.5 * step * (1.0 + _GAUSS_POINTS[point])
+        _write_transition(settings.model, angular_velocity, time, part)
+        # An element at a time, here and below: numba compiles expressions of arrays ten times as long.
+        for i in range(6):
+            for k in range(6):
+                grown[i, k] = 0.0
+        grown[2, 2] = grown[3, 3] = settings.acceleration_noise
+        grown[4, 4] = grown[5, 5] = settings.imbalance_noise
+        _sandwich(part, grown, half)
+        for i in range(6):
+            for k in range(6):
+                out[i, k] += 0.5 * step * _GAUSS_WEIGHTS[point] * grown[i, k]
+
+
+@in_place
+def _sandwich(a: FloatArray, p: FloatArray, half: FloatArray) -> None:
+    """P <- A P A^T, symmetric to the last bit, by plain sums: too small for a library call to pay."""
+    for i in range(6):
+        for k in range(6):
+            half[i, k] = 0.0
         for j in range(6):
             for k in range(6):
                 half[i, k] += a[i, j] * p[j, k]
@@ -171,57 +199,57 @@ def _sandwich(a: FloatArray, p: FloatArray) -> FloatArray:
             total = 0.0
             for k in range(6):
                 total += half[i, k] * a[j, k]
-            full[i, j] = full[j, i] = total
-    return full
+            p[i, j] = p[j, i] = total
 
 
 @compiled
-def _sensor_matrix(angular_velocity: float, laboratory: bool) -> FloatArray:
-    """What a displacement and a velocity sensor show of the state.
+def set_speed(known: Record, settings: FilterSettings, speed: float) -> None:
+    """Write the matrices at a speed, rad/s, into an element of type `IMBALANCE_FILTER`.
 
     A laboratory sensor shows Z' = (z' + j W z) exp(j W t); turned back by the rotor's angle, which leaves the
     noise as it is, that is z' + j W z.  A rotor-fixed sensor shows z'.
-    Args: `laboratory`: whether the sensor stands still, its sample turned back by the rotor's angle.
-    Returns: H, shape (4, 6); the printed one lets the imbalance into the last row, where it is not seen.
-    Source: Eq. 17 of the paper on eccentric masses, corrected.
+    Source: Eq. 17 of the paper on eccentric masses, corrected: as printed it lets the imbalance into the last
+        row, where it is not seen.
     """
-    found = np.zeros((4, 6))
+    known.speed = speed
+    if settings.euler:
+        _write_euler_transition(settings.model, speed, settings.step, known.transition)
+    else:
+        _write_transition(settings.model, speed, settings.step, known.transition)
+    _write_process(settings, speed, known.process)
+    _write_identity(known.observation)
+    if settings.laboratory:
+        known.observation[2, 1], known.observation[3, 0] = -speed, speed
+
+
+@in_place
+def begin_whirl(known: Record, settings: FilterSettings) -> None:
+    """Before the first sample nothing moves; the imbalance is kept."""
+    position, velocity, _ = settings.start
     for i in range(4):
-        found[i, i] = 1.0
-    if laboratory:
-        found[2, 1], found[3, 0] = -angular_velocity, angular_velocity
-    return found
+        known.state[i] = 0.0
+        for k in range(6):
+            known.covariance[i, k] = known.covariance[k, i] = 0.0
+    known.covariance[0, 0] = known.covariance[1, 1] = position * position
+    known.covariance[2, 2] = known.covariance[3, 3] = velocity * velocity
 
 
 @compiled
-def filter_matrices(
-    model: WhirlModel,
-    noise: ProcessNoise,
-    angular_velocity: float,
-    step: float,
-    laboratory: bool,
-    euler: bool,
-) -> FilterMatrices:
-    """All matrices of the imbalance filter at one speed, of a sensor that turns or stands still."""
-    exact = whirl_transition(model, angular_velocity, step)
-    return FilterMatrices(
-        angular_velocity,
-        _euler_transition(model, angular_velocity, step) if euler else exact,
-        _process_covariance(model, noise, angular_velocity, step),
-        _sensor_matrix(angular_velocity, laboratory),
-    )
+def begin_filter(known: Record, settings: FilterSettings, speed: float) -> None:
+    """Before the first sample, at a speed, rad/s: nothing moves and nothing is out of balance.
+
+    Args: `known`: an element of type `IMBALANCE_FILTER`, of zeros.
+    """
+    begin_whirl(known, settings)
+    known.covariance[4, 4] = known.covariance[5, 5] = settings.start[2] * settings.start[2]
+    set_speed(known, settings, speed)
 
 
-Pair = tuple[float, float]
-
-
-class ImbalanceEstimate(NamedTuple):
-    """Estimate of the imbalance filter."""
-
-    state: FloatArray
-    """Shape (6,): z, v and the imbalance along x and y, rotor-fixed; v is z' while the masses rest."""
-    covariance: FloatArray
-    """Shape (6, 6)."""
+def imbalance_filter(settings: FilterSettings, *, speed: float) -> Records:
+    """A filter before its first sample, type `IMBALANCE_FILTER`, shape (1,)."""
+    known = np.zeros(1, dtype=IMBALANCE_FILTER)
+    begin_filter(known[0], settings, speed)
+    return known
 
 
 class MassInput(NamedTuple):
@@ -231,20 +259,19 @@ class MassInput(NamedTuple):
     """p + C_B p'/(M W^2), mean over the step."""
     drift: complex
     """Integral of p'/M over the step, m."""
-    covariance: FloatArray
-    """That the encoders' angles give the imbalance, shape (2, 2)."""
+    covariance: tuple[float, float, float]
+    """That the encoders' angles give the imbalance, xx, xy and yy."""
     drift_variance: float
     """That the encoders' rates give each coordinate of the drift, m^2."""
 
 
-@compiled
 def locked_masses(imbalance: complex) -> MassInput:
     """Masses at rest at angles that are known exactly."""
-    return MassInput(imbalance, 0.0j, np.zeros((2, 2)), 0.0)
+    return MassInput(imbalance, 0.0j, (0.0, 0.0, 0.0), 0.0)
 
 
-@compiled
-def mass_vector(moment: float, angle: Pair, rate: Pair) -> tuple[complex, complex]:
+@in_place
+def mass_vector(moment: float, angle: Numbers, rate: Numbers) -> tuple[complex, complex]:
     """p = b sum exp(j phi_i), kg m, and its time derivative."""
     place, pace = 0.0j, 0.0j
     for i in range(2):
@@ -254,172 +281,134 @@ def mass_vector(moment: float, angle: Pair, rate: Pair) -> tuple[complex, comple
     return place, pace
 
 
-@compiled
-def encoder_covariance(moment: float, angle: Pair, deviation: float) -> FloatArray:
-    """Of p, from encoders with this standard deviation, kg^2 m^2, shape (2, 2)."""
-    found = np.zeros((2, 2))
+@in_place
+def encoder_covariance(moment: float, angle: Numbers, deviation: float) -> tuple[float, float, float]:
+    """Of p, from encoders with this standard deviation, xx, xy and yy, kg^2 m^2."""
+    xx, xy, yy = 0.0, 0.0, 0.0
     for i in range(2):
         x, y = -moment * deviation * math.sin(angle[i]), moment * deviation * math.cos(angle[i])
-        found[0, 0] += x * x
-        found[1, 1] += y * y
-        found[0, 1] += x * y
-    found[1, 0] = found[0, 1]
-    return found
+        xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
+    return xx, xy, yy
 
 
-@compiled
-def predict(estimate: ImbalanceEstimate, matrices: FilterMatrices, masses: MassInput) -> ImbalanceEstimate:
+@in_place
+def predict(known: Record, masses: MassInput) -> None:
     """Carry the estimate one step on; the drift acts half at its beginning and half at its end.
 
     Source: Eqs. 14 and 15 of the paper on eccentric masses, with the whole force of moving masses.
     """
-    x, a = estimate.state, matrices.transition
-    drive = x.copy()
-    drive[0] -= 0.5 * masses.drift.real
-    drive[1] -= 0.5 * masses.drift.imag
-    drive[4] += masses.imbalance.real
-    drive[5] += masses.imbalance.imag
-    state = np.zeros(6)
+    x, a, p, (xx, xy, yy) = known.state, known.transition, known.covariance, masses.covariance
+    drive = (
+        x[0] - 0.5 * masses.drift.real,
+        x[1] - 0.5 * masses.drift.imag,
+        x[2],
+        x[3],
+        x[4] + masses.imbalance.real,
+        x[5] + masses.imbalance.imag,
+    )
     for i in range(4):
+        x[i] = 0.0
         for k in range(6):
-            state[i] += a[i, k] * drive[k]
-    state[0] -= 0.5 * masses.drift.real
-    state[1] -= 0.5 * masses.drift.imag
-    state[4], state[5] = x[4], x[5]
-    covariance = _sandwich(a, estimate.covariance)
-    # An element at a time, here and below: numba compiles expressions of arrays ten times as long.
+            x[i] += a[i, k] * drive[k]
+    x[0] -= 0.5 * masses.drift.real
+    x[1] -= 0.5 * masses.drift.imag
+    _sandwich(a, p, known.half)
     for i in range(6):
         for k in range(6):
-            covariance[i, k] += matrices.process[i, k]
+            p[i, k] += known.process[i, k]
     for i in range(4):
         for k in range(4):
-            for m in range(2):
-                for n in range(2):
-                    covariance[i, k] += a[i, 4 + m] * masses.covariance[m, n] * a[k, 4 + n]
-    covariance[0, 0] += masses.drift_variance
-    covariance[1, 1] += masses.drift_variance
-    return ImbalanceEstimate(state, covariance)
+            p[i, k] += a[i, 4] * xx * a[k, 4]
+            p[i, k] += a[i, 4] * xy * a[k, 5]
+            p[i, k] += a[i, 5] * xy * a[k, 4]
+            p[i, k] += a[i, 5] * yy * a[k, 5]
+    p[0, 0] += masses.drift_variance
+    p[1, 1] += masses.drift_variance
 
 
-@compiled
-def correct(
-    estimate: ImbalanceEstimate, matrices: FilterMatrices, sample: FloatArray, variance: FloatArray
-) -> tuple[ImbalanceEstimate, float]:
+@in_place
+def correct(known: Record, sample: Numbers, variance: Numbers) -> float:
     """Take in one sample, one sensor after the other, in Joseph's form, and square its innovation.
 
     The latter, normalised, has a chi-square distribution of four degrees of freedom, independent of earlier
     samples, when the model is right.
 
     P+ = (I - k h) P (I - k h)^T + r k k^T stays symmetric and positive whatever rounding does to the gain.
+    Args: `sample`, `variance`: x, y, x', y' and those of their sensors.
     Source: Eqs. 16 to 21 of the paper on eccentric masses; Bucy and Joseph, "Filtering for Stochastic
     Processes with Applications to Guidance" (1968).
     """
-    state, covariance = estimate.state.copy(), estimate.covariance.copy()
-    cross_covariance, surprise = np.zeros(6), 0.0
+    state, p, cross, surprise = known.state, known.covariance, known.cross, 0.0
     for m in range(4):
-        h, r = matrices.observation[m], variance[m]
+        h, r = known.observation[m], variance[m]
         innovation, total = sample[m], r
         for i in range(6):
             innovation -= h[i] * state[i]
-            cross_covariance[i] = 0.0
+            cross[i] = 0.0
             for k in range(6):
-                cross_covariance[i] += covariance[i, k] * h[k]
-            total += h[i] * cross_covariance[i]
+                cross[i] += p[i, k] * h[k]
+            total += h[i] * cross[i]
         if total > 0 and math.isfinite(innovation):
             surprise += innovation * innovation / total
             for i in range(6):
-                state[i] += cross_covariance[i] / total * innovation
-            _joseph(covariance, total, h, cross_covariance, r)
-    return ImbalanceEstimate(state, covariance), surprise
+                state[i] += cross[i] / total * innovation
+            _joseph(p, total, h, cross, r)
+    return surprise
 
 
-@compiled
-def _joseph(p: FloatArray, total: float, h: FloatArray, cross_covariance: FloatArray, r: float) -> None:
-    """P <- (I - k h) P (I - k h)^T + r k k^T in place; `cross_covariance` is P h^T, k that over `total`."""
+@in_place
+def _joseph(p: FloatArray, total: float, h: FloatArray, cross: FloatArray, r: float) -> None:
+    """P <- (I - k h) P (I - k h)^T + r k k^T in place; `cross` is P h^T, k that over `total`."""
     for i in range(6):
-        seen, gain = 0.0, cross_covariance[i] / total
+        seen, gain = 0.0, cross[i] / total
         for k in range(6):
-            p[i, k] -= gain * cross_covariance[k]
+            p[i, k] -= gain * cross[k]
             seen += p[i, k] * h[k]
         for k in range(6):
-            p[i, k] += (r * gain - seen) * cross_covariance[k] / total
+            p[i, k] += (r * gain - seen) * cross[k] / total
     for i in range(6):
         for k in range(i):
             p[i, k] = p[k, i] = 0.5 * (p[i, k] + p[k, i])
 
 
-@compiled
-def turned_back(sample: FloatArray, rotor_angle: float) -> FloatArray:
-    """A laboratory sensor's sample along the rotor's axes; the velocity is still seen from outside."""
-    c, s = math.cos(rotor_angle), math.sin(rotor_angle)
-    return np.array(
-        [
-            c * sample[0] + s * sample[1],
-            c * sample[1] - s * sample[0],
-            c * sample[2] + s * sample[3],
-            c * sample[3] - s * sample[2],
-        ]
-    )
-
-
-@compiled
+@in_place
 def imbalance_deviation(covariance: FloatArray) -> float:
     """Largest standard deviation of the imbalance in any direction, kg m."""
     a, b, c = covariance[4, 4], covariance[4, 5], covariance[5, 5]
     return math.sqrt(max(0.5 * (a + c) + math.hypot(0.5 * (a - c), b), 0.0))
 
 
-@compiled
-def start_estimate(position: float, velocity: float, imbalance: float) -> ImbalanceEstimate:
-    """Initial estimate, before the first sample: nothing moves and nothing is out of balance."""
-    covariance = np.zeros((6, 6))
-    covariance[0, 0] = covariance[1, 1] = position * position
-    covariance[2, 2] = covariance[3, 3] = velocity * velocity
-    covariance[4, 4] = covariance[5, 5] = imbalance * imbalance
-    return ImbalanceEstimate(np.zeros(6), covariance)
-
-
 def imbalance_history(
-    start: ImbalanceEstimate,
-    *,
-    matrices: FilterMatrices,
-    samples: FloatArray,
-    variance: FloatArray,
-    masses: MassInput | None = None,
+    known: Records, *, samples: FloatArray, variance: FloatArray, masses: MassInput | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Run the filter over a record: predict, then take in the sample, for each.
+    """Run a filter over a record: predict, then take in the sample, for each.
 
-    Args: `start`: one step before the first sample.
+    Args: `known`: type `IMBALANCE_FILTER`, shape (1,), one step before the first sample; not changed.
     Returns: States, shape (n, 6), and covariances, shape (n, 6, 6), after each sample.
     Raises: ValueError: a rotor at rest, which shows no imbalance.
     Source: section 3.1 of the paper on eccentric masses.
     """
-    if matrices.speed == 0:
+    if known["speed"][0] == 0:
         raise ValueError("a rotor at rest shows no imbalance: the speed must not be zero")
-    return _history(
-        start,
-        matrices,
-        np.ascontiguousarray(samples, dtype=np.float64),
-        variance,
-        masses or locked_masses(0.0j),
-    )
+    states, covariances = np.empty((len(samples), 6)), np.empty((len(samples), 6, 6))
+    seen = np.ascontiguousarray(samples, dtype=np.float64)
+    _history(known.copy()[0], seen, variance, masses or locked_masses(0.0j), states, covariances)
+    return states, covariances
 
 
-@compiled
+@in_place
 def _history(
-    start: ImbalanceEstimate,
-    matrices: FilterMatrices,
+    known: Record,
     samples: FloatArray,
     variance: FloatArray,
     masses: MassInput,
-) -> tuple[FloatArray, FloatArray]:
-    count = samples.shape[0]
-    states, covariances = np.zeros((count, 6)), np.zeros((count, 6, 6))
-    estimate = start
-    for i in range(count):
-        estimate, _ = correct(predict(estimate, matrices, masses), matrices, samples[i], variance)
+    states: FloatArray,
+    covariances: FloatArray,
+) -> None:
+    for i in range(samples.shape[0]):
+        predict(known, masses)
+        correct(known, samples[i], variance)
         for j in range(6):
-            states[i, j] = estimate.state[j]
+            states[i, j] = known.state[j]
             for k in range(6):
-                covariances[i, j, k] = estimate.covariance[j, k]
-    return states, covariances
+                covariances[i, j, k] = known.covariance[j, k]

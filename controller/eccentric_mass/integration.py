@@ -11,13 +11,11 @@ from __future__ import annotations
 
 import cmath
 import math
-import time
 from collections.abc import Iterator
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import Progress
 from ringbalance.controller.eccentric_mass.plant import (
     HELD,
     LOCKED,
@@ -25,15 +23,13 @@ from ringbalance.controller.eccentric_mass.plant import (
     SLIDING,
     STUCK,
     Drive,
+    Motions,
     PlantParameters,
     angular_accelerations,
     drive_of,
     loads,
     motions,
-    rest_state,
     slips,
-    speed_at,
-    stuck_flags,
     write_derivative,
 )
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
@@ -75,7 +71,7 @@ def _smooth(
     state: FloatArray,
     speed: float,
     drive: Drive,
-    motion: tuple[int, int],
+    motion: Motions,
     step: float,
     work: FloatArray,
     out: FloatArray,
@@ -107,18 +103,17 @@ def _broken(
     stuck: IntArray,
     speed: float,
     drive: Drive,
-    motion: tuple[int, int],
+    motion: Motions,
 ) -> bool:
     """Whether a mass no longer moves, or is no longer held, as `motion` says."""
     if motion[0] * state[6] < 0.0 or motion[1] * state[7] < 0.0:
         return True
-    held_1 = motion[0] == HELD and stuck[0] != LOCKED
-    held_2 = motion[1] == HELD and stuck[1] != LOCKED
-    if not held_1 and not held_2:
+    held = (motion[0] == HELD and stuck[0] != LOCKED, motion[1] == HELD and stuck[1] != LOCKED)
+    if not (held[0] or held[1]):
         return False
     torques = loads(parameters, state, speed, drive).torques
-    one, two = angular_accelerations(torques, motion[0], motion[1])
-    return (held_1 and slips(torques, 0, two)) or (held_2 and slips(torques, 1, one))
+    one, two = angular_accelerations(torques, motion)
+    return (held[0] and slips(torques, 0, two)) or (held[1] and slips(torques, 1, one))
 
 
 @compiled
@@ -128,7 +123,7 @@ def _first_event(
     stuck: IntArray,
     speed: float,
     drive: Drive,
-    motion: tuple[int, int],
+    motion: Motions,
     step: float,
     work: FloatArray,
     out: FloatArray,
@@ -295,14 +290,10 @@ def _hold_surely(
 ) -> bool:
     """Whether friction holds both masses against drive, steady whirl and any deviation of that size."""
     for i in range(2):
-        if stuck[i] == LOCKED:
-            continue
-        torque, arm = drive.torque_1, parameters.friction_arm_1
-        if i == 1:
-            torque, arm = drive.torque_2, parameters.friction_arm_2
         across = steady.imag * math.cos(state[4 + i]) - steady.real * math.sin(state[4 + i])
-        load = abs(torque + parameters.moment * speed * speed * across) + parameters.moment * pull
-        if not load <= arm * parameters.moment * speed * speed:
+        most = parameters.friction_arm[i] * parameters.moment * speed * speed
+        load = abs(drive.torque[i] + parameters.moment * speed * speed * across) + parameters.moment * pull
+        if stuck[i] != LOCKED and not load <= most:
             return False
     return math.isfinite(pull)
 
@@ -371,90 +362,12 @@ def _fault(scene: EccentricScene, key: tuple[str, str], value: str, problem: str
     return Fault(file=scene.file, table=key[0], key=key[1], value=value, problem=problem, allowed=allowed)
 
 
-_FIRST: Final = 64
-_MOST: Final = 10_000
-_SHORT: Final = 0.05
-"""A piece that took less is followed by one of twice the samples, s."""
-_LONG: Final = 0.2
-"""A piece that took more is followed by one of half the samples, s."""
+_PIECE: Final = 50_000
+"""Substeps of a piece, some 0.1 s."""
 
 
-class _PlantRun(NamedTuple):
-    """History of the plant."""
-
-    time: FloatArray
-    """s, shape (steps + 1,)."""
-    speed: FloatArray
-    """W, rad/s, shape (steps + 1,)."""
-    state: FloatArray
-    """Shape (steps + 1, 8)."""
-
-    @property
-    def amplitude(self) -> FloatArray:
-        """Zero-to-peak vibration sqrt(x^2 + y^2), m, shape (steps + 1,)."""
-        amplitude: FloatArray = np.hypot(self.state[:, 0], self.state[:, 1])
-        return amplitude
-
-
-@compiled
-def _run_steps(
-    parameters: PlantParameters,
-    times: FloatArray,
-    speeds: FloatArray,
-    state: FloatArray,
-    stuck: IntArray,
-    commands: FloatArray,
-    step: float,
-    first: int = 0,
-) -> tuple[FloatArray, IntArray]:
-    """States, shape (steps + 1, 8), and flags, shape (steps + 1, 2), over steps of equal length."""
-    count = commands.shape[0]
-    states, flags = np.empty((count + 1, state.size)), np.empty((count + 1, 2), np.int64)
-    for place in range(count + 1):
-        for entry in range(state.size):
-            states[place, entry] = state[entry]
-        flags[place, 0], flags[place, 1] = stuck[0], stuck[1]
-        if place < count:
-            speed, rate = speed_at(times, speeds, (first + place) * step)
-            state, stuck = plant_step(parameters, state, stuck, commands[place], speed, rate, step)
-    return states, flags
-
-
-def run_plant(scene: EccentricScene, *, locked: bool = False, progress: Progress | None = None) -> _PlantRun:
-    """Run a scene's plant from rest, with its drives switched off.
-
-    Args: `locked`: whether both masses are clamped to the track. `progress`: called several times a second;
-    None for silence.
-    Raises: SceneError: a run that takes too many substeps.
-    """
-    check_substeps(scene)
-    step, count = scene.sensor.step, scene.samples - 1
-    times, speeds = scene.rotor.profile
-    parameters, flags = PlantParameters.of(scene), stuck_flags(LOCKED if locked else STUCK)
-    states = np.empty((count + 1, SIZE))
-    states[0] = rest_state(scene.masses.initial_angle)
-    for begin, end in stretches(count):
-        off = np.zeros((end - begin, 2))
-        states[begin : end + 1], passed = _run_steps(
-            parameters, times, speeds, states[begin], flags, off, step, begin
-        )
-        flags = passed[-1]
-        if progress is not None:
-            progress(end * step, scene.run.time_limit)
-    elapsed: FloatArray = np.arange(len(states), dtype=np.float64) * step
-    return _PlantRun(elapsed, np.interp(elapsed, times, speeds), states)
-
-
-def stretches(samples: int) -> Iterator[tuple[int, int]]:
-    """Pieces of the samples by the caller's time for each: its first number and one past its last."""
-    begin, size = 0, _FIRST
-    while begin < samples:
-        end = min(begin + size, samples)
-        started = time.perf_counter()
-        yield begin, end
-        elapsed = time.perf_counter() - started
-        if elapsed > _LONG:
-            size = max(size // 2, 1)
-        elif elapsed < _SHORT:
-            size = min(2 * size, _MOST)
-        begin = end
+def stretches(scene: EccentricScene) -> Iterator[tuple[int, int]]:
+    """Pieces of a run's samples between which the caller hears of it: first number and one past the last."""
+    size = max(1, round(_PIECE * scene.samples / _substeps(scene)))
+    for begin in range(0, scene.samples, size):
+        yield begin, min(begin + size, scene.samples)

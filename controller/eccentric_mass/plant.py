@@ -44,7 +44,11 @@ import numpy as np
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, Motor
 from ringbalance.physics.balancing import amplification_factor, critical_speed
 from ringbalance.scene.arrays import FloatArray, IntArray
-from ringbalance.scene.platform.compiled import compiled
+from ringbalance.scene.platform.compiled import in_place
+
+Pair = tuple[float, float]
+"""A number of each mass."""
+Motions = tuple[int, int]
 
 
 class PlantParameters(NamedTuple):
@@ -70,10 +74,8 @@ class PlantParameters(NamedTuple):
     """Back-emf reflected to phi, N m s."""
     drive_gain: float
     """Torque on a mass per motor voltage, N m/V."""
-    friction_arm_1: float
-    """mu_f of the first mass, m."""
-    friction_arm_2: float
-    """mu_f of the second mass, m."""
+    friction_arm: Pair
+    """mu_f of each mass, m."""
     gear_ratio: float
     """Turns of the motor per turn of the mass, N_3 / N_1."""
     back_emf_constant: float
@@ -128,8 +130,7 @@ class PlantParameters(NamedTuple):
             drive_inertia=_reflected_inertia(motor),
             drive_damping=motor.torque_constant * motor.back_emf_constant / motor.resistance * ratio**2,
             drive_gain=motor.torque_constant / motor.resistance * ratio,
-            friction_arm_1=masses.friction_arm[0],
-            friction_arm_2=masses.friction_arm[1],
+            friction_arm=masses.friction_arm,
             gear_ratio=ratio,
             back_emf_constant=motor.back_emf_constant,
             resistance=motor.resistance,
@@ -156,7 +157,7 @@ def _reflected_inertia(motor: Motor) -> float:
     return (motor.motor_inertia + motor.gear_inertia * (first / second) ** 2) * (third / first) ** 2
 
 
-@compiled
+@in_place
 def speed_at(times: FloatArray, speeds: FloatArray, time: float) -> tuple[float, float]:
     """W, rad/s, and W', rad/s^2, just after a time; constant before the first corner and after the last."""
     if time < times[0]:
@@ -168,7 +169,7 @@ def speed_at(times: FloatArray, speeds: FloatArray, time: float) -> tuple[float,
     return speeds[-1], 0.0
 
 
-@compiled
+@in_place
 def turned(times: FloatArray, speeds: FloatArray, time: float) -> float:
     """Angle of the rotor, the integral of its speed from time zero. Returns: rad, not wrapped."""
     angle: float = speeds[0] * min(time, times[0])
@@ -204,24 +205,20 @@ class _Torques(NamedTuple):
     """J + J_add - b^2 / M, kg m^2."""
     cross: float
     """-b^2 / M cos(phi_1 - phi_2), kg m^2."""
-    driving_1: float
-    """g of the first mass, all torques but friction, N m."""
-    driving_2: float
-    """g of the second mass, N m."""
-    friction_1: float
-    """mu_f b (W + phi')^2 of the first mass, N m."""
-    friction_2: float
-    """mu_f b (W + phi')^2 of the second mass, N m."""
+    driving: Pair
+    """g of each mass, all torques but friction, N m."""
+    friction: Pair
+    """mu_f b (W + phi')^2 of each mass, N m."""
 
 
-@compiled
-def angular_accelerations(torques: _Torques, first: int, second: int) -> tuple[float, float]:
-    """Solve for phi'' of both masses in given motions. Returns: phi_1'' and phi_2'', rad/s^2."""
-    net_1 = torques.driving_1 - first * torques.friction_1
-    net_2 = torques.driving_2 - second * torques.friction_2
-    if first == HELD:
-        return 0.0, 0.0 if second == HELD else net_2 / torques.own
-    if second == HELD:
+@in_place
+def angular_accelerations(torques: _Torques, motion: Motions) -> Pair:
+    """phi'' of both masses in given motions, rad/s^2."""
+    net_1 = torques.driving[0] - motion[0] * torques.friction[0]
+    net_2 = torques.driving[1] - motion[1] * torques.friction[1]
+    if motion[0] == HELD:
+        return 0.0, 0.0 if motion[1] == HELD else net_2 / torques.own
+    if motion[1] == HELD:
         return net_1 / torques.own, 0.0
     determinant = torques.own * torques.own - torques.cross * torques.cross
     one = (torques.own * net_1 - torques.cross * net_2) / determinant
@@ -229,51 +226,45 @@ def angular_accelerations(torques: _Torques, first: int, second: int) -> tuple[f
     return one, two
 
 
-@compiled
+@in_place
 def slips(torques: _Torques, mass: int, other_acceleration: float) -> bool:
     """Whether a held mass breaks loose: |g - cross phi''_other| > mu_f b W^2."""
-    driving = torques.driving_1 if mass == 0 else torques.driving_2
-    most = torques.friction_1 if mass == 0 else torques.friction_2
-    return abs(driving - torques.cross * other_acceleration) > most * (1.0 + _ROUNDING)
+    load = abs(torques.driving[mass] - torques.cross * other_acceleration)
+    return load > torques.friction[mass] * (1.0 + _ROUNDING)
 
 
-@compiled
-def _consistent(torques: _Torques, first: int, second: int, loose_1: bool, loose_2: bool) -> bool:
+@in_place
+def _consistent(torques: _Torques, motion: Motions, loose: tuple[bool, bool]) -> bool:
     """Whether motions of masses at rest hold together; a mass that already moves is not asked."""
-    one, two = angular_accelerations(torques, first, second)
-    if loose_1 and first == HELD and slips(torques, 0, two):
-        return False
-    if loose_2 and second == HELD and slips(torques, 1, one):
-        return False
-    if loose_1 and first != HELD and first * one < 0.0:
-        return False
-    return not (loose_2 and second != HELD and second * two < 0.0)
+    acceleration = angular_accelerations(torques, motion)
+    for i in range(2):
+        if loose[i]:
+            slipping = motion[i] == HELD and slips(torques, i, acceleration[1 - i])
+            if slipping or motion[i] * acceleration[i] < 0.0:
+                return False
+    return True
 
 
-@compiled
-def _sliding(rate: float) -> int:
+@in_place
+def _moving(flag: int, rate: float) -> int:
+    """Which way a mass moves that is locked or has a rate."""
+    if flag == LOCKED or rate == 0.0:
+        return HELD
     return FORWARDS if rate > 0.0 else BACKWARDS
 
 
-@compiled
-def motions(torques: _Torques, state: FloatArray, stuck: IntArray) -> tuple[int, int]:
+@in_place
+def motions(torques: _Torques, state: FloatArray, stuck: IntArray) -> Motions:
     """Which way each mass moves, or that it is held: HELD, FORWARDS or BACKWARDS."""
-    loose_1 = stuck[0] != LOCKED and state[6] == 0.0
-    loose_2 = stuck[1] != LOCKED and state[7] == 0.0
-    known_1 = HELD if stuck[0] == LOCKED else _sliding(state[6])
-    known_2 = HELD if stuck[1] == LOCKED else _sliding(state[7])
-    for turn_1 in range(3):
-        first = (HELD, FORWARDS, BACKWARDS)[turn_1] if loose_1 else known_1
-        for turn_2 in range(3):
-            second = (HELD, FORWARDS, BACKWARDS)[turn_2] if loose_2 else known_2
-            if _consistent(torques, first, second, loose_1, loose_2):
-                return first, second
-            if not loose_2:
-                break
-        if not loose_1:
-            break
+    loose = (stuck[0] != LOCKED and state[6] == 0.0, stuck[1] != LOCKED and state[7] == 0.0)
+    known = (_moving(stuck[0], state[6]), _moving(stuck[1], state[7]))
+    for first in (HELD, FORWARDS, BACKWARDS):
+        for second in (HELD, FORWARDS, BACKWARDS):
+            motion = (first if loose[0] else known[0], second if loose[1] else known[1])
+            if _consistent(torques, motion, loose):
+                return motion
     # Only rounding can bring us here: the torques are at their bounds.
-    return (HELD if loose_1 else known_1), (HELD if loose_2 else known_2)
+    return known
 
 
 SIZE: Final = 8
@@ -286,10 +277,8 @@ class Drive(NamedTuple):
     """U cos phi_m, kg m."""
     unbalance_y: float
     """U sin phi_m, kg m."""
-    torque_1: float
-    """Of the first motor at standstill, B_add V, N m."""
-    torque_2: float
-    """Of the second motor at standstill, N m."""
+    torque: Pair
+    """Of each motor at standstill, B_add V, N m."""
     rate: float
     """W', rad/s^2, constant."""
 
@@ -305,26 +294,25 @@ class _Loads(NamedTuple):
     """Of the masses."""
 
 
-@compiled
+@in_place
 def _limited(voltage: float, maximum: float) -> float:
     """A voltage cut to what the supply can give, which may be infinite."""
     return min(max(voltage, -maximum), maximum)
 
 
-@compiled
+@in_place
 def drive_of(parameters: PlantParameters, command: FloatArray, rate: float) -> Drive:
     """Gather what acts on the plant from outside."""
-    most = parameters.maximum_voltage
+    most, gain = parameters.maximum_voltage, parameters.drive_gain
     return Drive(
         parameters.unbalance * math.cos(parameters.phase),
         parameters.unbalance * math.sin(parameters.phase),
-        parameters.drive_gain * _limited(command[0], most),
-        parameters.drive_gain * _limited(command[1], most),
+        (gain * _limited(command[0], most), gain * _limited(command[1], most)),
         rate,
     )
 
 
-@compiled
+@in_place
 def loads(parameters: PlantParameters, state: FloatArray, speed: float, drive: Drive) -> _Loads:
     """Forces on the rotor, and the masses' equations with the rotor's accelerations eliminated.
 
@@ -341,37 +329,33 @@ def loads(parameters: PlantParameters, state: FloatArray, speed: float, drive: D
     force_y += speed * speed * drive.unbalance_y - rate * drive.unbalance_x
     force_x -= parameters.damping * (state[2] - speed * state[1]) + parameters.stiffness * state[0]
     force_y -= parameters.damping * (state[3] + speed * state[0]) + parameters.stiffness * state[1]
-    lever = b / parameters.mass
-    common = parameters.inertia * rate
+    lever, common, drag = b / parameters.mass, parameters.inertia * rate, parameters.drive_damping
+    own_1 = drive.torque[0] - drag * state[6] - common
+    own_2 = drive.torque[1] - drag * state[7] - common
     torques = _Torques(
         parameters.inertia + parameters.drive_inertia - b * lever,
         -b * lever * (cos_1 * cos_2 + sin_1 * sin_2),
-        drive.torque_1
-        - parameters.drive_damping * state[6]
-        - common
-        - lever * (force_y * cos_1 - force_x * sin_1),
-        drive.torque_2
-        - parameters.drive_damping * state[7]
-        - common
-        - lever * (force_y * cos_2 - force_x * sin_2),
-        parameters.friction_arm_1 * b * square_1,
-        parameters.friction_arm_2 * b * square_2,
+        (
+            own_1 - lever * (force_y * cos_1 - force_x * sin_1),
+            own_2 - lever * (force_y * cos_2 - force_x * sin_2),
+        ),
+        (parameters.friction_arm[0] * b * square_1, parameters.friction_arm[1] * b * square_2),
     )
     return _Loads(force_x, force_y, torques)
 
 
-@compiled
+@in_place
 def write_derivative(
     parameters: PlantParameters,
     state: FloatArray,
     speed: float,
     drive: Drive,
-    motion: tuple[int, int],
+    motion: Motions,
     out: FloatArray,
 ) -> None:
     """Write the time derivative of the state for given motions of the masses."""
     found = loads(parameters, state, speed, drive)
-    one, two = angular_accelerations(found.torques, motion[0], motion[1])
+    one, two = angular_accelerations(found.torques, motion)
     b, rate = parameters.moment, drive.rate
     pull_x = b * (math.sin(state[4]) * one + math.sin(state[5]) * two)
     pull_y = b * (math.cos(state[4]) * one + math.cos(state[5]) * two)
@@ -397,7 +381,7 @@ def stuck_flags(flag: int) -> IntArray:
     return np.full(2, flag, dtype=np.int64)
 
 
-@compiled
+@in_place
 def electrical_energy(
     parameters: PlantParameters, before: FloatArray, after: FloatArray, command: FloatArray, step: float
 ) -> float:

@@ -12,20 +12,15 @@ import cmath
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.control_records import ImbalanceFilter
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
-    FilterMatrices,
-    ImbalanceEstimate,
-    MassInput,
-    ProcessNoise,
     WhirlModel,
-    filter_matrices,
+    imbalance_filter,
     imbalance_history,
-    start_estimate,
+    locked_masses,
     whirl_transition,
 )
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.settings import believed_whirl
+from ringbalance.controller.eccentric_mass.settings import filter_settings
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.origins import value_at, with_values_at
 from ringbalance.scene.uncertain import NORMAL_95
@@ -33,19 +28,6 @@ from ringbalance.scene.uncertain import NORMAL_95
 _LONGEST_STEPS = 2_000
 """Steps in which an estimation is repeated; with fewer than the filter takes, each carries less noise."""
 _INPUTS = ("rotor.mass", "rotor.stiffness", "rotor.damping", "masses.mass", "masses.guide_radius")
-
-
-def _start(told: ImbalanceFilter) -> ImbalanceEstimate:
-    return start_estimate(told.initial_position, told.initial_velocity, told.initial_unbalance)
-
-
-def _process_noise(told: ImbalanceFilter) -> ProcessNoise:
-    return ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2)
-
-
-def _variance(told: ImbalanceFilter, share: float) -> FloatArray:
-    """Of each sensor, times a share."""
-    return np.repeat([told.position_noise**2, told.velocity_noise**2], 2) * share
 
 
 def rotor_covariance(
@@ -63,12 +45,16 @@ def rotor_covariance(
         return found
     step = max(scene.imbalance_filter.step, duration / _LONGEST_STEPS)
     count = max(round(duration / step), 1)
-    told, laboratory = scene.imbalance_filter, scene.sensor.frame == "laboratory"
-    matrices = filter_matrices(believed_whirl(scene), _process_noise(told), speed, step, laboratory, False)
+    settings = filter_settings(scene)._replace(step=step, euler=False)
+    known, assumed = imbalance_filter(settings, speed=speed), scene.imbalance_filter
+    variance = np.repeat([assumed.position_noise**2, assumed.velocity_noise**2], 2) * (assumed.step / step)
 
     def estimated(plant: EccentricScene) -> FloatArray:
-        samples = _samples(plant, matrices, imbalance, begin=begin, step=step, count=count)
-        return _found(scene, matrices, samples, share=told.step / step)
+        whirls = _whirls(plant, imbalance, speed=speed, begin=begin, step=step, count=count)
+        samples = whirls @ known["observation"][0].T
+        masses = locked_masses(_place(scene))
+        states, _ = imbalance_history(known, samples=samples, variance=variance, masses=masses)
+        return np.asarray(states[-1, 4:6])
 
     middle = estimated(scene)
     for each in stated:
@@ -86,40 +72,19 @@ def _place(scene: EccentricScene) -> complex:
     return moment * sum(cmath.exp(1j * angle) for angle in scene.masses.initial_angle)
 
 
-def _samples(
-    plant: EccentricScene,
-    matrices: FilterMatrices,
-    imbalance: complex,
-    *,
-    begin: float,
-    step: float,
-    count: int,
+def _whirls(
+    plant: EccentricScene, imbalance: complex, *, speed: float, begin: float, step: float, count: int
 ) -> FloatArray:
-    """What the sensors show of a rotor that starts from rest, without noise, shape (n, 4)."""
+    """States of the filter's model for a rotor that starts from rest, shape (n, 6)."""
     rotor = plant.rotor
     model = WhirlModel(rotor.mass + 2 * plant.masses.mass, rotor.damping, rotor.stiffness)
     drive = imbalance + _place(plant)
     state = np.array([0.0, 0.0, 0.0, 0.0, drive.real, drive.imag])
     if begin > 0:
-        state = whirl_transition(model, matrices.speed, begin) @ state
-    onward = whirl_transition(model, matrices.speed, step)
+        state = whirl_transition(model, speed, begin) @ state
+    onward = whirl_transition(model, speed, step)
     states = np.empty((count, 6))
     for i in range(count):
         state = onward @ state
         states[i] = state
-    return np.asarray(states @ matrices.observation.T)
-
-
-def _found(
-    scene: EccentricScene, matrices: FilterMatrices, samples: FloatArray, *, share: float
-) -> FloatArray:
-    """The filter's imbalance at the end, shape (2,). Args: `share`: of the variance of one sample."""
-    told, place = scene.imbalance_filter, _place(scene)
-    states, _ = imbalance_history(
-        _start(told),
-        matrices=matrices,
-        samples=samples,
-        variance=_variance(told, share),
-        masses=MassInput(place, 0.0j, np.zeros((2, 2)), 0.0),
-    )
-    return np.asarray(states[-1, 4:6])
+    return states

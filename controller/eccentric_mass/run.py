@@ -9,15 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ringbalance.controller.balancer import Progress
-from ringbalance.controller.eccentric_mass.integration import check_substeps, plant_step, run_plant, stretches
-from ringbalance.controller.eccentric_mass.plan import (
+from ringbalance.controller.eccentric_mass.imbalance_filter import Record, Records
+from ringbalance.controller.eccentric_mass.integration import check_substeps, plant_step, stretches
+from ringbalance.controller.eccentric_mass.memory import (
+    HISTORY,
+    LOCKED_MASSES,
+    MEMORY,
     RELEASED,
-    Cause,
     EccentricMeasurement,
-    Findings,
-    StrategyState,
 )
 from ringbalance.controller.eccentric_mass.plant import (
+    LOCKED,
     STUCK,
     PlantParameters,
     electrical_energy,
@@ -26,13 +28,12 @@ from ringbalance.controller.eccentric_mass.plant import (
     stuck_flags,
     turned,
 )
-from ringbalance.controller.eccentric_mass.run_facts import Record
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
-from ringbalance.controller.eccentric_mass.step import strategy_start, strategy_step
+from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray
-from ringbalance.scene.platform.compiled import compiled
+from ringbalance.scene.platform.compiled import compiled, in_place
 
 Seed = int | np.random.Generator | None
 """Of random numbers, or these themselves."""
@@ -46,217 +47,142 @@ _LARGEST = 1e100
 """Of any number, whatever its unit, so that squares and products of what is kept are finite."""
 
 
-class _SensorNoise(NamedTuple):
-    """Standard deviations of the sensors."""
+class _Machine(NamedTuple):
+    """What is run beside the strategy."""
 
-    position: float
-    velocity: float
-    angle: float
-    rate: float
-
-
-class _Profile(NamedTuple):
-    """The rotor's speed over time."""
-
+    plant: PlantParameters
     times: FloatArray
-    """Of the corners, s."""
+    """Of the corners of the speed profile, s."""
     speeds: FloatArray
     """At the corners, rad/s."""
+    position_noise: float
+    """Standard deviation, as the others."""
+    velocity_noise: float
+    encoder_noise: float
+    encoder_rate_noise: float
+    locked: bool
+    """Whether the masses are clamped to the track, without drive and filter."""
+
+    @classmethod
+    def of(cls, scene: EccentricScene) -> _Machine:
+        sensor, (times, speeds) = scene.sensor, scene.rotor.profile
+        return cls(
+            plant=PlantParameters.of(scene),
+            times=times,
+            speeds=speeds,
+            position_noise=sensor.position_noise,
+            velocity_noise=sensor.velocity_noise,
+            encoder_noise=sensor.encoder_noise,
+            encoder_rate_noise=sensor.encoder_rate_noise,
+            locked=scene.supervisor.strategy == "locked",
+        )
 
 
 def _recorded(
-    scene: EccentricScene,
-    seed: Seed,
-    progress: Progress,
-    settings: StrategySettings,
-) -> tuple[Record, Findings, float | None]:
-    """Every sample before the first that means nothing, and what the strategy found.
-
-    Returns: Last, the mean square of the imbalance filter's normalised innovations; None without any.
-    """
-    samples = scene.samples
-    if scene.supervisor.strategy == "locked":
-        return _locked(scene, _empty_record(samples), progress), Findings(False, 0.0, np.inf, 0.0, 0, 0), None
-    numbers = np.random.default_rng(scene.run.seed if seed is None else seed)
-    return _driven(scene, settings, numbers.standard_normal((samples, NOISES)), progress)
-
-
-def _locked(scene: EccentricScene, record: Record, progress: Progress) -> Record:
-    """The masses clamped to the track, no drive, no filter."""
-    states = run_plant(scene, locked=True, progress=progress).state
-    record.state[:], record.goal[:] = states, states[:, 4:6]
-    record.cause[:], record.hold[:] = int(Cause.LOCKED), RELEASED
-    return _meaningful(record, scene)
-
-
-def _driven(
-    scene: EccentricScene, settings: StrategySettings, numbers: FloatArray, progress: Progress
-) -> tuple[Record, Findings, float | None]:
-    parameters, record = PlantParameters.of(scene), _empty_record(len(numbers))
-    state, stuck = rest_state(scene.masses.initial_angle), stuck_flags(STUCK)
-    profile, sensor = _Profile(*scene.rotor.profile), scene.sensor
-    noise = _SensorNoise(
-        sensor.position_noise, sensor.velocity_noise, sensor.encoder_noise, sensor.encoder_rate_noise
-    )
-    first = _measure(state, profile, 0.0, settings.laboratory, noise, numbers[0])
-    memory = strategy_start(settings, first)
-    for begin, end in stretches(len(numbers)):
-        memory, state, stuck = _run_stretch(
-            settings,
-            parameters,
-            profile,
-            noise,
-            numbers,
-            memory,
-            state,
-            stuck,
-            record,
-            begin,
-            end,
-        )
+    scene: EccentricScene, seed: Seed, progress: Progress, settings: StrategySettings
+) -> tuple[Records, Records]:
+    """Every sample before the first that means nothing, type `HISTORY`, and the strategy's memory at the end,
+    type `MEMORY`, shape (1,)."""
+    machine, count = _Machine.of(scene), scene.samples
+    history, memory = np.zeros(count, dtype=HISTORY), np.zeros(1, dtype=MEMORY)
+    random = np.random.default_rng(scene.run.seed if seed is None else seed)
+    numbers = random.standard_normal((count, NOISES))
+    state = rest_state(scene.masses.initial_angle)
+    stuck = stuck_flags(LOCKED if machine.locked else STUCK)
+    if not machine.locked:
+        begin_strategy(settings, memory[0], _measure(machine, settings, state, 0.0, numbers[0]))
+    for begin, end in stretches(scene):
+        state, stuck = _run_stretch(settings, machine, numbers, memory[0], state, stuck, history, begin, end)
         progress(end * settings.step, scene.run.time_limit)
-        kept = _meaningful(_cut(record, slice(end)), scene, since=begin)
-        if len(kept.state) < end:
-            record = kept
+        bad = np.flatnonzero(_diverged(history[begin:end], scene))
+        if bad.size:
+            # At the start everything rests.
+            history = history[: max(begin + int(bad[0]), 1)]
             break
-    whirl = memory.whirl
-    innovation = whirl.surprise / (4 * whirl.judged) if whirl.judged else None
-    return _shifted(record), memory.plan.findings, innovation
+    # The energy of the last sample's voltage would be spent after the run.
+    history["energy"] = np.concatenate([[0.0], history["energy"][:-1]])
+    return history, memory
 
 
-def _shifted(record: Record) -> Record:
-    """The energy of the last sample's voltage would be spent after the run."""
-    record.energy[1:] = record.energy[:-1]
-    record.energy[0] = 0.0
-    return record
-
-
-def _meaningful(record: Record, scene: EccentricScene, *, since: int = 0) -> Record:
-    """The rows before the first that has diverged.
-
-    Returns: The record when nothing in it has diverged; else a shorter one, of at least one row: at the start
-    everything rests.
-    """
-    bad = np.flatnonzero(_diverged(_cut(record, slice(since, None)), scene))
-    return _cut(record, slice(max(since + int(bad[0]), 1))) if bad.size else record
-
-
-def _cut(record: Record, part: slice) -> Record:
-    return Record._make(values[part] for values in record)
-
-
-def _diverged(record: Record, scene: EccentricScene) -> BoolArray:
-    state = record.state
+def _diverged(history: Records, scene: EccentricScene) -> BoolArray:
+    state = history["state"]
     whirl = np.max(np.abs(state[:, :2]), axis=1)
     turn = np.max(np.abs(state[:, 6:8]), axis=1) * scene.sensor.step
     # A comparison with NaN is false.
     usual = (whirl <= _LARGEST_WHIRL * scene.masses.guide_radius) & (turn <= _LARGEST_TURN)
-    for values in record:
-        if values.dtype == np.float64:
-            usual &= np.all(np.abs(values.reshape(len(values), -1)) <= _LARGEST, axis=1)
+    for name in HISTORY.names or ():
+        usual &= np.all(np.abs(history[name].reshape(len(history), -1)) <= _LARGEST, axis=1)
     return np.asarray(~usual)
-
-
-def _empty_record(samples: int) -> Record:
-    """Room for a run. Returns: Record of zeros."""
-    whole = [np.zeros(samples, dtype=np.int64) for _ in range(3)]
-    return Record(
-        np.zeros((samples, 8)),
-        np.zeros((samples, 2)),
-        np.zeros(samples),
-        whole[0],
-        whole[1],
-        whole[2],
-        np.zeros((samples, 2)),
-        np.zeros((samples, 2)),
-        np.zeros((samples, 2, 2)),
-        np.zeros((samples, 2)),
-        np.zeros((samples, 2)),
-    )
 
 
 @compiled
 def _measure(
-    state: FloatArray,
-    profile: _Profile,
-    time: float,
-    laboratory: bool,
-    noise: _SensorNoise,
-    numbers: FloatArray,
+    machine: _Machine, settings: StrategySettings, state: FloatArray, time: float, numbers: FloatArray
 ) -> EccentricMeasurement:
-    """What the sensors show; `laboratory`: the vibration is measured in the fixed frame."""
-    speed, speed_rate = speed_at(profile.times, profile.speeds, time)
-    turn = turned(profile.times, profile.speeds, time)
+    """What the sensors show. Args: `numbers`: standard normal, shape (8,)."""
+    speed, speed_rate = speed_at(machine.times, machine.speeds, time)
+    turn = turned(machine.times, machine.speeds, time)
     place, velocity = complex(state[0], state[1]), complex(state[2], state[3])
-    if laboratory:
+    if settings.laboratory:
         outward = complex(math.cos(turn), math.sin(turn))
         velocity = outward * (velocity + complex(0.0, speed) * place)
         place = outward * place
-    vibration = np.array(
-        [
-            place.real + noise.position * numbers[0],
-            place.imag + noise.position * numbers[1],
-            velocity.real + noise.velocity * numbers[2],
-            velocity.imag + noise.velocity * numbers[3],
-        ]
-    )
-    angle = (state[4] + noise.angle * numbers[4], state[5] + noise.angle * numbers[5])
-    rate = (state[6] + noise.rate * numbers[6], state[7] + noise.rate * numbers[7])
-    return EccentricMeasurement(time, speed, speed_rate, turn, vibration, angle, rate)
+    place += complex(machine.position_noise * numbers[0], machine.position_noise * numbers[1])
+    velocity += complex(machine.velocity_noise * numbers[2], machine.velocity_noise * numbers[3])
+    noise, rate_noise = machine.encoder_noise, machine.encoder_rate_noise
+    angle = (state[4] + noise * numbers[4], state[5] + noise * numbers[5])
+    rate = (state[6] + rate_noise * numbers[6], state[7] + rate_noise * numbers[7])
+    return EccentricMeasurement(time, speed, speed_rate, turn, place, velocity, angle, rate)
 
 
 @compiled
 def _run_stretch(
     settings: StrategySettings,
-    parameters: PlantParameters,
-    profile: _Profile,
-    noise: _SensorNoise,
+    machine: _Machine,
     numbers: FloatArray,
-    memory: StrategyState,
+    memory: Record,
     state: FloatArray,
     stuck: IntArray,
-    record: Record,
+    history: Record,
     first: int,
     after: int,
-) -> tuple[StrategyState, FloatArray, IntArray]:
-    """Run samples `first` to `after - 1`, each followed by a step of the plant, into the record.
+) -> tuple[FloatArray, IntArray]:
+    """Run samples `first` to `after - 1`, each followed by a step of the plant, into the history.
 
-    Returns: Memory of the strategy, state and flags of the plant at sample `after`.
+    Returns: State and flags of the plant at sample `after`.
     """
-    energy = 0.0 if first == 0 else record.energy[first - 1]
-    command = np.zeros(2)
+    plant, step, voltage = machine.plant, settings.step, np.zeros(2)
+    energy = 0.0 if first == 0 else history[first - 1].energy
     for i in range(first, after):
-        time = i * settings.step
-        seen = _measure(state, profile, time, settings.laboratory, noise, numbers[i])
-        memory, voltage = strategy_step(settings, memory, seen)
-        command[0], command[1] = voltage
-        _keep(record, i, memory, state, command)
-        later, stuck = plant_step(
-            parameters, state, stuck, command, seen.speed, seen.speed_rate, settings.step
-        )
-        energy += electrical_energy(parameters, state, later, command, settings.step)
-        record.energy[i] = energy
+        seen = _measure(machine, settings, state, i * step, numbers[i])
+        if machine.locked:
+            memory.cause, memory.hold = LOCKED_MASSES, RELEASED
+            memory.goal[0], memory.goal[1] = state[4], state[5]
+        else:
+            strategy_step(settings, memory, seen)
+            voltage[0], voltage[1] = memory.voltage[0], memory.voltage[1]
+        _keep(history[i], memory, state)
+        later, stuck = plant_step(plant, state, stuck, voltage, seen.speed, seen.speed_rate, step)
+        energy += electrical_energy(plant, state, later, voltage, step)
+        history[i].energy = energy
         state = later
-    return memory, state, stuck
+    return state, stuck
 
 
-@compiled
-def _keep(record: Record, i: int, memory: StrategyState, state: FloatArray, command: FloatArray) -> None:
-    """Write one row of the record."""
-    plan, estimate = memory.plan, memory.whirl.estimate
+@in_place
+def _keep(row: Record, memory: Record, state: FloatArray) -> None:
+    """Write a sample into the history."""
     # An element at a time: numba compiles array assignment ten times as long.
-    for place in range(state.size):
-        record.state[i, place] = state[place]
-    record.stage[i], record.cause[i], record.hold[i] = plan.stage, plan.cause, plan.hold
+    for place in range(8):
+        row.state[place] = state[place]
+    row.stage, row.cause, row.hold = memory.stage, memory.cause, memory.hold
     for k in range(2):
-        friction = memory.beliefs.friction[k]
-        record.voltage[i, k] = command[k]
-        record.goal[i, k] = plan.goal[k]
-        record.imbalance[i, k] = estimate.state[4 + k]
-        record.friction_arm[i, k] = friction.arm
-        record.friction_variance[i, k] = friction.arm_variance
+        row.voltage[k], row.goal[k] = memory.voltage[k], memory.goal[k]
+        row.friction_arm[k] = memory.friction[k].arm
+        row.friction_variance[k] = memory.friction[k].arm_variance
+        row.imbalance[k] = memory.filter.state[4 + k]
         for m in range(2):
-            record.imbalance_covariance[i, k, m] = estimate.covariance[4 + k, 4 + m]
+            row.imbalance_covariance[k, m] = memory.filter.covariance[4 + k, 4 + m]
 
 
 def simulate_eccentric(
@@ -276,10 +202,10 @@ def simulate_eccentric(
     Source: Fig. 3 of the paper on eccentric masses.
     """
     check_substeps(scene)
-    record, findings, innovation = _recorded(
+    history, memory = _recorded(
         scene, seed, progress or (lambda _, __: None), settings or StrategySettings.of(scene)
     )
-    return EccentricRun(scene=scene, estimates=record, findings=findings, innovation=innovation)
+    return EccentricRun(scene=scene, history=history, memory=memory[0])
 
 
 def locked_run(scene: EccentricScene) -> EccentricRun:

@@ -6,11 +6,27 @@ import itertools
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from ringbalance.controller.eccentric_mass.plan import RELEASED, STAGE_NAMES, Cause, Findings, Stage
+from ringbalance.controller.eccentric_mass.imbalance_filter import Records
+from ringbalance.controller.eccentric_mass.memory import (
+    BALANCED,
+    CAUSE_NAMES,
+    CHECK,
+    CORRECTION,
+    FRICTION,
+    IMBALANCE,
+    NONE,
+    POSITIONING,
+    RELEASED,
+    SPEED_CHANGED,
+    SPEED_NOT_CONSTANT,
+    STAGE_NAMES,
+    STALLED,
+    TOO_SLOW,
+)
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.resolution import rotor_covariance
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
@@ -22,33 +38,6 @@ _NOTHING: Final = 1e-6
 """Share of the limit below which a vibration is round-off."""
 _FINAL_TIME: Final = 1.0
 """Over which the final amplitude is averaged, s."""
-
-
-class Record(NamedTuple):
-    """What one run leaves, a row for each sample."""
-
-    state: FloatArray
-    """Of the plant, shape (n, 8)."""
-    voltage: FloatArray
-    """V, from this sample on, shape (n, 2)."""
-    energy: FloatArray
-    """Electrical, taken since the start, J, shape (n,)."""
-    stage: IntArray
-    """Shape (n,)."""
-    cause: IntArray
-    """Shape (n,)."""
-    hold: IntArray
-    """Shape (n,)."""
-    goal: FloatArray
-    """rad, shape (n, 2)."""
-    imbalance: FloatArray
-    """Estimate along the rotor's axes, kg m, shape (n, 2)."""
-    imbalance_covariance: FloatArray
-    """kg^2 m^2, shape (n, 2, 2)."""
-    friction_arm: FloatArray
-    """Estimates, m, shape (n, 2)."""
-    friction_variance: FloatArray
-    """m^2, shape (n, 2)."""
 
 
 class EccentricOutcome(StrEnum):
@@ -88,16 +77,22 @@ class RunFacts:
     """One run of the whole strategy on the plant, as far as it is known without its sentences."""
 
     scene: EccentricScene
-    estimates: Record
-    """Those of the filters are constant outside their stages; their covariances are of the noise alone."""
-    findings: Findings
-    innovation: float | None
-    """Mean square of the imbalance filter's normalised innovations: 1 for a true model; None without any."""
+    history: Records
+    """Every sample, type `HISTORY`."""
+    memory: np.void
+    """Of the strategy at the end, type `MEMORY`."""
+
+    @property
+    def innovation(self) -> float | None:
+        """Mean square of the imbalance filter's normalised innovations: 1 for a true model; None without
+        any."""
+        judged = int(self.memory["judged"])
+        return float(self.memory["surprise"]) / (4 * judged) if judged else None
 
     @cached_property
     def time(self) -> FloatArray:
         """s, shape (n,)."""
-        return np.arange(len(self.estimates.state), dtype=np.float64) * self.scene.sensor.step
+        return np.arange(len(self.history["state"]), dtype=np.float64) * self.scene.sensor.step
 
     @cached_property
     def speed(self) -> FloatArray:
@@ -107,7 +102,7 @@ class RunFacts:
     @cached_property
     def whirl(self) -> ComplexArray:
         """True displacement of the rotor along its own axes, m, shape (n,)."""
-        return np.asarray(self.estimates.state[:, 0] + 1j * self.estimates.state[:, 1])
+        return np.asarray(self.history["state"][:, 0] + 1j * self.history["state"][:, 1])
 
     @cached_property
     def amplitude(self) -> FloatArray:
@@ -122,27 +117,27 @@ class RunFacts:
     @property
     def mass_angle(self) -> FloatArray:
         """True angles of the masses, rad, not wrapped, shape (2, n)."""
-        return self.estimates.state[:, 4:6].T
+        return self.history["state"][:, 4:6].T
 
     @property
     def mass_rate(self) -> FloatArray:
         """rad/s, shape (2, n)."""
-        return self.estimates.state[:, 6:8].T
+        return self.history["state"][:, 6:8].T
 
     @property
     def goal(self) -> FloatArray:
         """Where the masses should be, rad, shape (2, n)."""
-        return self.estimates.goal.T
+        return self.history["goal"].T
 
     @property
     def voltage(self) -> FloatArray:
         """V, shape (2, n)."""
-        return self.estimates.voltage.T
+        return self.history["voltage"].T
 
     @property
     def drive_off(self) -> BoolArray:
         """Whether both drives are off, shape (n,)."""
-        return np.asarray(self.estimates.hold == RELEASED)
+        return np.asarray(self.history["hold"] == RELEASED)
 
     @property
     def limit(self) -> float:
@@ -150,19 +145,9 @@ class RunFacts:
         return self.scene.supervisor.limit
 
     @property
-    def cause(self) -> Cause:
-        """Why the strategy does what it does at the end."""
-        return Cause(int(self.estimates.cause[-1]))
-
-    @property
-    def stage(self) -> Stage:
+    def stage(self) -> int:
         """At the end of the run."""
-        return Stage(int(self.estimates.stage[-1]))
-
-    @property
-    def hold(self) -> int:
-        """Of the drives at the end."""
-        return int(self.estimates.hold[-1])
+        return int(self.history["stage"][-1])
 
     @property
     def end(self) -> float:
@@ -179,7 +164,7 @@ class RunFacts:
         """Sample of the largest vibration above the limit after the rotor was balanced to within it; None for
         none.
         """
-        content = np.isin(self.estimates.cause, (int(Cause.BALANCED), int(Cause.SPEED_CHANGED)))
+        content = np.isin(self.history["cause"], (BALANCED, SPEED_CHANGED))
         within = np.flatnonzero(content & (self.amplitude <= self.limit))
         if within.size == 0:
             return None
@@ -200,30 +185,27 @@ class RunFacts:
         """SETTLED only when the strategy was content and the true amplitude stays within the limit after."""
         if self.diverged:
             return EccentricOutcome.DIVERGED
+        cause = int(self.history["cause"][-1])
         kept = self.within_since is not None and self.left is None
-        if self.cause is Cause.BALANCED:
+        if cause == BALANCED:
             return EccentricOutcome.SETTLED if kept else EccentricOutcome.RISES_AGAIN
-        if kept and (self.cause is Cause.SPEED_CHANGED or self._corrects_within_limit):
+        # What was measured to be within the limit may be made better still as the run ends.
+        correcting = self.stage in {CHECK, CORRECTION} and self.memory["objective"] <= self.limit
+        if kept and (cause == SPEED_CHANGED or correcting):
             return EccentricOutcome.SETTLED
-        cause = self._shown_cause
-        return EccentricOutcome.TIME_LIMIT if cause is Cause.NONE else EccentricOutcome(cause.name.lower())
+        cause = self._shown_cause(cause)
+        return EccentricOutcome.TIME_LIMIT if cause == NONE else EccentricOutcome(CAUSE_NAMES[cause])
 
-    @property
-    def _corrects_within_limit(self) -> bool:
-        """Whether the run ended while what was measured to be within the limit was made better still."""
-        return self.stage in {Stage.CHECK, Stage.CORRECTION} and self.findings.objective <= self.limit
-
-    @property
-    def _shown_cause(self) -> Cause:
+    def _shown_cause(self, cause: int) -> int:
         """Of the end; a run that ends within a stage may show already why the stage would have failed."""
-        speed, findings = self.speed, self.findings
-        if self.stage is Stage.IMBALANCE:
+        speed = self.speed
+        if self.stage == IMBALANCE:
             if abs(speed[-1]) < self.scene.supervisor.lowest_speed:
-                return Cause.TOO_SLOW
+                return TOO_SLOW
             steady = speed.size < 2 or speed[-1] == speed[-2]
-            return self.cause if steady else Cause.SPEED_NOT_CONSTANT
-        stalled = self.stage is Stage.FRICTION and findings.stalled > STALLED_SHARE * findings.driven
-        return Cause.STALLED if stalled else self.cause
+            return cause if steady else SPEED_NOT_CONSTANT
+        stalled = self.stage == FRICTION and self.memory["stalled"] > STALLED_SHARE * self.memory["driven"]
+        return STALLED if stalled else cause
 
     @property
     def settling_time(self) -> float | None:
@@ -239,17 +221,17 @@ class RunFacts:
     @cached_property
     def estimated_at(self) -> IntArray:
         """Samples at which the imbalance was estimated."""
-        return np.flatnonzero(self.estimates.stage == int(Stage.IMBALANCE))
+        return np.flatnonzero(self.history["stage"] == IMBALANCE)
 
     @property
     def friction_known(self) -> bool:
         """Whether the friction stage came to its end: then its drives have done what they are there for."""
-        return bool(np.any(self.estimates.stage == int(Stage.POSITIONING)))
+        return bool(np.any(self.history["stage"] == POSITIONING))
 
     @property
     def imbalance(self) -> complex:
         """As estimated at the end, kg m."""
-        return complex(*self.estimates.imbalance[-1])
+        return complex(*self.history["imbalance"][-1])
 
     @cached_property
     def rotor_covariance(self) -> FloatArray:
@@ -268,12 +250,12 @@ class RunFacts:
     @property
     def imbalance_covariance(self) -> FloatArray:
         """Of the imbalance as estimated at the end, from noise and rotor, kg^2 m^2, shape (2, 2)."""
-        return np.asarray(self.estimates.imbalance_covariance[-1] + self.rotor_covariance)
+        return np.asarray(self.history["imbalance_covariance"][-1] + self.rotor_covariance)
 
     @property
     def stages(self) -> tuple[StageSpan, ...]:
         """Those that the strategy went through, one after the other."""
-        stage, time = self.estimates.stage, self.time
+        stage, time = self.history["stage"], self.time
         edges = [0, *(np.flatnonzero(np.diff(stage)) + 1), len(stage) - 1]
         return tuple(
             StageSpan(name=STAGE_NAMES[stage[a]], start=float(time[a]), end=float(time[b]))
@@ -285,7 +267,7 @@ class RunFacts:
         """For the imbalance as it was estimated; None when it never came to that."""
         if not self.friction_known:
             return None
-        x, y = self.estimates.imbalance[-1]
+        x, y = self.history["imbalance"][-1]
         masses = self.scene.masses
         gap, moment = masses.arc_length / masses.guide_radius, PlantParameters.of(self.scene).moment
         return target_angles(float(np.hypot(x, y)), float(np.arctan2(y, x)), moment, gap)
@@ -312,7 +294,7 @@ class RunFacts:
     @property
     def electrical_energy(self) -> float:
         """Taken by both motors from the supply in the whole run, J."""
-        return float(self.estimates.energy[-1])
+        return float(self.history["energy"][-1])
 
     @property
     def worst_amplitude(self) -> float:
@@ -323,7 +305,7 @@ class RunFacts:
     def saturation(self) -> float:
         """Seconds for which a voltage was at its limit."""
         most = PlantParameters.of(self.scene).maximum_voltage
-        at_limit = np.any(np.abs(self.estimates.voltage) >= most, axis=1)
+        at_limit = np.any(np.abs(self.history["voltage"]) >= most, axis=1)
         return float(np.count_nonzero(at_limit)) * self.scene.sensor.step
 
     @property

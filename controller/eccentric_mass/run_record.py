@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import TracedRun
+from ringbalance.controller.balancer import RunResult
 from ringbalance.controller.document import amplitude_line
 from ringbalance.controller.eccentric_mass.findings import ended, warnings_of
 from ringbalance.controller.eccentric_mass.run_facts import RunFacts
@@ -94,12 +94,12 @@ def _document(run: EccentricRun) -> dict[str, Any]:
         "voltage_V": run.voltage[:, kept].tolist(),
         "drive_off": run.drive_off[kept].tolist(),
         "estimates": {
-            "imbalance_kg_m": run.estimates.imbalance[kept].T.tolist(),
-            "imbalance_covariance": run.estimates.imbalance_covariance[kept].tolist(),
+            "imbalance_kg_m": run.history["imbalance"][kept].T.tolist(),
+            "imbalance_covariance": run.history["imbalance_covariance"][kept].tolist(),
             "imbalance_rotor_covariance": run.rotor_covariance.tolist(),
             "imbalance_half_width_kg_m": (NORMAL_95 * np.sqrt(np.diag(run.imbalance_covariance))).tolist(),
-            "friction_arm_m": run.estimates.friction_arm[kept].T.tolist(),
-            "friction_variance": run.estimates.friction_variance[kept].T.tolist(),
+            "friction_arm_m": run.history["friction_arm"][kept].T.tolist(),
+            "friction_variance": run.history["friction_variance"][kept].T.tolist(),
         },
         **run.rows().document(),
     }
@@ -107,7 +107,7 @@ def _document(run: EccentricRun) -> dict[str, Any]:
 
 def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
     """Every sample of a run by name of its column: rotor-fixed vectors, angles not wrapped."""
-    told = run.estimates
+    history = run.history
     stages = np.searchsorted([stage.start for stage in run.stages], run.time, side="right") - 1
     columns: dict[str, FloatArray] = {
         "time_s": run.time,
@@ -120,14 +120,14 @@ def eccentric_history(run: EccentricRun) -> dict[str, Sequence[Any]]:
         **_each("mass_rate_{}_rad_s", run.mass_rate),
         **_each("goal_{}_rad", run.goal),
         **_each("voltage_{}_V", run.voltage),
-        "energy_J": run.estimates.energy,
-        "imbalance_x_kg_m": told.imbalance[:, 0],
-        "imbalance_y_kg_m": told.imbalance[:, 1],
-        "imbalance_variance_xx_kg2_m2": told.imbalance_covariance[:, 0, 0],
-        "imbalance_variance_xy_kg2_m2": told.imbalance_covariance[:, 0, 1],
-        "imbalance_variance_yy_kg2_m2": told.imbalance_covariance[:, 1, 1],
-        **_each("friction_arm_{}_m", told.friction_arm.T),
-        **_each("friction_variance_{}_m2", told.friction_variance.T),
+        "energy_J": run.history["energy"],
+        "imbalance_x_kg_m": history["imbalance"][:, 0],
+        "imbalance_y_kg_m": history["imbalance"][:, 1],
+        "imbalance_variance_xx_kg2_m2": history["imbalance_covariance"][:, 0, 0],
+        "imbalance_variance_xy_kg2_m2": history["imbalance_covariance"][:, 0, 1],
+        "imbalance_variance_yy_kg2_m2": history["imbalance_covariance"][:, 1, 1],
+        **_each("friction_arm_{}_m", history["friction_arm"].T),
+        **_each("friction_variance_{}_m2", history["friction_variance"].T),
     }
     return {
         **{name: values.tolist() for name, values in columns.items()},
@@ -175,7 +175,7 @@ def _rows(run: EccentricRun) -> Rows:
 
 
 def _quantities(run: EccentricRun) -> Iterator[Quantity]:
-    x, y = (float(each) for each in run.estimates.imbalance[-1])
+    x, y = (float(each) for each in run.history["imbalance"][-1])
     width = NORMAL_95 * math.sqrt(float(np.max(np.linalg.eigvalsh(run.imbalance_covariance))))
     size = math.hypot(x, y)
     rows: list[tuple[str, str, str, float | None, float]] = [
@@ -188,8 +188,8 @@ def _quantities(run: EccentricRun) -> Iterator[Quantity]:
         ("imbalance_angle", "angle of the imbalance", "rad", math.atan2(y, x) % math.tau, 0.0),
         ("energy", "electrical energy", "J", run.electrical_energy, 0.0),
     ]
-    for number, arm in enumerate(run.estimates.friction_arm[-1], start=1):
-        wide = NORMAL_95 * math.sqrt(run.estimates.friction_variance[-1][number - 1])
+    for number, arm in enumerate(run.history["friction_arm"][-1], start=1):
+        wide = NORMAL_95 * math.sqrt(run.history["friction_variance"][-1][number - 1])
         rows.append((f"friction_arm_{number}", f"friction arm of mass {number}", "m", float(arm), wide))
     for number, angle in enumerate(run.mass_angle[:, -1], start=1):
         place = float(angle) % math.tau
@@ -203,7 +203,7 @@ def _quantities(run: EccentricRun) -> Iterator[Quantity]:
 _INSTANTS = 600
 
 
-def amplitude_band(runs: Sequence[TracedRun], *, end: float) -> dict[str, Any]:
+def amplitude_band(runs: Sequence[RunResult], *, end: float) -> dict[str, Any]:
     """Least, middle and largest amplitude of runs at equally spaced times, each the largest since the last
     one, so that no peak is lost.
 
@@ -218,7 +218,7 @@ def amplitude_band(runs: Sequence[TracedRun], *, end: float) -> dict[str, Any]:
         "middle_m": middle,
         "high_m": high,
         "runs": len(runs),
-        "settled": sum(each.settling_time is not None for each in runs),
+        "settled": sum(each.settled for each in runs),
     }
 
 

@@ -15,9 +15,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.drive_law import lqr_gain, track_model
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.settings import lqr_gain, track_model
 from ringbalance.results.rows import Quantity
 from ringbalance.scene.arrays import ComplexArray
 
@@ -193,7 +193,7 @@ def _drive_speed(scene: EccentricScene, gain: float) -> float:
     """Where B_add gamma w is the friction's torque, with a margin."""
     plant = PlantParameters.of(scene)
     speed = scene.rotor.speed_profile[0].speed
-    friction = max(plant.friction_arm_1, plant.friction_arm_2) * plant.moment * speed**2
+    friction = max(plant.friction_arm) * plant.moment * speed**2
     return max(scene.friction_filter.drive_speed, _TORQUE_MARGIN * friction / (plant.drive_gain * gain))
 
 

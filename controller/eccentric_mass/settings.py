@@ -6,14 +6,18 @@ import math
 from typing import NamedTuple
 
 from ringbalance.controller.eccentric_mass.control_records import Supervisor
-from ringbalance.controller.eccentric_mass.friction_filter import FrictionEstimate, FrictionNoise, TrackModel
-from ringbalance.controller.eccentric_mass.imbalance_filter import ProcessNoise, WhirlModel
-from ringbalance.controller.eccentric_mass.plan import Gates
-from ringbalance.controller.eccentric_mass.plant import PlantParameters
+from ringbalance.controller.eccentric_mass.drive_law import (
+    SLOWEST_RATE,
+    SMOOTHING_TIME,
+    DriveLaw,
+    Pair,
+    believed_whirl,
+    track_model,
+)
+from ringbalance.controller.eccentric_mass.friction_filter import FrictionNoise, TrackModel
+from ringbalance.controller.eccentric_mass.imbalance_filter import FilterSettings
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 
-_SMOOTHING_TIME = 0.05
-"""Of the angles and rates that arrival is judged by, s."""
 _DWELL_TIME = 0.2
 """For which a mass must have arrived, s."""
 _DECAYS = 2.0
@@ -26,80 +30,101 @@ _LEAST_DRIVE_TIME = 1.0
 """Of the friction stage, s: long against the drive's own time constants."""
 _LONGEST_TRIAL_MOVE = 10.0
 """s."""
-_SLOWEST_RATE = 1e-3
-"""Below which a mass rests, however good the encoder, rad/s."""
 _CERTAIN = 5.0
 """Standard deviations of a smoothed rate beyond which a mass moves."""
-_SUPERVISOR_KEYS = [name for name in Gates._fields if name in Supervisor.__dataclass_fields__]
-FRICTION_ERROR = 0.1
+_FRICTION_ERROR = 0.1
 """Share of the arrival angle that unknown friction may hold a mass off."""
 
 
-class DriveLaw(NamedTuple):
-    """What the law of the voltages knows of masses, drives and sensors."""
+class Gates(NamedTuple):
+    """Limits between the stages; names of [supervisor] are its keys."""
 
-    whirl: WhirlModel
-    track: TrackModel
-    mass_inertia: float
-    """J of one mass alone, kg m^2."""
-    torque_per_volt: float
-    """B_add, N m/V."""
-    maximum_voltage: float
-    """V; infinite for no limit."""
-    position_gain: float
-    rate_gain: float
-    breaks_away: bool
-    """Whether friction is compensated so that a mass at rest breaks away; else it is not compensated."""
-    slow: float
-    """Rate below which a mass counts as resting, rad/s."""
-    near: float
-    """Distance from its place within which a resting mass is left to friction, rad."""
+    start: float
+    limit: float
+    lowest_speed: float
+    arrival_angle: float
+    arrival_rate: float
+    imbalance_time: float
+    friction_time: float
+    positioning_time: float
+    fine_tuning_time: float
+    target_error: Pair
+    noticeable: float
+    """Least angle by which masses that are not held come nearer within a second, rad."""
+    dwell: float
+    """For which a mass must have arrived, s."""
+    imbalance_gate: float
+    """Relative standard deviation."""
+    friction_gate: float
+    """Relative standard deviation."""
+    friction_torque: float
+    """Standard deviation of the friction torque that makes no difference to arrival, N m."""
+    least_estimate: float
+    """Shortest time of imbalance estimation, s."""
+    least_drive: float
+    """Shortest time of friction estimation, s."""
+    stall_rate: float
+    """Rate below which the drive nearly stalls, rad/s."""
+    tuning_step: float
+    tuning_stop: float
+    tuning_near: float
+    """Closest that a mass is brought to a place, rad."""
+    wait: float
+    average: float
+    margin: float
+    """By which a trial or a correction must be better, m."""
+    move_time: float
+    """Longest move of one trial, s."""
+    moment: float
+    """b, kg m."""
+    gap: float
+    """Angle that one mass takes up, rad."""
+    by_trials: bool
+    """Whether the masses are tuned by trials alone, as in the paper."""
 
     @classmethod
-    def of(cls, scene: EccentricScene) -> DriveLaw:
-        """What the law of the voltages knows."""
-        plant, track = PlantParameters.of(scene), track_model(scene)
-        position_gain, rate_gain = lqr_gain(
-            track, state_weight=scene.lqr.state_weight, input_weight=scene.lqr.input_weight
-        )
+    def of(cls, scene: EccentricScene, law: DriveLaw) -> Gates:
+        """Limits of a scene."""
+        keys, tuning = scene.supervisor, scene.fine_tuning
+        averaged = max(tuning.average / scene.sensor.step, 1.0)
+        shared = [name for name in cls._fields if name in Supervisor.__dataclass_fields__]
         return cls(
-            whirl=believed_whirl(scene),
-            track=track,
-            mass_inertia=plant.inertia,
-            torque_per_volt=plant.drive_gain,
-            maximum_voltage=plant.maximum_voltage,
-            position_gain=position_gain,
-            rate_gain=rate_gain,
-            breaks_away=scene.lqr.friction_compensation == "break_away",
-            slow=max(3 * scene.sensor.encoder_rate_noise, _SLOWEST_RATE),
-            near=_near(scene),
+            **{name: getattr(keys, name) for name in shared},
+            noticeable=max(_NOTICEABLE * keys.arrival_angle, 2 * law.near),
+            dwell=_DWELL_TIME,
+            imbalance_gate=scene.imbalance_filter.gate,
+            friction_gate=scene.friction_filter.gate,
+            friction_torque=_FRICTION_ERROR * law.position_gain * keys.arrival_angle,
+            least_estimate=_least_estimate(scene),
+            least_drive=_LEAST_DRIVE_TIME,
+            stall_rate=scene.friction_filter.stall_share * scene.friction_filter.drive_speed,
+            tuning_step=tuning.step,
+            tuning_stop=tuning.stop,
+            tuning_near=2 * law.near,
+            wait=tuning.wait,
+            average=tuning.average,
+            margin=2 * scene.sensor.position_noise / math.sqrt(averaged),
+            move_time=_LONGEST_TRIAL_MOVE,
+            moment=law.track.moment,
+            gap=scene.masses.arc_length / scene.masses.guide_radius,
+            by_trials=keys.correction == "trials",
         )
 
 
-class _ImbalanceSettings(NamedTuple):
-    """Of the imbalance filter."""
+class _SensorSettings(NamedTuple):
+    """What the imbalance filter assumes of its sensors: standard deviations."""
 
-    noise: ProcessNoise
-    position_deviation: float
-    """Of the displacement sensors as assumed, m."""
-    velocity_deviation: float
-    """Of the velocity sensors as assumed, m/s."""
-    start_position: float
-    """Standard deviation before the first sample, m."""
-    start_velocity: float
-    start_imbalance: float
-    encoder_deviation: float
-    encoder_rate_deviation: float
-    euler: bool
-    """The paper's transition in place of the exact one."""
-    every: int
-    """Samples between two steps."""
+    position: float
+    velocity: float
+    angle: float
+    rate: float
 
 
 class _FrictionSettings(NamedTuple):
     """Of the friction filter and the drive meanwhile."""
 
-    start: FrictionEstimate
+    start: Pair
+    """Standard deviations of rate, rad/s, and arm, m, before the first sample."""
     noise: FrictionNoise
     track: TrackModel
     """Whose inertia is less by b^2/M, as the rotor gives way."""
@@ -115,6 +140,26 @@ class _FrictionSettings(NamedTuple):
     pair_gain: float
     """V/rad; zero: the paper's law."""
 
+    @classmethod
+    def of(cls, scene: EccentricScene) -> _FrictionSettings:
+        keys, track, sensor = scene.friction_filter, track_model(scene), scene.sensor
+        given_way = track.moment**2 / believed_whirl(scene).mass
+        inertia = track.inertia - given_way
+        # The other mass's acceleration is a difference of two measured rates.
+        noise = keys.rate_noise**2 * (1 + 2 * (given_way / inertia) ** 2)
+        smooth = sensor.encoder_rate_noise * math.sqrt(sensor.step / (2 * SMOOTHING_TIME))
+        return cls(
+            start=(keys.initial_rate, keys.initial_friction),
+            noise=FrictionNoise(noise, keys.rate_walk**2, keys.friction_walk**2),
+            track=track._replace(inertia=inertia),
+            least_motion=max(_CERTAIN * smooth, SLOWEST_RATE),
+            euler=keys.discretisation == "euler",
+            every=max(round(keys.step / sensor.step), 1),
+            drive_speed=keys.drive_speed,
+            speed_gain=keys.speed_gain,
+            pair_gain=keys.pair_gain,
+        )
+
 
 class StrategySettings(NamedTuple):
     """All that does not change."""
@@ -129,92 +174,48 @@ class StrategySettings(NamedTuple):
     """Samples for which a voltage is held."""
     law: DriveLaw
     gates: Gates
-    imbalance: _ImbalanceSettings
+    filter: FilterSettings
+    sensor: _SensorSettings
+    filter_every: int
+    """Samples between two steps of the imbalance filter."""
     friction: _FrictionSettings
 
     @classmethod
     def of(cls, scene: EccentricScene) -> StrategySettings:
         """Gather what the strategy needs."""
-        step = scene.sensor.step
+        sensor, keys, law = scene.sensor, scene.imbalance_filter, DriveLaw.of(scene)
+        every = max(round(keys.step / sensor.step), 1)
         return cls(
-            step=step,
-            laboratory=scene.sensor.frame == "laboratory",
-            smoothing=-math.expm1(-step / _SMOOTHING_TIME),
-            voltage_every=max(round(scene.lqr.step / step), 1),
-            law=DriveLaw.of(scene),
-            gates=_gates(scene),
-            imbalance=_imbalance(scene),
-            friction=_friction(scene),
+            step=sensor.step,
+            laboratory=sensor.frame == "laboratory",
+            smoothing=-math.expm1(-sensor.step / SMOOTHING_TIME),
+            voltage_every=max(round(scene.lqr.step / sensor.step), 1),
+            law=law,
+            gates=Gates.of(scene, law),
+            filter=filter_settings(scene)._replace(step=sensor.step * every),
+            sensor=_SensorSettings(
+                position=keys.position_noise,
+                velocity=keys.velocity_noise,
+                angle=sensor.encoder_noise,
+                rate=sensor.encoder_rate_noise,
+            ),
+            filter_every=every,
+            friction=_FrictionSettings.of(scene),
         )
 
 
-def believed_whirl(scene: EccentricScene) -> WhirlModel:
-    """The rotor as configured in filter and controller; its mass includes the eccentric masses."""
-    told = scene.imbalance_filter
-    return WhirlModel(told.assumed_mass + 2 * scene.masses.mass, told.assumed_damping, told.assumed_stiffness)
-
-
-def track_model(scene: EccentricScene) -> TrackModel:
-    """One eccentric mass with its drive."""
-    plant = PlantParameters.of(scene)
-    return TrackModel(plant.inertia + plant.drive_inertia, plant.drive_damping, plant.moment)
-
-
-def _imbalance(scene: EccentricScene) -> _ImbalanceSettings:
-    told, sensor = scene.imbalance_filter, scene.sensor
-    return _ImbalanceSettings(
-        noise=ProcessNoise(told.velocity_walk**2, told.unbalance_walk**2),
-        position_deviation=told.position_noise,
-        velocity_deviation=told.velocity_noise,
-        start_position=told.initial_position,
-        start_velocity=told.initial_velocity,
-        start_imbalance=told.initial_unbalance,
-        encoder_deviation=sensor.encoder_noise,
-        encoder_rate_deviation=sensor.encoder_rate_noise,
-        euler=told.discretisation == "euler",
-        every=max(round(told.step / sensor.step), 1),
+def filter_settings(scene: EccentricScene) -> FilterSettings:
+    """Of the imbalance filter."""
+    keys = scene.imbalance_filter
+    return FilterSettings(
+        model=believed_whirl(scene),
+        acceleration_noise=keys.velocity_walk**2,
+        imbalance_noise=keys.unbalance_walk**2,
+        start=(keys.initial_position, keys.initial_velocity, keys.initial_unbalance),
+        step=keys.step,
+        laboratory=scene.sensor.frame == "laboratory",
+        euler=keys.discretisation == "euler",
     )
-
-
-def _friction(scene: EccentricScene) -> _FrictionSettings:
-    told, track, sensor = scene.friction_filter, track_model(scene), scene.sensor
-    given_way = track.moment**2 / believed_whirl(scene).mass
-    inertia = track.inertia - given_way
-    # The other mass's acceleration is a difference of two measured rates.
-    noise = told.rate_noise**2 * (1 + 2 * (given_way / inertia) ** 2)
-    smooth = sensor.encoder_rate_noise * math.sqrt(sensor.step / (2 * _SMOOTHING_TIME))
-    return _FrictionSettings(
-        start=FrictionEstimate(0.0, 0.0, told.initial_rate**2, 0.0, told.initial_friction**2),
-        noise=FrictionNoise(noise, told.rate_walk**2, told.friction_walk**2),
-        track=track._replace(inertia=inertia),
-        least_motion=max(_CERTAIN * smooth, _SLOWEST_RATE),
-        euler=told.discretisation == "euler",
-        every=max(round(told.step / sensor.step), 1),
-        drive_speed=told.drive_speed,
-        speed_gain=told.speed_gain,
-        pair_gain=told.pair_gain,
-    )
-
-
-def lqr_gain(track: TrackModel, *, state_weight: float, input_weight: float) -> tuple[float, float]:
-    """Gains k_p, N m/rad, and k_d, N m s/rad, of u = -k_p (phi - phi_d) - k_d phi', of one mass by itself.
-
-    They minimise the integral of 0.1 q (phi - phi_d)^2 + 0.01 q phi'^2 + 0.1 r u^2, with q the state weight
-    and r the input weight, both above zero.  The spectrum of the cost factors: k_p^2 = q/r and
-    (C_add + k_d)^2 = C_add^2 + 2 (J + J_add) k_p + 0.1 q/r.
-    Source: Eqs. 42 to 49 of the paper on eccentric masses, whose back-EMF in Eq. 42 lost the minus sign.
-    """
-    ratio = state_weight / input_weight
-    position = math.sqrt(ratio)
-    more = 2 * track.inertia * position + 0.1 * ratio
-    return position, more / (math.sqrt(track.damping**2 + more) + track.damping)
-
-
-def _near(scene: EccentricScene) -> float:
-    """A quarter of the finest move asked for, but not finer than the smoothed encoder can tell."""
-    finest = min(scene.fine_tuning.stop, scene.supervisor.arrival_angle)
-    smooth = scene.sensor.encoder_noise * math.sqrt(scene.sensor.step / (2 * _SMOOTHING_TIME))
-    return max(0.25 * finest, 3 * smooth)
 
 
 def _least_estimate(scene: EccentricScene) -> float:
@@ -222,30 +223,3 @@ def _least_estimate(scene: EccentricScene) -> float:
     whirl = believed_whirl(scene)
     longest = _LONGEST_ESTIMATE * scene.supervisor.imbalance_time
     return min(_DECAYS * 2 * whirl.mass / whirl.damping, longest) if whirl.damping > 0 else longest
-
-
-def _gates(scene: EccentricScene) -> Gates:
-    told, tuning = scene.supervisor, scene.fine_tuning
-    plant, law = PlantParameters.of(scene), DriveLaw.of(scene)
-    averaged = max(tuning.average / scene.sensor.step, 1.0)
-    return Gates(
-        **{name: getattr(told, name) for name in _SUPERVISOR_KEYS},
-        noticeable=max(_NOTICEABLE * told.arrival_angle, 2 * law.near),
-        dwell=_DWELL_TIME,
-        imbalance_gate=scene.imbalance_filter.gate,
-        friction_gate=scene.friction_filter.gate,
-        friction_torque=FRICTION_ERROR * law.position_gain * told.arrival_angle,
-        least_estimate=_least_estimate(scene),
-        least_drive=_LEAST_DRIVE_TIME,
-        stall_rate=scene.friction_filter.stall_share * scene.friction_filter.drive_speed,
-        tuning_step=tuning.step,
-        tuning_stop=tuning.stop,
-        tuning_near=2 * law.near,
-        wait=tuning.wait,
-        average=tuning.average,
-        margin=2 * scene.sensor.position_noise / math.sqrt(averaged),
-        move_time=_LONGEST_TRIAL_MOVE,
-        moment=plant.moment,
-        gap=scene.masses.arc_length / scene.masses.guide_radius,
-        by_trials=told.correction == "trials",
-    )

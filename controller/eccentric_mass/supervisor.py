@@ -1,63 +1,61 @@
-"""The order of the stages: estimate, drive round, go, look, correct, rest; and when each is left."""
+"""The order of the stages: estimate, drive round, go, look, correct, rest; and when each is left.
+
+Every function changes an element of type `MEMORY`; `Motion` is the sample that it is decided on.
+"""
 
 from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
 from typing import Final
 
-from ringbalance.controller.eccentric_mass.plan import (
+from ringbalance.controller.eccentric_mass.drive_law import DriveLaw, Motion, friction_needed
+from ringbalance.controller.eccentric_mass.imbalance_filter import Record
+from ringbalance.controller.eccentric_mass.memory import (
+    BALANCED,
+    CHECK,
+    CORRECTION,
+    FAILED,
+    FINE_TUNING,
+    FRICTION,
+    FRICTION_UNCERTAIN,
     HELD,
+    IMBALANCE,
+    IMBALANCE_UNCERTAIN,
+    MASSES_MOVE,
     MOVING,
+    NONE,
+    NOT_ARRIVED,
     NOT_YET,
+    POSITIONING,
     RELEASED,
-    Cause,
-    Facts,
-    Findings,
-    Gates,
+    RESIDUAL,
+    REST,
+    SATURATED,
+    SPEED_CHANGED,
+    SPEED_NOT_CONSTANT,
+    STALLED,
+    TOO_SLOW,
+    TUNING_TIME,
+    WAITING,
     Pair,
-    Plan,
-    Stage,
-    averaging_from,
-    enter,
-    setting_out,
-    with_arrival,
-    with_correction,
-    with_findings,
-    with_goal,
-    with_hold,
-    with_nearest,
-    with_objective,
-    with_progress,
-    with_sample,
-    with_short,
-    with_stall,
-    with_targets,
-    with_trial,
 )
+from ringbalance.controller.eccentric_mass.settings import Gates
 from ringbalance.controller.eccentric_mass.targets import (
-    Correction,
-    Tuning,
+    aim_back,
     assign,
-    correction_aim,
-    correction_back,
+    begin_correction,
+    begin_tuning,
     correction_ends,
-    correction_judged,
-    correction_start,
-    correction_step,
+    judge_correction,
+    next_trial,
     separation,
+    set_pair,
     target_angles,
-    tuning_next,
     tuning_place,
-    tuning_start,
 )
-from ringbalance.scene.platform.compiled import compiled
-
-# Plain numbers: the compiler takes enumerations, but not as fast.
-WAITING, IMBALANCE, FRICTION, POSITIONING, CHECK, CORRECTION, FINE_TUNING, REST, FAILED = map(int, Stage)
-_CAUSES: Final = tuple(map(int, Cause))
-NONE, BALANCED, SATURATED, RESIDUAL, TUNING_TIME, SPEED_CHANGED, TOO_SLOW, SPEED_NOT_CONSTANT = _CAUSES[:8]
-IMBALANCE_UNCERTAIN, FRICTION_UNCERTAIN, STALLED, NOT_ARRIVED, LOCKED, MASSES_MOVE = _CAUSES[8:]
+from ringbalance.scene.platform.compiled import in_place
 
 _HOLDS_FOR_SURE: Final = 0.7
 """Share of the friction known to be there that the drives may be switched off on."""
@@ -65,101 +63,138 @@ STALLED_SHARE: Final = 0.5
 """Of the friction stage, beyond which its failure is blamed on the drive."""
 _STILL_TIME: Final = 1.0
 """For which masses must have come no nearer to their goal to count as held by friction, s."""
+_STEADY: Final = 1e-6
+"""Speed rate that counts as none, rad/s^2."""
 
 
-@compiled
-def first_plan(goal: Pair, time: float) -> Plan:
-    """The plan before the first sample. Returns: Plan, waiting."""
-    nothing = Findings(False, 0.0, math.inf, 0.0, 0, 0)
-    tuning = tuning_start(goal[0], goal[1], math.inf, 1.0)
-    begin = setting_out(time)
-    return Plan(0, time, 0, goal, MOVING, begin, correction_start(goal, 0.0j), tuning, nothing)
+@in_place
+def supervise(
+    gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float, visible: bool
+) -> None:
+    """Decide what to do next.
 
-
-@compiled
-def supervise(gates: Gates, plan: Plan, facts: Facts) -> Plan:
-    """Decide what to do next; the same arguments always give the same answer.
-
+    Args: `visible`: whether the imbalance filter's model holds now.
     Source: Fig. 3 of the paper on eccentric masses, with gates on relative uncertainty and ways out.
     """
-    if plan.stage == WAITING:
-        begins = facts.time >= gates.start
-        return enter(plan, IMBALANCE, facts.time, NONE, plan.goal) if begins else plan
-    if plan.stage == IMBALANCE:
-        return _imbalance(gates, plan, facts)
-    if plan.stage == FRICTION:
-        return _friction(gates, plan, facts)
-    if plan.stage == POSITIONING:
-        return _positioning(gates, plan, facts)
-    if plan.stage == CHECK:
-        return _check(gates, plan, facts)
-    if plan.stage == CORRECTION:
-        return _correction(gates, plan, facts)
-    if plan.stage == FINE_TUNING:
-        return _fine_tuning(gates, plan, facts)
-    return _rest(gates, plan, facts)
+    if memory.stage == WAITING:
+        if time >= gates.start:
+            enter(memory, IMBALANCE, time, NONE)
+    elif memory.stage == IMBALANCE:
+        _imbalance(gates, law, memory, motion, time, visible)
+    elif memory.stage == FRICTION:
+        _friction(gates, memory, motion, time)
+    elif memory.stage == POSITIONING:
+        _positioning(gates, memory, time)
+    elif memory.stage == CHECK:
+        _check(gates, law, memory, motion, time)
+    elif memory.stage == CORRECTION:
+        _correction(gates, memory, motion, time)
+    elif memory.stage == FINE_TUNING:
+        _fine_tuning(gates, memory, motion, time)
+    else:
+        _rest(gates, law, memory, motion, time)
 
 
-@compiled
-def _imbalance(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+@in_place
+def enter(memory: Record, stage: int, time: float, cause: int) -> None:
+    """Begin a stage: the masses set out to their goal."""
+    memory.stage, memory.entered, memory.cause = stage, time, cause
+    _set_out(memory, time)
+
+
+@in_place
+def _set_out(memory: Record, time: float) -> None:
+    memory.hold, memory.moving, memory.arrived = MOVING, time, NOT_YET
+    memory.nearest, memory.nearer = math.inf, time
+    _average_from(memory, NOT_YET)
+
+
+@in_place
+def _average_from(memory: Record, time: float) -> None:
+    memory.averaging, memory.total, memory.averaged = time, 0.0j, 0
+
+
+@in_place
+def _stay(memory: Record, stage: int, time: float, cause: int) -> None:
+    """Begin a stage with the masses where they are."""
+    set_pair(memory.goal, memory.angle[0], memory.angle[1])
+    enter(memory, stage, time, cause)
+
+
+@in_place
+def _return(memory: Record, place: Sequence[float], time: float, cause: int) -> None:
+    """Rest at a place."""
+    set_pair(memory.goal, place[0], place[1])
+    enter(memory, REST, time, cause)
+
+
+@in_place
+def influence_of(law: DriveLaw, speed: float) -> complex:
+    """alpha, steady vibration per imbalance as configured, m/(kg m)."""
+    stiffness = law.whirl.stiffness - law.whirl.mass * speed * speed
+    return speed * speed / complex(stiffness, law.whirl.damping * speed)
+
+
+@in_place
+def is_constant(motion: Motion) -> bool:
+    """Whether the speed is."""
+    return abs(motion.speed_rate) < _STEADY
+
+
+@in_place
+def _imbalance(
+    gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float, visible: bool
+) -> None:
     """Until the imbalance is known relative to itself, or so well that it makes no difference."""
-    known = facts.deviation <= gates.imbalance_gate * abs(facts.imbalance)
-    settled = 2 * facts.deviation * abs(facts.influence) <= 0.1 * gates.limit
-    if facts.visible and (known or settled) and facts.time - plan.entered >= gates.least_estimate:
-        return enter(plan, FRICTION, facts.time, NONE, facts.angle)
-    if facts.time - plan.entered < gates.imbalance_time:
-        return plan
-    cause = IMBALANCE_UNCERTAIN
-    if abs(facts.speed) < gates.lowest_speed:
-        cause = TOO_SLOW
-    elif not facts.constant:
-        cause = SPEED_NOT_CONSTANT
-    elif not facts.visible:
-        cause = MASSES_MOVE
-    return enter(plan, FAILED, facts.time, cause, facts.angle)
+    known = memory.deviation <= gates.imbalance_gate * abs(memory.imbalance)
+    settled = 2 * memory.deviation * abs(influence_of(law, motion.speed)) <= 0.1 * gates.limit
+    elapsed = time - memory.entered
+    if visible and (known or settled) and elapsed >= gates.least_estimate:
+        _stay(memory, FRICTION, time, NONE)
+    elif elapsed >= gates.imbalance_time:
+        cause = IMBALANCE_UNCERTAIN
+        if abs(motion.speed) < gates.lowest_speed:
+            cause = TOO_SLOW
+        elif not is_constant(motion):
+            cause = SPEED_NOT_CONSTANT
+        elif not visible:
+            cause = MASSES_MOVE
+        _stay(memory, FAILED, time, cause)
 
 
-@compiled
-def _friction(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+@in_place
+def _friction(gates: Gates, memory: Record, motion: Motion, time: float) -> None:
     """Until both friction arms are known relative to themselves, or so well that it makes no difference."""
-    elapsed = facts.time - plan.entered
-    now = _watched(gates, plan, facts)
-    known = True
+    elapsed, known = time - memory.entered, True
+    # Once the drives have had a moment to get going.
+    if elapsed >= 0.5 * gates.least_drive:
+        memory.driven += 1
+        memory.stalled += 1 if min(abs(memory.rate[0]), abs(memory.rate[1])) < gates.stall_rate else 0
     for i in range(2):
-        torque = facts.arm_deviation[i] * gates.moment * facts.speed**2
-        relative = facts.arm_deviation[i] <= gates.friction_gate * facts.arm[i]
+        arm, deviation = memory.friction[i].arm, arm_deviation(memory, i)
+        relative = deviation <= gates.friction_gate * arm
         # Friction does not drive: an arm well below zero contradicts the filter's model.
-        possible = facts.arm[i] >= -2 * facts.arm_deviation[i]
-        known = known and possible and (relative or torque <= gates.friction_torque)
+        possible = arm >= -2 * deviation
+        little = deviation * gates.moment * motion.speed**2 <= gates.friction_torque
+        known = known and possible and (relative or little)
     if known and elapsed >= gates.least_drive:
-        return _towards(gates, now, facts)
-    if elapsed < gates.friction_time:
-        return now
-    stalled = now.findings.stalled > STALLED_SHARE * now.findings.driven
-    cause = STALLED if stalled else FRICTION_UNCERTAIN
-    return enter(now, FAILED, facts.time, cause, facts.angle)
+        (first, second), memory.saturated, memory.left = _goal(gates, memory.angle, memory.imbalance)
+        set_pair(memory.goal, first, second)
+        begin_correction(memory)
+        enter(memory, POSITIONING, time, NONE)
+    elif elapsed >= gates.friction_time:
+        stalled = memory.stalled > STALLED_SHARE * memory.driven
+        _stay(memory, FAILED, time, STALLED if stalled else FRICTION_UNCERTAIN)
 
 
-@compiled
-def _watched(gates: Gates, plan: Plan, facts: Facts) -> Plan:
-    """Count the samples in which a mass hardly moves, once the drives have had a moment to get going."""
-    if facts.time - plan.entered < 0.5 * gates.least_drive:
-        return plan
-    slow = min(abs(facts.rate[0]), abs(facts.rate[1])) < gates.stall_rate
-    return with_findings(plan, with_stall(plan.findings, slow))
+@in_place
+def arm_deviation(memory: Record, mass: int) -> float:
+    """Standard deviation of an estimated friction arm, m."""
+    return math.sqrt(max(memory.friction[mass].arm_variance, 0.0))
 
 
-@compiled
-def _towards(gates: Gates, plan: Plan, facts: Facts) -> Plan:
-    """Go to the targets for the estimated imbalance."""
-    goal, saturated, residual = _goal(gates, facts.angle, facts.imbalance)
-    now = with_findings(plan, with_targets(plan.findings, saturated, residual))
-    now = with_correction(now, correction_start(goal, facts.imbalance))
-    return enter(now, POSITIONING, facts.time, NONE, goal)
-
-
-@compiled
-def _goal(gates: Gates, angle: Pair, imbalance: complex) -> tuple[Pair, bool, float]:
+@in_place
+def _goal(gates: Gates, angle: Sequence[float], imbalance: complex) -> tuple[Pair, int, float]:
     """Targets for an imbalance, and who goes where from these angles.
 
     Returns: Goal, whether it is saturated, and the imbalance that it leaves, kg m.
@@ -170,218 +205,209 @@ def _goal(gates: Gates, angle: Pair, imbalance: complex) -> tuple[Pair, bool, fl
         angle[0] + travel.first + gates.target_error[0],
         angle[1] + travel.second + gates.target_error[1],
     )
-    return goal, targets.saturated, targets.residual
+    return goal, 1 if targets.saturated else 0, targets.residual
 
 
-@compiled
-def _positioning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+@in_place
+def _positioning(gates: Gates, memory: Record, time: float) -> None:
     """Until the masses are at their targets, or friction holds them: the check tells what that leaves."""
-    now = _arriving(gates, plan, facts, gates.arrival_angle)
-    if _there(gates, now, facts) or _held(gates, now, facts):
-        return enter(now, CHECK, facts.time, NONE, now.goal)
-    late = facts.time - now.entered >= gates.positioning_time
-    return enter(now, FAILED, facts.time, NOT_ARRIVED, facts.angle) if late else now
+    _watch_arrival(gates, memory, time, gates.arrival_angle)
+    if _there(gates, memory, time) or _held(gates, memory, time):
+        enter(memory, CHECK, time, NONE)
+    elif time - memory.entered >= gates.positioning_time:
+        _stay(memory, FAILED, time, NOT_ARRIVED)
 
 
-@compiled
-def _check(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+@in_place
+def _check(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
     """Average the vibration once the masses are left to friction, and correct the targets by it."""
-    if not facts.constant:
-        return _cut_short(gates, plan, facts)
-    now = _rest(gates, plan, facts)
-    if now.hold == MOVING:
-        return now
-    if now.progress.averaging == NOT_YET:
-        now = with_progress(now, averaging_from(now.progress, facts.time + gates.wait))
-    now = _sampled(now, facts)
-    if not _averaged(gates, now, facts):
-        return now
-    return _corrected(gates, now, now.progress.total / now.progress.samples, facts)
+    if not is_constant(motion):
+        _cut_short(gates, memory, time)
+        return
+    _rest(gates, law, memory, motion, time)
+    if memory.hold == MOVING:
+        return
+    if memory.averaging == NOT_YET:
+        _average_from(memory, time + gates.wait)
+    if _averaged(gates, memory, motion, time):
+        mean = memory.total / memory.averaged
+        _correct(gates, memory, mean, influence_of(law, motion.speed), time)
 
 
-@compiled
-def _corrected(gates: Gates, plan: Plan, mean: complex, facts: Facts) -> Plan:
+@in_place
+def _correct(gates: Gates, memory: Record, mean: complex, influence: complex, time: float) -> None:
     """Go on to better targets while that helps, back to the best place, or on to what comes after."""
-    held = plan.findings.short > gates.tuning_near
-    best = correction_judged(plan.correction, mean, gates.margin, held)
-    now = _judged(with_correction(plan, best), abs(best.residual))
-    far = plan.findings.short > gates.arrival_angle
+    judge_correction(memory, mean, gates.margin, memory.short > gates.tuning_near)
+    memory.objective = abs(memory.residual)
+    far = memory.short > gates.arrival_angle
     enough = far and abs(mean) <= gates.limit
-    over = enough or gates.by_trials or facts.influence == 0 or correction_ends(best, gates.margin)
-    if not over:
-        aim = correction_aim(best, facts.influence)
-        goal, saturated, residual = _goal(gates, _without_error(gates, best.place), aim)
-        if _distance(goal, best.place) > gates.tuning_near:
-            # Where friction keeps the masses far off, the aim goes beyond the imbalance to pull them free.
-            if not far:
-                now = with_findings(now, with_targets(now.findings, saturated, residual))
-            return _set_out(now, correction_step(best, aim, goal), facts)
-    if best.residual != mean and not enough:
-        return _set_out(now, correction_back(best), facts)
-    return _decided(gates, _judged(now, abs(mean)), facts)
+    over = enough or gates.by_trials or influence == 0 or correction_ends(memory, gates.margin)
+    if not over and _step(gates, memory, influence, far):
+        enter(memory, CORRECTION, time, NONE)
+    elif memory.residual != mean and not enough:
+        # Where the next mean is the last.
+        aim_back(memory)
+        memory.share = 0.0
+        set_pair(memory.goal, memory.aimed[0], memory.aimed[1])
+        enter(memory, CORRECTION, time, NONE)
+    else:
+        memory.objective = abs(mean)
+        _decide(gates, memory, time)
 
 
-@compiled
-def _set_out(plan: Plan, correction: Correction, facts: Facts) -> Plan:
-    """Begin the move of a correction."""
-    return enter(with_correction(plan, correction), CORRECTION, facts.time, NONE, correction.goal)
+@in_place
+def _step(gates: Gates, memory: Record, influence: complex, far: bool) -> bool:
+    """Aim at the targets for what the best place leaves. Returns: whether they are others."""
+    aim = memory.corrected + memory.share * memory.residual / influence
+    place = (memory.place[0] - gates.target_error[0], memory.place[1] - gates.target_error[1])
+    (first, second), saturated, left = _goal(gates, place, aim)
+    if max(abs(first - memory.place[0]), abs(second - memory.place[1])) <= gates.tuning_near:
+        return False
+    # Where friction keeps the masses far off, the aim goes beyond the imbalance to pull them free.
+    if not far:
+        memory.saturated, memory.left = saturated, left
+    memory.aim, memory.steps = aim, memory.steps + 1
+    set_pair(memory.aimed, first, second)
+    set_pair(memory.goal, first, second)
+    return True
 
 
-@compiled
-def _decided(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+@in_place
+def _decide(gates: Gates, memory: Record, time: float) -> None:
     """After the last correction: content with this place, or what is left to do from here."""
-    if plan.findings.objective <= gates.limit:
-        return with_hold(enter(plan, REST, facts.time, BALANCED, plan.goal), plan.hold)
-    if plan.findings.saturated:
-        return with_hold(enter(plan, REST, facts.time, SATURATED, plan.goal), plan.hold)
-    if plan.findings.short > gates.arrival_angle:
-        return enter(plan, FAILED, facts.time, NOT_ARRIVED, facts.angle)
-    first = tuning_start(plan.goal[0], plan.goal[1], plan.findings.objective, gates.tuning_step)
-    return _try(gates, enter(plan, FINE_TUNING, facts.time, NONE, plan.goal), first, facts)
+    hold = memory.hold
+    if memory.objective <= gates.limit or memory.saturated:
+        enter(memory, REST, time, BALANCED if memory.objective <= gates.limit else SATURATED)
+        memory.hold = hold
+    elif memory.short > gates.arrival_angle:
+        _stay(memory, FAILED, time, NOT_ARRIVED)
+    else:
+        enter(memory, FINE_TUNING, time, NONE)
+        begin_tuning(memory, gates.tuning_step)
+        _try(gates, memory, time)
 
 
-@compiled
-def _cut_short(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+@in_place
+def _cut_short(gates: Gates, memory: Record, time: float) -> None:
     """The speed has changed during a check or a correction: the best place so far is kept."""
-    content = abs(plan.correction.residual) <= gates.limit
-    cause = BALANCED if content else SPEED_CHANGED
-    return enter(plan, REST, facts.time, cause, plan.correction.place)
+    content = abs(memory.residual) <= gates.limit
+    _return(memory, memory.place, time, BALANCED if content else SPEED_CHANGED)
 
 
-@compiled
-def _correction(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+@in_place
+def _correction(gates: Gates, memory: Record, motion: Motion, time: float) -> None:
     """Until the masses are at the corrected targets, or where friction leaves them."""
-    if not facts.constant:
-        return _cut_short(gates, plan, facts)
-    now = _arriving(gates, plan, facts, gates.tuning_near)
-    return enter(now, CHECK, facts.time, NONE, now.goal) if _over(gates, now, facts) else now
+    if not is_constant(motion):
+        _cut_short(gates, memory, time)
+        return
+    _watch_arrival(gates, memory, time, gates.tuning_near)
+    if _over(gates, memory, time):
+        enter(memory, CHECK, time, NONE)
 
 
-@compiled
-def _fine_tuning(gates: Gates, plan: Plan, facts: Facts) -> Plan:
-    if not facts.constant:
-        return enter(plan, REST, facts.time, SPEED_CHANGED, plan.tuning.base)
-    if facts.time - plan.entered >= gates.fine_tuning_time:
-        return enter(plan, REST, facts.time, TUNING_TIME, plan.tuning.base)
-    if plan.progress.averaging == NOT_YET:
-        return _moving(gates, plan, facts)
-    now = _sampled(plan, facts)
-    if not _averaged(gates, now, facts):
-        return now
-    tuning = tuning_next(now.tuning, _mean(now), gates.margin, gates.tuning_stop)
-    told = _judged(now, tuning.best)
-    if tuning.best <= gates.limit:
-        return enter(told, REST, facts.time, BALANCED, tuning.base)
-    return _try(gates, told, tuning, facts)
-
-
-@compiled
-def _moving(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+@in_place
+def _fine_tuning(gates: Gates, memory: Record, motion: Motion, time: float) -> None:
     """A trial counts from where friction leaves the masses, even if not quite where they should be."""
-    now = _arriving(gates, plan, facts, max(0.1 * plan.tuning.step, gates.tuning_near))
-    if not _over(gates, now, facts):
-        return now
-    return with_progress(now, averaging_from(now.progress, facts.time + gates.wait))
+    if not is_constant(motion):
+        _return(memory, memory.base, time, SPEED_CHANGED)
+    elif time - memory.entered >= gates.fine_tuning_time:
+        _return(memory, memory.base, time, TUNING_TIME)
+    elif memory.averaging == NOT_YET:
+        _watch_arrival(gates, memory, time, max(0.1 * memory.move_size, gates.tuning_near))
+        if _over(gates, memory, time):
+            _average_from(memory, time + gates.wait)
+    elif _averaged(gates, memory, motion, time):
+        next_trial(memory, abs(memory.total) / memory.averaged, gates.margin, gates.tuning_stop)
+        memory.objective = memory.least
+        if memory.least <= gates.limit:
+            _return(memory, memory.base, time, BALANCED)
+        else:
+            _try(gates, memory, time)
 
 
-@compiled
-def _try(gates: Gates, plan: Plan, tuning: Tuning, facts: Facts) -> Plan:
+@in_place
+def _try(gates: Gates, memory: Record, time: float) -> None:
     """Go to the next trial at which the masses do not overlap."""
-    chosen = tuning
-    place = tuning_place(chosen)
-    while not chosen.done and separation(place[0], place[1]) < gates.gap:
-        chosen = tuning_next(chosen, math.inf, gates.margin, gates.tuning_stop)
-        place = tuning_place(chosen)
-    if chosen.done:
-        return enter(plan, REST, facts.time, RESIDUAL, chosen.base)
-    return with_trial(plan, facts.time, chosen, place)
+    first, second = tuning_place(memory)
+    while not memory.done and separation(first, second) < gates.gap:
+        next_trial(memory, math.inf, gates.margin, gates.tuning_stop)
+        first, second = tuning_place(memory)
+    if memory.done:
+        _return(memory, memory.base, time, RESIDUAL)
+    else:
+        set_pair(memory.goal, first, second)
+        _set_out(memory, time)
 
 
-@compiled
-def _rest(gates: Gates, plan: Plan, facts: Facts) -> Plan:
+@in_place
+def _rest(gates: Gates, law: DriveLaw, memory: Record, motion: Motion, time: float) -> None:
     """Bring the masses home; then the drives rest while friction holds for sure, or hold from then on."""
-    now = _arriving(gates, plan, facts, gates.tuning_near)
-    hold = now.hold
-    if hold == MOVING and _over(gates, now, facts):
-        hold, now = RELEASED, _left_there(gates, now, facts)
-    astray = False
-    for i in range(2):
-        astray = astray or abs(facts.angle[i] - now.goal[i]) > 2 * gates.arrival_angle
-    if hold == RELEASED and (astray or facts.load > _HOLDS_FOR_SURE):
-        hold = HELD
-    return with_hold(now, hold)
+    _watch_arrival(gates, memory, time, gates.tuning_near)
+    if memory.hold == MOVING and _over(gates, memory, time):
+        memory.hold, memory.short = RELEASED, _distance(memory)
+        # Where friction has the masses is their place from now on, if that is far short of their goal.
+        if memory.short > gates.arrival_angle:
+            set_pair(memory.goal, memory.angle[0], memory.angle[1])
+    astray = _distance(memory) > 2 * gates.arrival_angle
+    if memory.hold == RELEASED and (astray or _holding_load(law, memory, motion) > _HOLDS_FOR_SURE):
+        memory.hold = HELD
 
 
-@compiled
-def _left_there(gates: Gates, plan: Plan, facts: Facts) -> Plan:
-    """Where friction has the masses is their place from now on, if that is far short of their goal."""
-    short = _distance(facts.angle, plan.goal)
-    now = with_findings(plan, with_short(plan.findings, short))
-    return with_goal(now, facts.angle) if short > gates.arrival_angle else now
+@in_place
+def _holding_load(law: DriveLaw, memory: Record, motion: Motion) -> float:
+    """Largest share of what friction holds for sure that holding takes; infinite when it holds nothing."""
+    first = max(memory.friction[0].arm - 2 * arm_deviation(memory, 0), 0.0)
+    second = max(memory.friction[1].arm - 2 * arm_deviation(memory, 1), 0.0)
+    angle = (memory.angle[0], memory.angle[1])
+    quiet = Motion(motion.speed, motion.speed_rate, memory.position, memory.velocity, angle, (0.0, 0.0))
+    return friction_needed(law, quiet, memory.imbalance, (first, second))
 
 
-@compiled
-def _arriving(gates: Gates, plan: Plan, facts: Facts, closeness: float) -> Plan:
-    there = True
-    for i in range(2):
-        close = abs(facts.angle[i] - plan.goal[i]) <= closeness
-        there = there and close and abs(facts.rate[i]) <= gates.arrival_rate
-    since = facts.time if plan.progress.arrived == NOT_YET else plan.progress.arrived
-    now = with_arrival(plan.progress, since if there else NOT_YET)
-    distance = _distance(facts.angle, plan.goal)
-    nearer = distance < now.nearest - gates.noticeable
-    return with_progress(plan, with_nearest(now, distance, facts.time) if nearer else now)
+@in_place
+def _watch_arrival(gates: Gates, memory: Record, time: float, closeness: float) -> None:
+    distance = _distance(memory)
+    slow = max(abs(memory.rate[0]), abs(memory.rate[1])) <= gates.arrival_rate
+    if not (distance <= closeness and slow):
+        memory.arrived = NOT_YET
+    elif memory.arrived == NOT_YET:
+        memory.arrived = time
+    if distance < memory.nearest - gates.noticeable:
+        memory.nearest, memory.nearer = distance, time
 
 
-@compiled
-def _there(gates: Gates, plan: Plan, facts: Facts) -> bool:
-    return plan.progress.arrived != NOT_YET and facts.time - plan.progress.arrived >= gates.dwell
+@in_place
+def _there(gates: Gates, memory: Record, time: float) -> bool:
+    return bool(memory.arrived != NOT_YET and time - memory.arrived >= gates.dwell)
 
 
-@compiled
-def _held(gates: Gates, plan: Plan, facts: Facts) -> bool:
+@in_place
+def _held(gates: Gates, memory: Record, time: float) -> bool:
     """Whether friction holds the masses: slow, and for a while no nearer to their goal."""
-    slow = max(abs(facts.rate[0]), abs(facts.rate[1])) <= gates.arrival_rate
-    return slow and facts.time - plan.progress.nearer >= _STILL_TIME
+    slow = max(abs(memory.rate[0]), abs(memory.rate[1])) <= gates.arrival_rate
+    return bool(slow and time - memory.nearer >= _STILL_TIME)
 
 
-@compiled
-def _over(gates: Gates, plan: Plan, facts: Facts) -> bool:
+@in_place
+def _over(gates: Gates, memory: Record, time: float) -> bool:
     """Whether a move has come to its end, at its goal or short of it."""
-    late = facts.time - plan.progress.moving >= gates.move_time
-    return late or _there(gates, plan, facts) or _held(gates, plan, facts)
+    late = time - memory.moving >= gates.move_time
+    return late or _there(gates, memory, time) or _held(gates, memory, time)
 
 
-@compiled
-def _distance(one: Pair, other: Pair) -> float:
-    """Larger distance of both masses between two places, rad."""
-    return max(abs(one[0] - other[0]), abs(one[1] - other[1]))
+@in_place
+def _distance(memory: Record) -> float:
+    """Of the mass farther from its goal, rad."""
+    first, second = memory.angle[0] - memory.goal[0], memory.angle[1] - memory.goal[1]
+    return float(max(abs(first), abs(second)))
 
 
-@compiled
-def _without_error(gates: Gates, place: Pair) -> Pair:
-    """Targets of a goal, without the error that the scene adds to them, rad."""
-    return place[0] - gates.target_error[0], place[1] - gates.target_error[1]
+@in_place
+def _averaged(gates: Gates, memory: Record, motion: Motion, time: float) -> bool:
+    """Take a sample into the mean, and say whether that is long enough.
 
-
-@compiled
-def _sampled(plan: Plan, facts: Facts) -> Plan:
-    """The mean is of the rotor-fixed vector: noise averages out of it, but not out of amplitudes."""
-    if facts.time < plan.progress.averaging:
-        return plan
-    return with_progress(plan, with_sample(plan.progress, facts.position))
-
-
-@compiled
-def _averaged(gates: Gates, plan: Plan, facts: Facts) -> bool:
-    return plan.progress.samples > 0 and facts.time - plan.progress.averaging >= gates.average
-
-
-@compiled
-def _mean(plan: Plan) -> float:
-    return abs(plan.progress.total) / plan.progress.samples
-
-
-@compiled
-def _judged(plan: Plan, objective: float) -> Plan:
-    return with_findings(plan, with_objective(plan.findings, objective))
+    It is of the rotor-fixed vector: noise averages out of that, but not out of amplitudes.
+    """
+    if time >= memory.averaging:
+        memory.total += motion.position
+        memory.averaged += 1
+    return bool(memory.averaged > 0 and time - memory.averaging >= gates.average)

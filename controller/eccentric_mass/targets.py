@@ -19,9 +19,12 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+from ringbalance.controller.eccentric_mass.imbalance_filter import Record
+from ringbalance.controller.eccentric_mass.memory import Pair
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.scene.platform.compiled import compiled
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.platform.compiled import in_place
 
 
 class Targets(NamedTuple):
@@ -50,13 +53,13 @@ class _Assignment(NamedTuple):
     """Whether the first mass goes to the second target."""
 
 
-@compiled
+@in_place
 def wrapped(angle: float) -> float:
     """An angle within (-pi, pi]. Returns: The same direction, rad."""
     return math.pi - (math.pi - angle) % (2 * math.pi)
 
 
-@compiled
+@in_place
 def target_angles(imbalance: float, phase: float, moment: float, gap: float) -> Targets:
     """Angles at which the masses undo an imbalance.
 
@@ -78,7 +81,7 @@ def target_angles(imbalance: float, phase: float, moment: float, gap: float) -> 
     )
 
 
-@compiled
+@in_place
 def assign(first: float, second: float, target_one: float, target_two: float) -> _Assignment:
     """Send each mass to a target by the shortest pair of travels on which they do not meet.
 
@@ -107,61 +110,43 @@ def assign(first: float, second: float, target_one: float, target_two: float) ->
 MOVES = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
 
 
-class Tuning(NamedTuple):
-    """Where the search is."""
-
-    base: tuple[float, float]
-    """Best place so far, rad, unwrapped."""
-    best: float
-    """Objective there, m."""
-    step: float
-    """Size of the moves, rad."""
-    move: int
-    """Of the four, the one that is tried now."""
-    failed: int
-    """Moves in a row that were no better than staying."""
-    trials: int
-    """Places looked at since the start."""
-    done: bool
-    """Whether the moves have become shorter than the search is asked for."""
+@in_place
+def begin_tuning(memory: Record, step: float) -> None:
+    """Search by trial from the present goal. Args: `memory`: of type `MEMORY`. `step`: first move, rad."""
+    set_pair(memory.base, memory.goal[0], memory.goal[1])
+    memory.least, memory.move_size = memory.objective, step
+    memory.move, memory.failed, memory.done = 0, 0, 0
 
 
-@compiled
-def tuning_start(first: float, second: float, objective: float, step: float) -> Tuning:
-    """Begin at the present place."""
-    return Tuning((first, second), objective, step, 0, 0, 0, False)
-
-
-@compiled
-def tuning_place(tuning: Tuning) -> tuple[float, float]:
+@in_place
+def tuning_place(memory: Record) -> Pair:
     """Angles of both masses to go to now, rad; the best place when the search is done."""
-    first, second = tuning.base
-    if tuning.done:
-        return first, second
-    one, two = MOVES[tuning.move]
-    return first + tuning.step * one, second + tuning.step * two
+    step = 0.0 if memory.done else memory.move_size
+    one, two = MOVES[memory.move]
+    return memory.base[0] + step * one, memory.base[1] + step * two
 
 
-@compiled
-def tuning_next(tuning: Tuning, objective: float, margin: float, stop: float) -> Tuning:
-    """Take in what the present trial gave.
+@in_place
+def next_trial(memory: Record, objective: float, margin: float, stop: float) -> None:
+    """Take in what the present trial gave; a move that helped is tried again first.
 
     Args: `objective`: at the place of the trial, m; infinite for one that cannot be taken up.
-    Returns: The search with its next trial; a move that helped is tried again first.
     Source: section 3.6 of the paper on eccentric masses, with staying compared and the moves halved.
     """
-    base, best, step, move, failed, trials, _ = tuning
-    if objective < best - margin:
-        return Tuning(tuning_place(tuning), objective, step, move, 0, trials + 1, False)
-    if failed < 3:
-        return Tuning(base, best, step, (move + 1) % 4, failed + 1, trials + 1, False)
-    half = 0.5 * step
-    return Tuning(base, best, half, (move + 1) % 4, 0, trials + 1, half < stop)
+    if objective < memory.least - margin:
+        first, second = tuning_place(memory)
+        set_pair(memory.base, first, second)
+        memory.least, memory.failed = objective, 0
+        return
+    memory.move, memory.failed = (memory.move + 1) % 4, memory.failed + 1
+    if memory.failed > 3:
+        memory.move_size, memory.failed = 0.5 * memory.move_size, 0
+        memory.done = 1 if memory.move_size < stop else 0
 
 
-@compiled
+@in_place
 def separation(first: float, second: float) -> float:
-    """Angle between two masses, the shorter way round. Returns: Within [0, pi], rad."""
+    """Angle between two masses, the shorter way round, within [0, pi], rad."""
     return abs(math.pi - (math.pi - second + first) % (2 * math.pi))
 
 
@@ -173,70 +158,51 @@ _WORTH: Final = 2.0
 """Times the margin of a mean, which a vibration must exceed for a step to show a gain."""
 
 
-class Correction(NamedTuple):
-    """The best place so far, and the step that is tried from it."""
-
-    place: tuple[float, float]
-    """Goal of each mass there, rad, unwrapped."""
-    residual: complex
-    """Mean vibration there, m; infinite before the first mean."""
-    imbalance: complex
-    """For which the targets there were, kg m."""
-    aim: complex
-    """For which the present targets are, kg m."""
-    goal: tuple[float, float]
-    """Of the present step, rad, unwrapped; friction may hold the masses short of it."""
-    share: float
-    """Of a whole step that is taken."""
-    steps: int
-    """Taken so far."""
+@in_place
+def begin_correction(memory: Record) -> None:
+    """The masses go to the first targets, for the imbalance as estimated; there is no mean yet."""
+    memory.residual, memory.share, memory.steps = complex(math.inf, 0.0), 1.0, 0
+    memory.corrected, memory.aim = memory.imbalance, memory.imbalance
+    set_pair(memory.place, memory.goal[0], memory.goal[1])
+    set_pair(memory.aimed, memory.goal[0], memory.goal[1])
 
 
-@compiled
-def correction_start(place: tuple[float, float], imbalance: complex) -> Correction:
-    """The masses go to the first targets. Returns: Correction without a mean."""
-    return Correction(place, complex(math.inf, 0.0), imbalance, imbalance, place, 1.0, 0)
+@in_place
+def judge_correction(memory: Record, residual: complex, margin: float, held: bool) -> None:
+    """Compare a mean vibration with that of staying at the best place so far, and keep the better place.
 
-
-@compiled
-def correction_judged(old: Correction, residual: complex, margin: float, held: bool) -> Correction:
-    """Compare a mean vibration with that of staying at the best place so far.
-
-    Args: `held`: whether friction held a mass short of its goal. Where nothing got worse a further step adds
-    to the goal, so that the mass breaks away.
-    Returns: The correction from the better place; half the share when the step did not help.
+    A step that did not help is halved. Args: `held`: whether friction held a mass short of its goal. Where
+    nothing got worse a further step adds to the goal, so that the mass breaks away.
     """
-    here, best, half = abs(residual), abs(old.residual), 0.5 * old.share
-    if here < best - margin or old.share == 0:
-        return Correction(old.goal, residual, old.aim, old.aim, old.goal, old.share, old.steps)
-    if held and here <= best + margin:
-        return Correction(old.goal, residual, old.aim, old.aim, old.goal, half, old.steps)
-    return Correction(old.place, old.residual, old.imbalance, old.imbalance, old.place, half, old.steps)
+    here, best = abs(residual), abs(memory.residual)
+    better = here < best - margin or memory.share == 0
+    if not better:
+        memory.share *= 0.5
+    if better or (held and here <= best + margin):
+        memory.residual, memory.corrected = residual, memory.aim
+        set_pair(memory.place, memory.aimed[0], memory.aimed[1])
+    else:
+        aim_back(memory)
 
 
-@compiled
-def correction_aim(old: Correction, influence: complex) -> complex:
-    """Imbalance for which the next targets are, kg m. Args: `influence`: alpha as configured, m/(kg m)."""
-    return old.imbalance + old.share * old.residual / influence
+@in_place
+def aim_back(memory: Record) -> None:
+    """To the best place so far."""
+    memory.aim = memory.corrected
+    set_pair(memory.aimed, memory.place[0], memory.place[1])
 
 
-@compiled
-def correction_step(old: Correction, aim: complex, goal: tuple[float, float]) -> Correction:
-    """One step from the best place. Returns: With its aim and goal."""
-    return Correction(old.place, old.residual, old.imbalance, aim, goal, old.share, old.steps + 1)
-
-
-@compiled
-def correction_back(old: Correction) -> Correction:
-    """Back to the best place, where the next mean is the last. Returns: Correction with no share left."""
-    return Correction(old.place, old.residual, old.imbalance, old.imbalance, old.place, 0.0, old.steps)
-
-
-@compiled
-def correction_ends(correction: Correction, margin: float) -> bool:
+@in_place
+def correction_ends(memory: Record, margin: float) -> bool:
     """Whether no further step is worth its time."""
-    shown = abs(correction.residual) > _WORTH * margin
-    return not shown or correction.share < _LEAST_SHARE or correction.steps >= MOST_STEPS
+    shown = abs(memory.residual) > _WORTH * margin
+    return bool(not shown or memory.share < _LEAST_SHARE or memory.steps >= MOST_STEPS)
+
+
+@in_place
+def set_pair(pair: FloatArray, first: float, second: float) -> None:
+    """Write two numbers into an array."""
+    pair[0], pair[1] = first, second
 
 
 def reach_of(scene: EccentricScene) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -20,12 +20,12 @@ from ringbalance.controller.judging.search import (
     searched_along,
     top_level,
 )
-from ringbalance.controller.judging.tuning import BestOfKind, Information, Tuning
+from ringbalance.controller.judging.tuning import BestOfKind, Tuning
 from ringbalance.controller.judging.tuning_rows import LONGER, tuning_document, tuning_rows
 from ringbalance.results.requirements import MET
 from ringbalance.results.result import Presentation
 from ringbalance.scene.draws import BLOCK
-from ringbalance.scene.origins import SceneFile, value_at, with_values_at
+from ringbalance.scene.origins import value_at, with_values_at
 
 _MOST_LONGER: Final = 4 * BLOCK
 """Devices that are watched longer where 64 do not decide."""
@@ -34,15 +34,14 @@ _MOST_LONGER: Final = 4 * BLOCK
 def tuned(
     balancer: Balancer,
     *,
-    information: Callable[[SceneFile], Information] = lambda _: Information(),
     along: bool = False,
     remedies: bool | None = False,
     progress: Progress | None = None,
 ) -> Tuning:
     """Settings of a balancer by runs.
 
-    Args: `information`: of the scene with the recommended settings. `along`: whether the axis that the
-        balancer names is searched in any case; else only where the scene's level of it does not suffice.
+    Args: `along`: whether what `Trials.along` names, such as the supply's pressure, is searched in any case;
+        else only where the scene's level of it does not suffice.
         `remedies`: whether those are tried where what is required is not met, and choices that the scene
         leaves open; None: the former alone.
     """
@@ -73,7 +72,7 @@ def tuned(
         along=tuple(_agreeing(each, best, own_level if level is None else level) for each in curve),
         along_name=axis.name if axis else "",
         along_unit=axis.unit if axis else "1",
-        information=information(with_values_at(balancer.scene, best.settings)),
+        information=balancer.information(with_values_at(balancer.scene, best.settings)),
         ranking=ranked(balancer, best),
         remedies=tried_remedies(balancer, best, search=settings, told=told) if mends else (),
         choices=tried_choices(balancer, search=settings, told=told) if remedies else (),

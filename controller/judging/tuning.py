@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,21 +9,12 @@ from ringbalance.controller.judging.judge import Judgement
 from ringbalance.controller.judging.ranking import Ranking
 from ringbalance.controller.judging.remedies import Remedied
 from ringbalance.controller.judging.search import Along
+from ringbalance.controller.trials import Information
 from ringbalance.results.requirements import MET
-from ringbalance.results.result import Facts, PresentedResult
-from ringbalance.results.rows import Quantity
+from ringbalance.results.result import PresentedResult
 from ringbalance.scene.changes import rechecked
 from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import SceneFile, with_values_at
-
-
-@dataclass(frozen=True, kw_only=True)
-class Information:
-    """What is known of a loop without a run; nothing is judged by it."""
-
-    quantities: tuple[Quantity, ...] = ()
-    facts: Facts = ()
-    document: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,7 +42,7 @@ class Tuning(PresentedResult):
     along_name: str = ""
     """Path of its key."""
     along_unit: str = "1"
-    information: Information = Information()
+    information: Information = field(default_factory=Information)
     remedies: tuple[Remedied, ...] = ()
     """What remedies come to, the best first; tried where what is required is not met."""
     ranking: Ranking = field(default_factory=Ranking)

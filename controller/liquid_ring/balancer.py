@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Any, Final
@@ -13,23 +14,21 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.balancer import (
     FURTHER,
+    Balancer,
     Demand,
     Draws,
     Input,
     Outcomes,
     Progress,
     Remedy,
+    RunResult,
     Setting,
     Settings,
-    TracedRun,
     inputs_of,
-    outcomes_of,
     settles_within,
 )
 from ringbalance.controller.document import line_runs, line_runs_table, simulation_history
 from ringbalance.controller.judging.judge import MOST_DRAWS
-from ringbalance.controller.judging.tune import tuned
-from ringbalance.controller.judging.tuning import Information, Tuning
 from ringbalance.controller.liquid_ring.devices import Spread, rotor_like
 from ringbalance.controller.liquid_ring.drawn_runs import DrawnRuns
 from ringbalance.controller.liquid_ring.loop_factor import loop_information
@@ -39,12 +38,18 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import CommonRotor, Rotors, Sensor, wrapped
 from ringbalance.controller.simulation import Simulation
 from ringbalance.controller.terms import run_models
-from ringbalance.controller.trials import DrawnInput, Trials
+from ringbalance.controller.trials import DrawnInput, Information, Trials
 from ringbalance.reduced_model.calibration import calibrate, calibrated_model, chamber_and_law, law_by_name
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import gives_forces
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.flow_law import CALIBRATED, BalancerModel, completed_model, lacking
+from ringbalance.reduced_model.law.flow_law import (
+    CALIBRATED,
+    UNCHECKED,
+    BalancerModel,
+    completed_model,
+    lacking,
+)
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
 from ringbalance.results.requirements import AT_LEAST
@@ -63,7 +68,7 @@ _PRESSURE: Final = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class LiquidRingBalancer:
+class LiquidRingBalancer(Balancer):
     """A disc with chambers that a gas drives liquid between; options as in `ringbalance.simulate`."""
 
     options = frozenset({"flow_law", "controller", "sensor", "modelled"})
@@ -145,7 +150,7 @@ class LiquidRingBalancer:
         traced = [
             self._traced(scene, number, devices=draws.devices, progress=progress) for number in draws.numbers
         ]
-        return outcomes_of(traced, trace=trace)
+        return Outcomes.of(traced, trace=trace)
 
     def run_all(
         self, settings: Sequence[Settings], draws: Draws, *, further: float = FURTHER
@@ -209,13 +214,13 @@ class LiquidRingBalancer:
 
     @cached_property
     def _drawn_runs(self) -> DrawnRuns:
-        remade = self.flow_law is None or self.flow_law == CALIBRATED
+        remade = self.flow_law in (None, CALIBRATED, UNCHECKED)
         spread = Spread.of(self.scene, self.model, remade=remade)
         return DrawnRuns(
             scene=self.scene, model=self.model, spread=spread, limit=self.limit, rotors=self.rotors
         )
 
-    def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> TracedRun:
+    def _traced(self, scene: Scene, number: int, *, devices: bool, progress: Progress | None) -> RunResult:
         drawn: dict[str, Any] = {"controller": self.controller}
         model, moment = self.model, 1.0
         if devices:
@@ -238,9 +243,9 @@ class LiquidRingBalancer:
             **drawn,
         )
         run = replace(run, findings=(*run.findings, *_of_own_law(self.flow_law, run)))
-        return TracedRun(
+        return RunResult(
             run=run,
-            settling_time=run.settling_time,
+            settling_time=math.inf if run.settling_time is None else run.settling_time,
             final_amplitude=float(run.amplitude[-1]),
             energy=run.gas.energy,
             worst_amplitude=float(np.max(run.amplitude)),
@@ -293,28 +298,14 @@ class LiquidRingBalancer:
         """See `Balancer`."""
         return self.scene.controller.period
 
-    def span(self) -> float:
-        """The scene's time limit, s."""
-        return self.scene.run.time_limit
-
     def lasting(self, span: float) -> LiquidRingBalancer:
         """See `Balancer`."""
         run = replace(self.scene.run, time_limit=span)
         return replace(self, scene=replace(self.scene, run=run), to_time_limit=True)
 
-    def recommend(
-        self,
-        *,
-        pressure: bool = False,
-        remedies: bool | None = False,
-        progress: Callable[[str], None] | None = None,
-    ) -> Tuning:
+    def information(self, scene: SceneFile) -> Information:
         """See `Balancer`."""
-
-        def information(scene: SceneFile) -> Information:
-            return loop_information(liquid_ring_scene(scene), self.model)
-
-        return tuned(self, information=information, along=pressure, remedies=remedies, progress=progress)
+        return loop_information(liquid_ring_scene(scene), self.model)
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Those of its calibration; see `Balancer`."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
@@ -14,7 +13,7 @@ import numpy as np
 
 from ringbalance.controller.algorithms.built_in import BuiltIn
 from ringbalance.controller.algorithms.by_name import controller_of
-from ringbalance.controller.balancer import FURTHER, Draws, Outcomes, Settings
+from ringbalance.controller.balancer import FURTHER, Draws, Outcomes, RunResult, Settings
 from ringbalance.controller.liquid_ring.devices import Device, Spread, devices
 from ringbalance.controller.liquid_ring.plant import LiquidRing
 from ringbalance.controller.loop_plan import LoopPlan, Records
@@ -30,7 +29,6 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import HELD
 from ringbalance.scene.designs import Designs, alike
 from ringbalance.scene.draws import run_noise
-from ringbalance.scene.loop_models import ControllerSettings
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import with_values_at
 
@@ -85,7 +83,7 @@ class DrawnRuns:
         """
         check_ring(self.scene)
         asked = [self._setting(place, each) for place, each in enumerate(settings)]
-        ended: list[list[_Ended]] = [[] for _ in asked]
+        ended: list[list[RunResult]] = [[] for _ in asked]
         drawn: list[Device] = []
         for group, numbers in groupby(draws.numbers, lambda number: number // _GROUP):
             some = list(numbers)
@@ -96,7 +94,12 @@ class DrawnRuns:
                 for number in some:
                     for at, done in self._runs(under[number % _GROUP], tried, further, whole=draws.whole):
                         ended[at].append(done)
-        return tuple(_outcomes(rows, drawn) for rows in ended)
+        devices_drawn: dict[str, Any] = {
+            "numbers": tuple(device.number for device in drawn),
+            "inputs": [device.inputs for device in drawn],
+            "clipped": [name for device in drawn for name in device.clipped],
+        }
+        return tuple(Outcomes.of(results, **devices_drawn) for results in ended)
 
     def _setting(self, place: int, setting: Settings) -> _Setting:
         scene = with_values_at(self.scene, setting)
@@ -106,10 +109,10 @@ class DrawnRuns:
 
     def _runs(
         self, under: _Under, asked: Sequence[_Setting], further: float, *, whole: bool
-    ) -> Iterator[tuple[int, _Ended]]:
+    ) -> Iterator[tuple[int, RunResult]]:
         """Place of a setting and how the device's run under it ended."""
         if not whole and under.unreachable > _OUT_OF_REACH * self.limit:
-            yield from ((each.place, _Ended.at_best(under, limit=self.limit)) for each in asked)
+            yield from ((each.place, _at_best(under, limit=self.limit)) for each in asked)
             return
         for settings, tried in _grouped(asked, lambda each: replace(each.scene.controller, proportional=1)):
             plan = LoopPlan.of(
@@ -125,7 +128,7 @@ class DrawnRuns:
             gains = [each.scene.controller.proportional for each in tried]
             runs = under.carried(plan, gains, seed=self.scene.run.seed)
             for each, run in zip(tried, runs, strict=True):
-                yield each.place, _Ended.of(under, run, limit=self.limit)
+                yield each.place, _result(under, run, limit=self.limit)
 
     def device(self, number: int) -> Device:
         """One of the devices."""
@@ -236,48 +239,38 @@ def _under(drawn: Sequence[Device], scenes: Sequence[Scene], *, modelled: Sequen
         yield _Under.of(device, scene, plants[place : place + 1], each, drawn_to, stalls_at)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Ended:
-    """How one run ended."""
+def _result(under: _Under, run: np.void, *, limit: float) -> RunResult:
+    """What a run comes to."""
+    gas = under.scene.gas
+    rests = run["cause"] == AT_REST and run["since"] < math.inf
+    settled = run["settled"] > 0 or rests
+    since = run["held_since"] if run["settled"] > 0 else run["since"]
+    work = compression_work(
+        pressure_volume=float(run["gas"]),
+        pressure=gas.pressure + gas.ambient_pressure,
+        ambient_pressure=gas.ambient_pressure,
+    )
+    return RunResult(
+        settling_time=float(since) if settled else math.inf,
+        final_amplitude=float(run["amplitude"]),
+        energy=work,
+        usable_moment=under.usable_moment,
+        unbalance=under.unbalance,
+        ended=str(Outcome.SETTLED if settled else _why(under, run, limit)),
+    )
 
-    settling_time: float = math.inf
-    final_amplitude: float = math.nan
-    energy: float = 0.0
-    usable_moment: float = math.nan
-    unbalance: float = math.nan
-    code: str = ""
 
-    @classmethod
-    def of(cls, under: _Under, run: np.void, *, limit: float) -> _Ended:
-        gas = under.scene.gas
-        rests = run["cause"] == AT_REST and run["since"] < math.inf
-        settled = run["settled"] > 0 or rests
-        since = run["held_since"] if run["settled"] > 0 else run["since"]
-        work = compression_work(
-            pressure_volume=float(run["gas"]),
-            pressure=gas.pressure + gas.ambient_pressure,
-            ambient_pressure=gas.ambient_pressure,
-        )
-        return cls(
-            settling_time=float(since) if settled else math.inf,
-            final_amplitude=float(run["amplitude"]),
-            energy=work,
-            usable_moment=under.usable_moment,
-            unbalance=under.unbalance,
-            code=str(Outcome.SETTLED if settled else _why(under, run, limit)),
-        )
-
-    @classmethod
-    def at_best(cls, under: _Under, *, limit: float) -> _Ended:
-        """With the liquid at its best, of a device that this does not bring to the limit."""
-        beyond = under.beyond_disc > limit
-        return cls(
-            final_amplitude=under.unreachable,
-            energy=math.nan,
-            usable_moment=under.usable_moment,
-            unbalance=under.unbalance,
-            code=str(Outcome.CAPACITY_EXCEEDED if beyond else Outcome.STALLED),
-        )
+def _at_best(under: _Under, *, limit: float) -> RunResult:
+    """With the liquid at its best, of a device that this does not bring to the limit."""
+    beyond = under.beyond_disc > limit
+    return RunResult(
+        settling_time=math.inf,
+        final_amplitude=under.unreachable,
+        energy=math.nan,
+        usable_moment=under.usable_moment,
+        unbalance=under.unbalance,
+        ended=str(Outcome.CAPACITY_EXCEEDED if beyond else Outcome.STALLED),
+    )
 
 
 def _why(under: _Under, run: np.void, limit: float) -> Outcome:
@@ -300,29 +293,9 @@ def _numbers(group: int) -> range:
     return range(group * _GROUP, (group + 1) * _GROUP)
 
 
-def _but_for_gain(setting: _Setting) -> ControllerSettings:
-    return replace(setting.scene.controller, proportional=1.0)
-
-
 def _grouped(settings: Sequence[_Setting], key: Any) -> Iterator[tuple[Any, list[_Setting]]]:
     """Settings that are alike in a key, in the order of the first of each."""
     groups: dict[Any, list[_Setting]] = {}
     for each in settings:
         groups.setdefault(key(each), []).append(each)
     yield from groups.items()
-
-
-def _outcomes(rows: Sequence[_Ended], drawn: Sequence[Device]) -> Outcomes:
-    times = np.array([row.settling_time for row in rows])
-    return Outcomes(
-        settled=np.isfinite(times),
-        settling_time=times,
-        final_amplitude=np.array([row.final_amplitude for row in rows]),
-        energy=np.array([row.energy for row in rows]),
-        usable_moment=np.array([row.usable_moment for row in rows]),
-        unbalance=np.array([row.unbalance for row in rows]),
-        ended=tuple(row.code for row in rows),
-        numbers=tuple(device.number for device in drawn),
-        inputs={name: np.array([device.inputs[name] for device in drawn]) for name in drawn[0].inputs},
-        clipped=Counter(name for device in drawn for name in device.clipped),
-    )

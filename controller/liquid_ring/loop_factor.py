@@ -25,10 +25,10 @@ from ringbalance.controller.algorithms.algorithm import Controller
 from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, split_change
-from ringbalance.controller.judging.tuning import Information
 from ringbalance.controller.loop_records import RUN, MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import run_models
+from ringbalance.controller.trials import Information
 from ringbalance.reduced_model.gas_line import line_answers, line_document, line_text
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio, stalled_fill_ratio

@@ -34,7 +34,8 @@ def rotor_of(scene: SceneFile) -> CommonRotor:
 
 
 def moved(scene: SceneFile, to: SceneFile) -> SceneFile:
-    return balancer_of(scene).on_rotor(rotor_of(to)).scene
+    placed: SceneFile = balancer_of(scene).on_rotor(rotor_of(to)).scene
+    return placed
 
 
 @pytest.fixture(scope="module")

@@ -175,7 +175,7 @@ def test_a_mass_reaches_the_speed_at_which_motor_and_friction_balance(scene: Ecc
         "angle": np.zeros(2),
     }
     start, end = KINDS["positioning"].predict(stiff, observed("positioning", columns), None)
-    arm = plant.friction_arm_1 * plant.moment
+    arm = plant.friction_arm[0] * plant.moment
     a, b, c = arm, plant.drive_damping + 2 * arm * speed, arm * speed**2 - plant.drive_gain * volts
     steady = (-b + math.sqrt(b * b - 4 * a * c)) / (2 * a)
     assert (end - start) / (times[1] - times[0]) == pytest.approx(steady, rel=0.02)

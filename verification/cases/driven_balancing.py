@@ -13,34 +13,30 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
-    ProcessNoise,
-    filter_matrices,
+    imbalance_filter,
     imbalance_history,
     locked_masses,
-    start_estimate,
 )
-from ringbalance.controller.eccentric_mass.integration import run_plant
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
-from ringbalance.controller.eccentric_mass.run import simulate_eccentric
+from ringbalance.controller.eccentric_mass.run import locked_run, simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.settings import believed_whirl
+from ringbalance.controller.eccentric_mass.settings import filter_settings
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.verification.evidence import (
     Curve,
     Evidence,
     Found,
     Level,
-    Reference,
     Series,
     as_found,
     figure,
-    from_rounding,
+    printed,
 )
 from ringbalance.verification.papers import at_constant_speed, changed, convergence_time, envelope, thinned
 
 _RPM: Final = 30 / np.pi
-_CRITICAL: Final = Reference(value=135.0, uncertainty=from_rounding(1.0))
+_CRITICAL: Final = printed(135.0, last_digit=1.0)
 """Printed, rpm."""
 _SHOWN: Final = 12.0
 """s."""
@@ -69,8 +65,10 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     peak = largest if defect else float(np.max(balanced.amplitude[balanced.time >= begins]))
     runs = {"locked": locked, "balanced at 100 rpm": balanced}
     return Evidence(
-        found={"critical": Found(value=critical, corrected=without), "peak": Found(value=peak / largest)},
-        reference={"critical": _CRITICAL},
+        found={
+            "critical": Found(value=critical, corrected=without, reference=_CRITICAL),
+            "peak": Found(value=peak / largest),
+        },
         numbers={
             "locked": largest,
             "balanced": peak,
@@ -160,9 +158,9 @@ def positioning(scene: EccentricScene, level: Level, defect: str | None = None) 
     return Evidence(
         found=as_found(ratio=np.max(found.positioned / found.before)),
         numbers={
-            "before": float(found.before[0]),
-            "first": float(found.positioned[0]),
-            "second": float(found.positioned[1]),
+            "before": found.before[0],
+            "first": found.positioned[0],
+            "second": found.positioned[1],
             "arrived": max(arrived),
         },
         series=(_amplitudes("amplitude", found.runs, until=_SHOWN), angles),
@@ -179,9 +177,9 @@ def fine_tuning(scene: EccentricScene, level: Level, defect: str | None = None) 
             left=np.min(found.positioned / found.before), ended=np.max(found.after / found.before)
         ),
         numbers={
-            "left_m": float(found.positioned.min()),
-            "end": float(found.after.max()),
-            "time": float(max(settled)),
+            "left_m": found.positioned.min(),
+            "end": found.after.max(),
+            "time": max(settled),
         },
         series=(_amplitudes("amplitude", found.runs),),
     )
@@ -339,10 +337,10 @@ def imbalance_record(scene: EccentricScene, *, duration: float) -> _ImbalanceRec
 
     Returns: One sample for each step of the sensor, without the instant of the start.
     """
-    run = run_plant(at_constant_speed(scene, time_limit=duration), locked=True)
+    run = locked_run(at_constant_speed(scene, time_limit=duration))
     random = np.random.default_rng(scene.run.seed)
     deviations = np.repeat([scene.sensor.position_noise, scene.sensor.velocity_noise], 2)
-    clean = run.state[1:, :4]
+    clean = run.history["state"][1:, :4]
     parameters = PlantParameters.of(scene)
     return _ImbalanceRecord(
         time=run.time[1:],
@@ -357,12 +355,10 @@ def estimate_imbalance(
 ) -> tuple[FloatArray, FloatArray]:
     """States, shape (n, 6), and covariances, shape (n, 6, 6), of the scene's filter over a record."""
     keys = scene.imbalance_filter
-    noise = ProcessNoise(keys.velocity_walk**2, keys.unbalance_walk**2)
-    euler = keys.discretisation == "euler"
+    settings = filter_settings(scene)._replace(step=scene.sensor.step, laboratory=False)
     masses = PlantParameters.of(scene).moment * np.sum(np.exp(1j * np.array(scene.masses.initial_angle)))
     return imbalance_history(
-        start_estimate(keys.initial_position, keys.initial_velocity, keys.initial_unbalance),
-        matrices=filter_matrices(believed_whirl(scene), noise, record.speed, scene.sensor.step, False, euler),
+        imbalance_filter(settings, speed=record.speed),
         samples=record.samples,
         variance=scale**2 * np.repeat([keys.position_noise**2, keys.velocity_noise**2], 2),
         masses=locked_masses(complex(masses)),
@@ -397,13 +393,15 @@ def friction(scene: EccentricScene, level: Level, defect: str | None = None) -> 
     """Two friction arms found while both masses go round: their errors and the time they take."""
     runs = friction_runs(scene)
     wrong = 1.1 if defect == "another_friction" else 1.0
-    errors = [np.max(np.abs(run.estimates.friction_arm[-1] / (wrong * arm) - 1)) for arm, run in runs.items()]
+    errors = [
+        np.max(np.abs(run.history["friction_arm"][-1] / (wrong * arm) - 1)) for arm, run in runs.items()
+    ]
     slowest = max(friction_time(run, arm) for arm, run in runs.items())
     time = runs[_ARMS[0]].time - _begun(runs[_ARMS[0]])
     shown = (time > -_BEFORE) & (time < _AFTER)
     when = thinned(time[shown])
     estimated = (
-        Curve(f"{1e3 * arm:g} mm, first mass", "m", thinned(run.estimates.friction_arm[shown, 0]))
+        Curve(f"{1e3 * arm:g} mm, first mass", "m", thinned(run.history["friction_arm"][shown, 0]))
         for arm, run in runs.items()
     )
     printed = (
@@ -424,7 +422,7 @@ def friction_runs(scene: EccentricScene) -> Mapping[float, EccentricRun]:
 
 def friction_time(run: EccentricRun, arm: float) -> float:
     """From the beginning of the friction stage until both estimates keep within 5 %, s."""
-    error = np.max(np.abs(run.estimates.friction_arm - arm), axis=1) / arm
+    error = np.max(np.abs(run.history["friction_arm"] - arm), axis=1) / arm
     return convergence_time(run.time, error, limit=_ARM_KNOWN) - _begun(run)
 
 

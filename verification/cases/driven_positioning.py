@@ -9,10 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.controller.eccentric_mass.drive_law import DriveLaw, friction_torque, regulator_torque
 from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.settings import DriveLaw
-from ringbalance.controller.eccentric_mass.step import friction_torque, regulator_torque
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.platform.compiled import compiled
 from ringbalance.verification.evidence import Curve, Evidence, Found, Level, as_found, figure

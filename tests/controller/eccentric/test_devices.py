@@ -18,6 +18,7 @@ from ringbalance.controller.eccentric_mass.sampled_loops import RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.targets import reach_of
 from ringbalance.controller.judging.judge import judged_all
+from ringbalance.controller.judging.tune import tuned
 from ringbalance.results.proportion import Proportion
 from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.papers import at_constant_speed, changed
@@ -129,7 +130,7 @@ def test_tuning_gives_the_drives_their_margins_where_they_lack_them(small: Eccen
 
 def test_too_few_devices_are_told_after_sixteen(small: EccentricScene) -> None:
     """In one second none settles; the loops stand beside it as information."""
-    tuning = balancer_of(small.with_values({"run.time_limit": 1.0})).recommend()
+    tuning = tuned(balancer_of(small.with_values({"run.time_limit": 1.0})))
     document = tuning.to_dict()
     assert (document["verdict"], document["fraction"]["of"], document["fraction"]["count"]) == (
         "not met",

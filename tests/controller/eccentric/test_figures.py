@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
+from ringbalance.controller.eccentric_mass.drive_law import DriveLaw, friction_torque
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
-from ringbalance.controller.eccentric_mass.settings import DriveLaw
-from ringbalance.controller.eccentric_mass.step import friction_torque
 from ringbalance.controller.eccentric_mass.targets import target_angles
 from ringbalance.verification.cases import driven_balancing
 from ringbalance.verification.cases.driven_balancing import (
@@ -45,7 +44,7 @@ def test_figure_four_honest_filters_need_no_seconds(paper: EccentricScene) -> No
 
 def test_figure_five_finds_both_friction_arms(paper: EccentricScene) -> None:
     for arm, run in friction_runs(paper).items():
-        assert run.estimates.friction_arm[-1] == pytest.approx((arm, arm), rel=0.02)
+        assert run.history["friction_arm"][-1] == pytest.approx((arm, arm), rel=0.02)
         assert friction_time(run, arm) < 1.0
 
 

@@ -10,30 +10,34 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from ringbalance.controller.eccentric_mass.imbalance_filter import (
-    FilterMatrices,
-    ImbalanceEstimate,
+    FilterSettings,
     MassInput,
-    ProcessNoise,
+    Records,
     WhirlModel,
-    _euler_transition,
-    _process_covariance,
     correct,
-    filter_matrices,
     imbalance_deviation,
+    imbalance_filter,
     imbalance_history,
     locked_masses,
     mass_vector,
     predict,
-    start_estimate,
-    turned_back,
     whirl_transition,
 )
-from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.arrays import FloatArray
 
 MODEL = WhirlModel(5.36, 10.0, 1000.0)
 SPEED = 100 * math.pi / 30
 STEP = 1e-3
-NOISE = ProcessNoise(1e-6, 1e-10)
+SETTINGS = FilterSettings(
+    model=MODEL,
+    acceleration_noise=1e-6,
+    imbalance_noise=1e-10,
+    start=(0.02, 0.2, 0.08),
+    step=STEP,
+    laboratory=False,
+    euler=False,
+)
+QUIET = SETTINGS._replace(acceleration_noise=0.0, imbalance_noise=0.0)
 VARIANCE = np.array([1e-8, 1e-8, 1e-6, 1e-6])
 TRUE = np.array([0.03, -0.02])
 MODELS = [MODEL, WhirlModel(26.2, 180.0, 12e3), WhirlModel(2.0, 400.0, 50.0), WhirlModel(1.0, 20.0, 100.0)]
@@ -58,29 +62,29 @@ def dynamic_stiffness(*, model: WhirlModel, angular_velocity: float) -> complex:
     return complex(model.stiffness - model.mass * w**2, model.damping * w)
 
 
-def start() -> ImbalanceEstimate:
-    return start_estimate(0.02, 0.2, 0.08)
+def begun(settings: FilterSettings = SETTINGS, speed: float = SPEED) -> Records:
+    return imbalance_filter(settings, speed=speed)
 
 
-def matrices(*, laboratory: bool = False, noise: ProcessNoise = NOISE, step: float = STEP) -> FilterMatrices:
-    return filter_matrices(MODEL, noise, SPEED, step, laboratory, False)
+def matrix(known: Records, name: str) -> FloatArray:
+    return np.asarray(known[name][0])
 
 
 def record(
-    *, steps: int, seed: int, laboratory: bool = False, noise: ProcessNoise = NOISE, prior: bool = False
+    *, steps: int, seed: int, settings: FilterSettings, prior: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """States and samples drawn from the filter's own model; from its prior when asked."""
-    random = np.random.default_rng(seed)
-    told = matrices(laboratory=laboratory, noise=noise)
+    random, known = np.random.default_rng(seed), begun(settings)
     state = np.concatenate([np.zeros(4), TRUE])
     if prior:
-        state = random.multivariate_normal(np.zeros(6), start().covariance)
+        state = random.multivariate_normal(np.zeros(6), matrix(known, "covariance"))
     states, samples = np.zeros((steps, 6)), np.zeros((steps, 4))
     for i in range(steps):
-        push = random.multivariate_normal(np.zeros(6), told.process) if noise.acceleration else 0.0
-        state = told.transition @ state + push
+        noisy = settings.acceleration_noise > 0
+        push = random.multivariate_normal(np.zeros(6), matrix(known, "process")) if noisy else 0.0
+        state = matrix(known, "transition") @ state + push
         states[i] = state
-        samples[i] = told.observation @ state + np.sqrt(VARIANCE) * random.standard_normal(4)
+        samples[i] = matrix(known, "observation") @ state + np.sqrt(VARIANCE) * random.standard_normal(4)
     return states, samples
 
 
@@ -91,9 +95,8 @@ def test_transition_is_the_matrix_exponential(model: WhirlModel, speed: float, s
     generator = whirl_generator(model=model, angular_velocity=speed)
     expected = expm(generator * step)
     np.testing.assert_allclose(whirl_transition(model, speed, step), expected, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(
-        _euler_transition(model, speed, step), np.eye(6) + generator * step, atol=1e-15
-    )
+    euler = matrix(begun(SETTINGS._replace(model=model, step=step, euler=True), speed), "transition")
+    np.testing.assert_allclose(euler, np.eye(6) + generator * step, atol=1e-15)
 
 
 def test_generator_is_the_whirls_equation() -> None:
@@ -112,7 +115,8 @@ def test_process_covariance_is_van_loans() -> None:
     power = np.diag([0, 0, 1e-3, 1e-3, 1e-8, 1e-8])
     block = expm(np.block([[-generator, power], [np.zeros((6, 6)), generator.T]]) * 0.02)
     expected = block[6:, 6:].T @ block[:6, 6:]
-    found = _process_covariance(MODEL, ProcessNoise(1e-3, 1e-8), SPEED, 0.02)
+    settings = SETTINGS._replace(acceleration_noise=1e-3, imbalance_noise=1e-8, step=0.02)
+    found = matrix(begun(settings), "process")
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-16)
 
 
@@ -123,38 +127,40 @@ def test_eulers_step_limit_is_where_its_eigenvalues_leave_the_unit_circle(
 ) -> None:
     limit = float(model.euler_step_limit(angular_velocity=speed))
     for share, grows in ((0.999, False), (1.001, True)):
-        radius = max(abs(np.linalg.eigvals(_euler_transition(model, speed, share * limit)[:4, :4])))
+        euler = begun(SETTINGS._replace(model=model, step=share * limit, euler=True), speed)
+        radius = max(abs(np.linalg.eigvals(matrix(euler, "transition")[:4, :4])))
         assert (radius > 1) == grows
 
 
 def test_covariance_history_is_the_information_filters() -> None:
     """Sums of inverses in place of gains: another arithmetic for the same numbers."""
-    told = matrices()
-    _, samples = record(steps=60, seed=1)
-    states, covariances = imbalance_history(start(), matrices=told, samples=samples, variance=VARIANCE)
-    state, covariance = start()
+    known = begun()
+    _, samples = record(steps=60, seed=1, settings=SETTINGS)
+    states, covariances = imbalance_history(known, samples=samples, variance=VARIANCE)
+    transition, observation = matrix(known, "transition"), matrix(known, "observation")
+    state, covariance = matrix(known, "state"), matrix(known, "covariance")
     for i in range(60):
-        state = told.transition @ state
-        covariance = told.transition @ covariance @ told.transition.T + told.process
+        state = transition @ state
+        covariance = transition @ covariance @ transition.T + matrix(known, "process")
         information = np.linalg.inv(covariance)
-        seen = information + told.observation.T @ (told.observation / VARIANCE[:, None])
+        seen = information + observation.T @ (observation / VARIANCE[:, None])
         covariance = np.linalg.inv(seen)
-        state = covariance @ (information @ state + told.observation.T @ (samples[i] / VARIANCE))
+        state = covariance @ (information @ state + observation.T @ (samples[i] / VARIANCE))
         np.testing.assert_allclose(covariances[i], covariance, rtol=1e-6, atol=1e-14)
         np.testing.assert_allclose(states[i], state, rtol=1e-6, atol=1e-9)
 
 
 def test_last_estimate_is_the_batch_least_squares_solution() -> None:
     """Without process noise all samples hang on the first state: one weighted least-squares problem."""
-    none = ProcessNoise(0.0, 0.0)
-    told = matrices(noise=none)
-    _, samples = record(steps=300, seed=2, noise=none)
-    states, covariances = imbalance_history(start(), matrices=told, samples=samples, variance=VARIANCE)
-    rows, power = [np.diag(1 / np.sqrt(np.diag(start().covariance)))], np.eye(6)
+    known = begun(QUIET)
+    _, samples = record(steps=300, seed=2, settings=QUIET)
+    states, covariances = imbalance_history(known, samples=samples, variance=VARIANCE)
+    transition, observation = matrix(known, "transition"), matrix(known, "observation")
+    rows, power = [np.diag(1 / np.sqrt(np.diag(matrix(known, "covariance"))))], np.eye(6)
     sides = [np.zeros(6)]
     for sample in samples:
-        power = told.transition @ power
-        rows.append(told.observation @ power / np.sqrt(VARIANCE)[:, None])
+        power = transition @ power
+        rows.append(observation @ power / np.sqrt(VARIANCE)[:, None])
         sides.append(sample / np.sqrt(VARIANCE))
     whole = np.vstack(rows)
     first = np.linalg.lstsq(whole, np.concatenate(sides), rcond=None)[0]
@@ -166,12 +172,10 @@ def test_last_estimate_is_the_batch_least_squares_solution() -> None:
 @pytest.mark.parametrize("laboratory", [False, True])
 def test_errors_are_as_large_as_the_covariance_says(laboratory: bool) -> None:
     """The mean of e^T P^-1 e over runs drawn from the prior is the number of states, 6."""
-    runs, nees = 60, []
+    runs, nees, settings = 60, [], SETTINGS._replace(laboratory=laboratory)
     for seed in range(runs):
-        states, samples = record(steps=150, seed=seed, laboratory=laboratory, prior=True)
-        found, covariances = imbalance_history(
-            start(), matrices=matrices(laboratory=laboratory), samples=samples, variance=VARIANCE
-        )
+        states, samples = record(steps=150, seed=seed, settings=settings, prior=True)
+        found, covariances = imbalance_history(begun(settings), samples=samples, variance=VARIANCE)
         error = states[-1] - found[-1]
         nees.append(error @ np.linalg.solve(covariances[-1], error))
     # Chi-squared of 6 degrees of freedom: standard deviation sqrt(12/60) of the mean; 4 of them.
@@ -179,46 +183,40 @@ def test_errors_are_as_large_as_the_covariance_says(laboratory: bool) -> None:
 
 
 def test_josephs_form_stays_symmetric_and_positive() -> None:
-    told, estimate = matrices(noise=ProcessNoise(0.0, 0.0)), start()
-    tiny = np.full(4, 1e-14)
+    known = begun(QUIET)
     for _ in range(200):
-        estimate, _ = correct(predict(estimate, told, locked_masses(0.0j)), told, np.zeros(4), tiny)
-        assert np.array_equal(estimate.covariance, estimate.covariance.T)
-        assert np.min(np.linalg.eigvalsh(estimate.covariance)) >= 0
+        predict(known[0], locked_masses(0.0j))
+        correct(known[0], np.zeros(4), np.full(4, 1e-14))
+        covariance = matrix(known, "covariance")
+        assert np.array_equal(covariance, covariance.T)
+        assert np.min(np.linalg.eigvalsh(covariance)) >= 0
 
 
 def test_both_frames_know_the_imbalance() -> None:
-    states, _ = record(steps=4000, seed=3, noise=ProcessNoise(0.0, 0.0))
+    states, _ = record(steps=4000, seed=3, settings=QUIET)
     random = np.random.default_rng(4)
     noise = np.sqrt(VARIANCE) * random.standard_normal((4000, 4))
-    time = STEP * np.arange(1, 4001)
     z, v = states[:, 0] + 1j * states[:, 1], states[:, 2] + 1j * states[:, 3]
-    turn = np.exp(1j * SPEED * time)
-    outside = np.column_stack([(turn * z).real, (turn * z).imag, *_parts(turn * (v + 1j * SPEED * z))])
-    back = np.array([turned_back(s, SPEED * t) for s, t in zip(outside + noise, time, strict=True)])
-    for laboratory, samples in ((False, states[:, :4] + noise), (True, back)):
-        told = matrices(laboratory=laboratory)
-        found, covariances = imbalance_history(start(), matrices=told, samples=samples, variance=VARIANCE)
+    seen = v + 1j * SPEED * z
+    outside = np.column_stack([z.real, z.imag, seen.real, seen.imag])
+    for laboratory, samples in ((False, states[:, :4] + noise), (True, outside + noise)):
+        known = begun(SETTINGS._replace(laboratory=laboratory))
+        found, covariances = imbalance_history(known, samples=samples, variance=VARIANCE)
         error = np.hypot(*(found[-1, 4:] - TRUE))
         assert error < 4 * imbalance_deviation(covariances[-1])
         assert error < 2e-3 * np.hypot(*TRUE)
 
 
-def _parts(values: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    return values.real, values.imag
-
-
 def test_masses_that_are_not_opposite_are_taken_out() -> None:
-    known, _ = mass_vector(0.0414, (0.2, 2.9), (0.0, 0.0))
-    own = np.array([known.real, known.imag])
-    told = matrices(noise=ProcessNoise(0.0, 0.0))
+    place, _ = mass_vector(0.0414, (0.2, 2.9), (0.0, 0.0))
+    own, known = np.array([place.real, place.imag]), begun(QUIET)
     state, samples = np.concatenate([np.zeros(4), TRUE + own]), []
     for _ in range(3000):
-        state = told.transition @ state
+        state = matrix(known, "transition") @ state
         samples.append(state[:4].copy())
-    for given, expected in ((known, TRUE), (0.0j, TRUE + own)):
+    for given, expected in ((place, TRUE), (0.0j, TRUE + own)):
         found, _ = imbalance_history(
-            start(), matrices=told, samples=np.array(samples), variance=VARIANCE, masses=locked_masses(given)
+            known, samples=np.array(samples), variance=VARIANCE, masses=locked_masses(given)
         )
         np.testing.assert_allclose(found[-1, 4:], expected, rtol=1e-3)
 
@@ -242,56 +240,56 @@ def test_moving_masses_are_taken_out() -> None:
     run = solve_ivp(slope, (0, 3), [0j, 0j], t_eval=time, rtol=1e-10, atol=1e-13, method="DOP853")
     back = np.exp(-1j * SPEED * time)
     z, v = run.y[0] * back, (run.y[1] - 1j * SPEED * run.y[0]) * back
-    estimate, told = start(), matrices(noise=ProcessNoise(0.0, 0.0))
+    known = begun(QUIET)
     before = mass_vector(moment, *angles(0.0))
     for i in range(1, time.size):
         now = mass_vector(moment, *angles(float(time[i])))
         p, pace = 0.5 * (before[0] + now[0]), 0.5 * (before[1] + now[1])
         damped = MODEL.damping / (MODEL.mass * SPEED**2)
-        masses = MassInput(p + damped * pace, pace * STEP / MODEL.mass, np.zeros((2, 2)), 0.0)
+        masses = MassInput(p + damped * pace, pace * STEP / MODEL.mass, (0.0, 0.0, 0.0), 0.0)
         seen = v[i] + now[1] / MODEL.mass
         sample = np.array([z[i].real, z[i].imag, seen.real, seen.imag])
-        estimate, _ = correct(predict(estimate, told, masses), told, sample, 1e-4 * VARIANCE)
+        predict(known[0], masses)
+        correct(known[0], sample, 1e-4 * VARIANCE)
         before = now
     # Of second order in the step: (3 rad/s * 1 ms)^2 of 0.04 kg m at most.
-    np.testing.assert_allclose(estimate.state[4:], TRUE, atol=4e-7)
+    np.testing.assert_allclose(known["state"][0, 4:], TRUE, atol=4e-7)
 
 
 def test_a_resting_rotor_is_refused() -> None:
-    still = filter_matrices(MODEL, NOISE, 0.0, STEP, False, False)
     with pytest.raises(ValueError, match="at rest"):
-        imbalance_history(start(), matrices=still, samples=np.zeros((5, 4)), variance=VARIANCE)
+        imbalance_history(begun(speed=0.0), samples=np.zeros((5, 4)), variance=VARIANCE)
 
 
 def test_a_sample_that_is_not_a_number_is_passed_over() -> None:
-    told = matrices()
-    ahead = predict(start(), told, locked_masses(0.0j))
-    found, _ = correct(ahead, told, np.full(4, np.nan), VARIANCE)
-    np.testing.assert_array_equal(found.state, ahead.state)
-    np.testing.assert_array_equal(found.covariance, ahead.covariance)
+    known = begun()
+    predict(known[0], locked_masses(0.0j))
+    before = known.copy()
+    assert correct(known[0], np.full(4, np.nan), VARIANCE) == 0.0
+    np.testing.assert_array_equal(known["state"], before["state"])
+    np.testing.assert_array_equal(known["covariance"], before["covariance"])
 
 
 def test_the_printed_observation_lets_the_imbalance_into_the_velocity() -> None:
     """Its last row is 0 0 0 1 1 1: the filter then blames the imbalance for what y' shows."""
-    printed = matrices().observation.copy()
-    printed[3, 4:] = 1.0
-    _, samples = record(steps=4000, seed=5, noise=ProcessNoise(0.0, 0.0))
-    for observation, good in ((matrices().observation, True), (printed, False)):
-        told = matrices()._replace(observation=observation)
-        found, _ = imbalance_history(start(), matrices=told, samples=samples, variance=VARIANCE)
+    _, samples = record(steps=4000, seed=5, settings=QUIET)
+    right, printed = begun(), begun()
+    printed["observation"][0, 3, 4:] = 1.0
+    for known, good in ((right, True), (printed, False)):
+        found, _ = imbalance_history(known, samples=samples, variance=VARIANCE)
         error = np.hypot(*(found[-1, 4:] - TRUE)) / np.hypot(*TRUE)
         assert (error < 0.01) == good
 
 
 def test_the_printed_process_noise_is_no_covariance() -> None:
     """diag(O randn) with normal numbers is negative half of the time, and takes the covariance along."""
-    random = np.random.default_rng(0)
-    told, estimate = matrices(), start()
-    lowest = 0.0
+    random, known, lowest = np.random.default_rng(0), begun(), 0.0
     for _ in range(200):
-        told = told._replace(process=np.diag(1e-6 * random.standard_normal(6)))
-        estimate, _ = correct(predict(estimate, told, locked_masses(0.0j)), told, np.zeros(4), VARIANCE)
-        lowest = min(lowest, float(np.min(np.linalg.eigvalsh(estimate.covariance))))
-        if not np.all(np.isfinite(estimate.covariance)):
+        known["process"][0] = np.diag(1e-6 * random.standard_normal(6))
+        predict(known[0], locked_masses(0.0j))
+        correct(known[0], np.zeros(4), VARIANCE)
+        covariance = matrix(known, "covariance")
+        lowest = min(lowest, float(np.min(np.linalg.eigvalsh(covariance))))
+        if not np.all(np.isfinite(covariance)):
             break
     assert lowest < -1e-8

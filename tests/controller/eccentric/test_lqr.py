@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_continuous_are
 
+from ringbalance.controller.eccentric_mass.drive_law import lqr_gain
 from ringbalance.controller.eccentric_mass.friction_filter import TrackModel
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.sampled_loops import GAIN_MARGIN, RecommendedGains
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene, eccentric_scene
-from ringbalance.controller.eccentric_mass.settings import lqr_gain
 from ringbalance.scene import bundled_scene, load_scene
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.verification.papers import changed

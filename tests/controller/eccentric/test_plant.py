@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from plant_runs import run_steps
 from scipy.integrate import solve_ivp
 
 from ringbalance.controller.eccentric_mass import integration
-from ringbalance.controller.eccentric_mass.integration import _run_steps
 from ringbalance.controller.eccentric_mass.plant import (
     LOCKED,
     SLIDING,
@@ -32,7 +32,7 @@ ANGLES = (0.3, 2.6)
 
 
 def without_friction(parameters: PlantParameters) -> PlantParameters:
-    return parameters._replace(friction_arm_1=0.0, friction_arm_2=0.0)
+    return parameters._replace(friction_arm=(0.0, 0.0))
 
 
 def fixed_frame_rates(
@@ -97,10 +97,10 @@ def test_against_the_fixed_frame(
     """Moving masses under a speed ramp, from rest: 1e-9 m after 5 s, where gyroscopic faults would show."""
     step, pieces = 1e-3, 5
     voltages = np.array([[4.0, 3.0], [5.0, 2.5], [2.5, 4.5], [4.0, 4.0], [3.0, 5.0]])
-    given = parameters._replace(friction_arm_1=arms[0], friction_arm_2=arms[1])
+    given = parameters._replace(friction_arm=(arms[0], arms[1]))
     times, speeds = np.array([0.0, 10.0]), np.array([start, start + 10 * rate])
     commands = np.repeat(voltages, 1000, axis=0)
-    states, _ = _run_steps(given, times, speeds, rest_state(ANGLES), stuck_flags(SLIDING), commands, step)
+    states, _ = run_steps(given, times, speeds, rest_state(ANGLES), stuck_flags(SLIDING), commands, step)
     rates = fixed_frame_rates(paper, start, rate, arms)
     q = np.array([0.0, 0.0, *ANGLES, 0.0, 0.0, 0.0, 0.0])
     largest = 0.0
@@ -123,7 +123,7 @@ def test_against_the_fixed_frame(
 def test_steady_whirl(rpm: float, parameters: PlantParameters) -> None:
     """Masses locked at constant speed: after the transient the complex closed form, to 1e-9 of itself."""
     speed = rpm * RPM
-    states, _ = _run_steps(
+    states, _ = run_steps(
         parameters,
         np.array([0.0]),
         np.array([speed]),
@@ -178,7 +178,7 @@ def test_electrical_energy_is_the_integral_of_power(parameters: PlantParameters)
     step, count = 1e-4, 5000
     command = np.array([3.0, -2.0])
     free = without_friction(parameters)
-    states, _ = _run_steps(
+    states, _ = run_steps(
         free,
         np.array([0.0]),
         np.array([10.0]),
@@ -202,7 +202,7 @@ def test_electrical_energy_is_the_integral_of_power(parameters: PlantParameters)
 def test_motor_equations_by_shaft_and_gear(parameters: PlantParameters) -> None:
     """A motor alone on a mass of its own: terminal speed V / (n K_m), time constant (J + J_add) / C_add."""
     heavy = without_friction(parameters)._replace(mass=1e9, stiffness=1e12, unbalance=0.0)
-    states, _ = _run_steps(
+    states, _ = run_steps(
         heavy,
         np.array([0.0]),
         np.array([0.0]),

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plant_runs import run_steps
 from scipy.integrate import solve_ivp
 
-from ringbalance.controller.eccentric_mass.integration import _held_step, _run_steps, plant_step
+from ringbalance.controller.eccentric_mass.integration import _held_step, plant_step
 from ringbalance.controller.eccentric_mass.plant import (
     BACKWARDS,
     FORWARDS,
@@ -54,7 +55,7 @@ def at_rest_on(parameters: PlantParameters, speed: float, angles: tuple[float, f
 def steps(
     parameters: PlantParameters, state: FloatArray, speed: float, commands: FloatArray, step: float = 1e-3
 ) -> tuple[FloatArray, IntArray]:
-    return _run_steps(
+    return run_steps(
         parameters, np.array([0.0]), np.array([speed]), state, stuck_flags(SLIDING), commands, step
     )
 
@@ -122,7 +123,7 @@ def test_the_run_up_itself_breaks_a_mass_loose(fixed_rotor: PlantParameters) -> 
 def test_a_mass_reverses_without_resting_when_the_drive_is_strong(fixed_rotor: PlantParameters) -> None:
     """Past zero speed the friction changes sign at once; accelerations are constant while W is large."""
     speed = 100.0
-    light = fixed_rotor._replace(friction_arm_1=1e-6, friction_arm_2=1e-6)
+    light = fixed_rotor._replace(friction_arm=(1e-6, 1e-6))
     friction = 1e-6 * light.moment * speed**2
     inertia = light.inertia + light.drive_inertia
     voltage = -5 * friction / light.drive_gain
@@ -141,7 +142,7 @@ def test_self_holding_against_the_whirl(share: float, rpm: float, parameters: Pl
     speed, angles = rpm * RPM, (1.2, 4.0)
     whirl = parameters.steady_whirl(speed, angles)
     across = [abs((whirl * cmath.exp(-1j * angle)).imag) for angle in angles]
-    arms = parameters._replace(friction_arm_1=across[0] / share, friction_arm_2=10 * across[1])
+    arms = parameters._replace(friction_arm=(across[0] / share, 10 * across[1]))
     states, stuck = steps(arms, at_rest_on(arms, speed, angles), speed, np.zeros((200, 2)))
     assert np.all(stuck[1:, 1] == STUCK)
     assert np.all(stuck[1:, 0] == (STUCK if share < 1 else SLIDING))
@@ -166,7 +167,7 @@ def test_without_friction_and_speed_nothing_holds(parameters: PlantParameters) -
     )
     assert after[6] > 0
     assert stuck[0] == SLIDING
-    free = parameters._replace(friction_arm_1=0.0, friction_arm_2=0.0)
+    free = parameters._replace(friction_arm=(0.0, 0.0))
     states, stuck_now = steps(free, rest_state((0.0, 2.0)), 10.0, np.zeros((50, 2)))
     assert np.all(stuck_now[1:] == SLIDING)
     assert np.all(np.isfinite(states))
@@ -174,7 +175,7 @@ def test_without_friction_and_speed_nothing_holds(parameters: PlantParameters) -
 
 def test_through_zero_speed_with_friction(parameters: PlantParameters) -> None:
     """A rotor that stops and turns back: every state is finite, and the masses rest again at the end."""
-    states, stuck = _run_steps(
+    states, stuck = run_steps(
         parameters._replace(unbalance=1e-3),
         np.array([0.0, 20.0]),
         np.array([5.0, -5.0]),
@@ -203,7 +204,7 @@ def energy_of(parameters: PlantParameters, state: FloatArray, speed: float) -> f
 
 def test_friction_never_gives_energy(parameters: PlantParameters) -> None:
     """At W = 0 with the drive off, shaken masses and rotor only lose energy, whatever sticks or slips."""
-    calm = parameters._replace(unbalance=0.0, friction_arm_1=0.05, friction_arm_2=0.02)
+    calm = parameters._replace(unbalance=0.0, friction_arm=(0.05, 0.02))
     state = rest_state((0.2, 2.0))
     state[:4] = [0.02, -0.01, 0.3, 0.1]
     state[6:] = [3.0, -2.0]
@@ -215,12 +216,13 @@ def test_friction_never_gives_energy(parameters: PlantParameters) -> None:
 
 def consistent_motions(torques: _Torques) -> Iterator[tuple[int, int]]:
     """All combinations that the law of friction allows, by its definition."""
-    most = (torques.friction_1, torques.friction_2)
-    for motion in product((HELD, FORWARDS, BACKWARDS), repeat=2):
-        a = angular_accelerations(torques, *motion)
+    most = torques.friction
+    ways = (HELD, FORWARDS, BACKWARDS)
+    for motion in product(ways, ways):
+        a = angular_accelerations(torques, motion)
         needed = (
-            torques.driving_1 - torques.own * a[0] - torques.cross * a[1],
-            torques.driving_2 - torques.own * a[1] - torques.cross * a[0],
+            torques.driving[0] - torques.own * a[0] - torques.cross * a[1],
+            torques.driving[1] - torques.own * a[1] - torques.cross * a[0],
         )
         held = all(abs(needed[i]) <= most[i] for i in range(2) if motion[i] == HELD)
         if held and all(motion[i] * a[i] > 0 for i in range(2) if motion[i] != HELD):
@@ -236,12 +238,12 @@ def consistent_motions(torques: _Torques) -> Iterator[tuple[int, int]]:
 def test_the_motion_from_rest_is_the_one_that_the_law_allows(
     driving: tuple[float, float], friction: tuple[float, float], cross: float
 ) -> None:
-    torques = _Torques(1.0, cross, *driving, *friction)
+    torques = _Torques(1.0, cross, driving, friction)
     found = motions(torques, rest_state((0.0, 1.0)), stuck_flags(STUCK))
-    accelerations = angular_accelerations(torques, *found)
+    accelerations = angular_accelerations(torques, found)
     # At the bound of the torque two motions are the same: what counts is the acceleration.
     for allowed in consistent_motions(torques):
-        assert angular_accelerations(torques, *allowed) == pytest.approx(accelerations, abs=1e-9)
+        assert angular_accelerations(torques, allowed) == pytest.approx(accelerations, abs=1e-9)
 
 
 def carried(
@@ -261,7 +263,7 @@ def carried(
 @pytest.mark.parametrize("damping", [0.0, 20.0, 3000.0])
 def test_a_step_with_held_masses_is_exact(damping: float, parameters: PlantParameters) -> None:
     """Undamped, underdamped, and overdamped; the step is as long as the transient."""
-    rotor = parameters._replace(damping=damping, friction_arm_1=1e3, friction_arm_2=1e3)
+    rotor = parameters._replace(damping=damping, friction_arm=(1e3, 1e3))
     speed, state = 150 * RPM, rest_state((0.4, 2.9))
     state[:4] = 1e-3, -2e-3, 0.01, 0.02
     drive, after, stuck = drive_of(rotor, np.array([0.01, -0.02]), 0.0), state.copy(), stuck_flags(SLIDING)
@@ -277,7 +279,7 @@ def test_masses_that_the_transient_could_break_loose_are_not_taken_as_held(
     speed, angles = 150 * RPM, (1.2, 4.0)
     whirl = parameters.steady_whirl(speed, angles)
     arm = 1.5 * max(abs((whirl * cmath.exp(-1j * angle)).imag) for angle in angles)
-    rotor = parameters._replace(friction_arm_1=arm, friction_arm_2=arm)
+    rotor = parameters._replace(friction_arm=(arm, arm))
     drive, step = drive_of(rotor, OFF, 0.0), 1e-3
     settled, shaken = at_rest_on(rotor, speed, angles), rest_state(angles)
     assert _held_step(rotor, settled, stuck_flags(STUCK), speed, drive, step)

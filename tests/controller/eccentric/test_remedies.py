@@ -56,8 +56,8 @@ def test_errors_of_the_imbalance_are_those_claimed_while_masses_creep(number: in
     total = 0.0
     for seed in SEEDS:
         run = simulate_eccentric(scene, seed=seed)
-        error = run.estimates.imbalance[-1] - true
-        total += float(error @ np.linalg.solve(run.estimates.imbalance_covariance[-1], error))
+        error = run.history["imbalance"][-1] - true
+        total += float(error @ np.linalg.solve(run.history["imbalance_covariance"][-1], error))
     low, high = chi2.ppf([1e-6, 1 - 1e-6], 2 * len(SEEDS))
     assert low < total < high
 
@@ -81,9 +81,9 @@ def test_masses_that_rest_teach_nothing(seed: int) -> None:
     stuck = changed(changed(small, "lqr", friction_compensation="none"), "run", time_limit=8.0)
     run = simulate_eccentric(stuck, seed=seed)
     assert np.ptp(run.mass_angle, axis=1).max() == 0.0
-    np.testing.assert_array_equal(run.estimates.friction_arm, 0.0)
+    np.testing.assert_array_equal(run.history["friction_arm"], 0.0)
     start = stuck.friction_filter.initial_friction**2
-    np.testing.assert_allclose(run.estimates.friction_variance, start)
+    np.testing.assert_allclose(run.history["friction_variance"], start)
     assert run.outcome == "stalled"
 
 
@@ -102,8 +102,8 @@ def test_a_resting_mass_does_not_bias_the_other_ones_friction(scene: EccentricSc
     run = simulate_eccentric(weak)
     moved = np.ptp(run.mass_angle, axis=1)
     assert moved[0] < 1e-2 < moved[1]
-    error = run.estimates.friction_arm[-1, 1] - 0.005
-    assert abs(error) < 5 * math.sqrt(run.estimates.friction_variance[-1, 1])
+    error = run.history["friction_arm"][-1, 1] - 0.005
+    assert abs(error) < 5 * math.sqrt(run.history["friction_variance"][-1, 1])
 
 
 def test_a_balanced_rotor_that_leaves_its_limit_is_not_settled() -> None:

@@ -32,8 +32,8 @@ def shrunk(size: float) -> EccentricScene:
 def normalised(scene: EccentricScene, seed: int) -> float:
     """Squared error of the imbalance over the filter's covariance, at the end of a run."""
     run = simulate_eccentric(scene, seed=seed)
-    error = run.estimates.imbalance[-1] - true_imbalance(scene)
-    return float(error @ np.linalg.solve(run.estimates.imbalance_covariance[-1], error))
+    error = run.history["imbalance"][-1] - true_imbalance(scene)
+    return float(error @ np.linalg.solve(run.history["imbalance_covariance"][-1], error))
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 30.0])
@@ -57,7 +57,7 @@ def ellipse(scene: EccentricScene, number: int) -> tuple[float, float]:
     run = simulate_eccentric(plant, seed=number, settings=StrategySettings.of(scene))
     told = simulate_eccentric(scene).to_dict()["estimates"]
     noise = np.asarray(told["imbalance_covariance"][-1])
-    error = run.estimates.imbalance[-1] - true_imbalance(plant)
+    error = run.history["imbalance"][-1] - true_imbalance(plant)
     # The scene's own imbalance is drawn as well; what is not known of the rotor is a share of it.
     share = PlantParameters.of(plant).unbalance / PlantParameters.of(scene).unbalance
     whole = noise + share**2 * np.asarray(told["imbalance_rotor_covariance"])

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from eccentric_runs import bundled, stage_names, stage_of
 
-from ringbalance.controller.eccentric_mass.plan import EccentricMeasurement
+from ringbalance.controller.eccentric_mass.memory import MEMORY, EccentricMeasurement
 from ringbalance.controller.eccentric_mass.plant import PlantParameters
 from ringbalance.controller.eccentric_mass.run import simulate_eccentric
 from ringbalance.controller.eccentric_mass.run_facts import EccentricOutcome
 from ringbalance.controller.eccentric_mass.run_record import EccentricRun
 from ringbalance.controller.eccentric_mass.scene_records import EccentricScene
 from ringbalance.controller.eccentric_mass.settings import StrategySettings
-from ringbalance.controller.eccentric_mass.step import strategy_start, strategy_step
+from ringbalance.controller.eccentric_mass.step import begin_strategy, strategy_step
 from ringbalance.verification.papers import RPM, at_constant_speed, changed
 
 
@@ -45,8 +44,8 @@ def unbalance_left(run: EccentricRun, plant: PlantParameters) -> float:
 
 def test_the_masses_undo_the_imbalance(run: EccentricRun, scene: EccentricScene) -> None:
     assert unbalance_left(run, PlantParameters.of(scene)) < 2e-3 * PlantParameters.of(scene).unbalance
-    errors = run.estimates.friction_arm[-1] - np.array(scene.masses.friction_arm)
-    assert np.all(np.abs(errors) < 5 * np.sqrt(run.estimates.friction_variance[-1]))
+    errors = run.history["friction_arm"][-1] - np.array(scene.masses.friction_arm)
+    assert np.all(np.abs(errors) < 5 * np.sqrt(run.history["friction_variance"][-1]))
 
 
 def test_a_seed_gives_the_same_bits(run: EccentricRun, scene: EccentricScene) -> None:
@@ -65,32 +64,22 @@ def test_progress_is_reported(scene: EccentricScene) -> None:
     assert times[-1] == pytest.approx(12.0, abs=2e-3)
 
 
-def test_the_step_is_pure(scene: EccentricScene) -> None:
-    settings = StrategySettings.of(scene)
-    sample = EccentricMeasurement(0.0, 10.0, 0.0, 0.0, np.array([1e-3, 0, 0, 0]), (0.0, 3.0), (0.0, 0.0))
-    state = strategy_start(settings, sample)
-    first, voltage = strategy_step(settings, state, sample)
-    again, same = strategy_step(settings, state, sample)
-    assert voltage == same
-    assert first.plan == again.plan
-    np.testing.assert_array_equal(first.whirl.estimate.state, again.whirl.estimate.state)
-    bad = sample._replace(angle=(math.nan, 3.0))
-    skipped, kept = strategy_step(settings, first, bad)
-    assert kept == voltage
-    assert skipped.plan == first.plan
-
-
-def test_plain_python_gives_the_compiled_steps_numbers(scene: EccentricScene) -> None:
-    settings = StrategySettings.of(scene)
-    sample = EccentricMeasurement(0.0, 10.0, 0.0, 0.0, np.array([1e-3, 0, 0, 0]), (0.0, 3.0), (0.01, 0.0))
-    step: Any = strategy_step
-    compiled, plain = strategy_start(settings, sample), strategy_start(settings, sample)
-    for i in range(5):
-        seen = sample._replace(time=1e-3 * i)
-        compiled, one = strategy_step(settings, compiled, seen)
-        plain, two = step.py_func(settings, plain, seen)
-        assert one == pytest.approx(two, rel=1e-12)
-    np.testing.assert_allclose(compiled.whirl.estimate.state, plain.whirl.estimate.state, rtol=1e-12)
+def test_a_step_is_repeatable_and_a_sample_that_is_not_a_number_is_passed_over(
+    scene: EccentricScene,
+) -> None:
+    settings, memory = StrategySettings.of(scene), np.zeros(1, dtype=MEMORY)
+    sample = EccentricMeasurement(0.0, 10.0, 0.0, 0.0, 1e-3 + 0j, 0j, (0.0, 3.0), (0.0, 0.0))
+    begin_strategy(settings, memory[0], sample)
+    again = memory.copy()
+    strategy_step(settings, memory[0], sample)
+    strategy_step(settings, again[0], sample)
+    assert again.tobytes() == memory.tobytes()
+    assert np.any(memory["voltage"] != 0.0)
+    before = memory.copy()
+    strategy_step(settings, memory[0], sample._replace(angle=(math.nan, 3.0)))
+    assert memory["sample"] == before["sample"] + 1
+    memory["sample"] = before["sample"]
+    assert memory.tobytes() == before.tobytes()
 
 
 @pytest.mark.parametrize("arms", [(0.0, 0.0), (0.004, 0.012), (0.0, 0.01)])
@@ -148,7 +137,7 @@ def test_any_sensor_and_any_start_will_do(scene: EccentricScene) -> None:
 
 def test_the_washing_machine_settles() -> None:
     found = settles(bundled("washing_machine"), 5e-3)
-    np.testing.assert_allclose(found.estimates.friction_arm[-1], [0.004, 0.006], rtol=0.05)
+    np.testing.assert_allclose(found.history["friction_arm"][-1], [0.004, 0.006], rtol=0.05)
 
 
 def settles(scene: EccentricScene, share: float) -> EccentricRun:

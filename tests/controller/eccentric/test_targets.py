@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ringbalance.controller.eccentric_mass.memory import MEMORY
 from ringbalance.controller.eccentric_mass.targets import (
     MOVES,
-    Tuning,
     assign,
+    begin_tuning,
+    next_trial,
     separation,
     target_angles,
-    tuning_next,
     tuning_place,
-    tuning_start,
     wrapped,
 )
 
@@ -110,27 +110,36 @@ def vibration(first: float, second: float) -> float:
     return abs(cmath.exp(1j * first) + cmath.exp(1j * second) - wanted)
 
 
-def search(start: tuple[float, float], step: float, stop: float) -> Tuning:
-    tuning = tuning_start(*start, vibration(*start), step)
-    while not tuning.done:
-        tuning = tuning_next(tuning, vibration(*tuning_place(tuning)), 0.0, stop)
-        assert tuning.trials < 500
-    return tuning
+def begun(place: tuple[float, float], objective: float, step: float) -> np.void:
+    memory: np.void = np.zeros(1, dtype=MEMORY)[0]
+    memory["goal"], memory["objective"] = place, objective
+    begin_tuning(memory, step)
+    return memory
+
+
+def search(start: tuple[float, float], step: float, stop: float) -> tuple[np.void, int]:
+    """The memory at the end, and the number of trials."""
+    memory, trials = begun(start, vibration(*start), step), 0
+    while not memory["done"]:
+        next_trial(memory, vibration(*tuning_place(memory)), 0.0, stop)
+        trials += 1
+        assert trials < 500
+    return memory, trials
 
 
 @pytest.mark.parametrize("error", [(0.17, 0.17), (-0.17, 0.17), (0.1, 0.0), (-0.05, -0.12)])
 def test_it_ends_at_the_best_place(error: tuple[float, float]) -> None:
     stop = math.radians(0.1)
-    found = search((BEST[0] + error[0], BEST[1] + error[1]), math.radians(4), stop)
-    assert math.dist(found.base, BEST) < 2 * stop
-    assert found.best == vibration(*found.base)
-    assert tuning_place(found) == found.base
+    found, _ = search((BEST[0] + error[0], BEST[1] + error[1]), math.radians(4), stop)
+    assert math.dist(found["base"], BEST) < 2 * stop
+    assert found["least"] == vibration(*found["base"])
+    assert tuning_place(found) == tuple(found["base"])
 
 
 def test_staying_is_kept_when_nothing_helps() -> None:
-    found = search(BEST, 0.05, 0.01)
-    assert found.base == BEST
-    assert found.trials == 12
+    found, trials = search(BEST, 0.05, 0.01)
+    assert tuple(found["base"]) == BEST
+    assert trials == 12
 
 
 def test_the_printed_rule_never_comes_to_rest() -> None:
@@ -142,15 +151,16 @@ def test_the_printed_rule_never_comes_to_rest() -> None:
         place = min(tried, key=lambda at: vibration(*at))
         levels.append(vibration(*place))
     assert min(levels[-2:]) < max(levels[-2:])
-    assert max(levels[-10:]) > 5 * search((BEST[0] + 0.01, BEST[1] + 0.01), step, 0.002).best
+    assert max(levels[-10:]) > 5 * search((BEST[0] + 0.01, BEST[1] + 0.01), step, 0.002)[0]["least"]
 
 
 def test_a_move_that_helped_is_tried_again() -> None:
-    tuning = tuning_start(0.0, 1.0, 2.0, 0.1)
-    helped = tuning_next(tuning, 1.0, 0.0, 0.01)
-    assert helped.base == (0.1, 1.1)
-    assert helped.move == tuning.move
-    assert tuning_next(tuning, 1.95, 0.1, 0.01).base == (0.0, 1.0)
+    memory = begun((0.0, 1.0), 2.0, 0.1)
+    next_trial(memory, 1.95, 0.1, 0.01)
+    assert (tuple(memory["base"]), memory["move"]) == ((0.0, 1.0), 1)
+    next_trial(memory, 1.0, 0.1, 0.01)
+    assert tuple(memory["base"]) == (-0.1, 1.1)
+    assert memory["move"] == 1
 
 
 def test_separation_is_the_shorter_way() -> None:

@@ -29,7 +29,6 @@ def test_the_fraction_is_covered(of: int) -> None:
 def judgement(times: FloatArray) -> Judgement:
     n = times.size
     outcomes = Outcomes(
-        settled=np.isfinite(times),
         settling_time=times,
         final_amplitude=np.zeros(n),
         energy=np.zeros(n),

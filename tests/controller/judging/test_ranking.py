@@ -70,7 +70,6 @@ def judgement(settled: Any, inputs: dict[str, FloatArray]) -> Judgement:
     n = settled.size
     times = np.where(settled, 1.0, math.inf)
     outcomes = Outcomes(
-        settled=settled,
         settling_time=times,
         final_amplitude=np.zeros(n),
         energy=np.zeros(n),

@@ -56,7 +56,6 @@ class Machine:
         share = 0.5 * (self.scene.controller.limit / 50e-9) * (1.5e-3 / self.scene.tube.bore)
         return tuple(
             Outcomes(
-                settled=q < share * each.get("gain", 1.0),
                 settling_time=np.where(q < share * each.get("gain", 1.0), 1.0, math.inf),
                 final_amplitude=q,
                 energy=np.zeros(n),
@@ -130,7 +129,6 @@ def test_the_amplitude_that_is_surely_reached() -> None:
     """The lower bound of 62 of 64 is 0.893, that of 63 is 0.917."""
     q = (np.arange(64) + 0.5) / 64
     outcomes = Outcomes(
-        settled=q < 0,
         settling_time=np.full(64, math.inf),
         final_amplitude=q[::-1],
         energy=q,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,26 +13,17 @@ from scipy.integrate import solve_ivp
 
 from ball_balancer.scene_keys import BallScene
 from ringbalance.controller.balancer import (
-    FURTHER,
-    REQUIRED_FRACTION,
-    Demand,
+    Balancer,
     Draws,
-    Input,
     Outcomes,
     Progress,
     Remedy,
+    RunResult,
     Setting,
     Settings,
-    TracedRun,
-    inputs_of,
-    one_by_one,
-    outcomes_of,
-    settles_within,
 )
-from ringbalance.controller.judging.tune import tuned
-from ringbalance.controller.judging.tuning import Tuning
 from ringbalance.controller.rotor import CommonRotor, Rotors, rotor_fault
-from ringbalance.controller.trials import DrawnInput, Trials, drawn_key, scaled
+from ringbalance.controller.trials import Trials, scaled
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.arrays import FloatArray
@@ -76,25 +67,18 @@ class BallRun:
         }
 
 
-class BallBalancer:
+class BallBalancer(Balancer):
     """Two balls of mass m at radius r in oil of drag c, under the rotor's whirl x at speed w.
 
     c r phi' = m w^2 Re(x conj(j exp(j phi))), x = alpha (U_0 + m r sum exp(j phi)): the tangential force of
     the race's acceleration, averaged over a turn, against the drag; the balls' own inertia is left out.
     """
 
-    options = frozenset[str]()
-    verdict_draws = (16, 64)
     energy_kind = "energy_none"
-    watched_to_end = True
-    models_used: tuple[Any, ...] = ()
+    scene: BallScene
 
     def __init__(self, scene: BallScene, rotors: Rotors | None = None) -> None:
         self.scene, self.rotors = scene, rotors
-
-    def inputs(self) -> tuple[Input, ...]:
-        """Those of the scene."""
-        return inputs_of(self.scene)
 
     def settings(self) -> tuple[Setting, ...]:
         """The drag, by the choice of the oil."""
@@ -117,9 +101,9 @@ class BallBalancer:
                 progress(place * scene.run.time_limit, len(draws.numbers) * scene.run.time_limit)
             run = _rolled(self._drawn(scene, number) if draws.devices else scene)
             runs.append(
-                TracedRun(
+                RunResult(
                     run=run,
-                    settling_time=run.settling_time,
+                    settling_time=math.inf if run.settling_time is None else run.settling_time,
                     final_amplitude=float(run.amplitude[-1]),
                     energy=0.0,
                     worst_amplitude=float(np.max(run.amplitude)),
@@ -128,7 +112,7 @@ class BallBalancer:
                     unbalance=abs(self.rotor().unbalance),
                 )
             )
-        return outcomes_of(runs, trace=trace)
+        return Outcomes.of(runs, trace=trace)
 
     def _drawn(self, scene: BallScene, number: int) -> BallScene:
         random = np.random.default_rng([scene.run.seed, number])
@@ -142,24 +126,6 @@ class BallBalancer:
         device = with_values_at(replace(scene, balls=balls), values)
         return device if self.rotors is None else _on(device, self.rotors(number))
 
-    def run_all(
-        self,
-        settings: Sequence[Settings],
-        draws: Draws,
-        *,
-        further: float = FURTHER,  # noqa: ARG002
-    ) -> tuple[Outcomes, ...]:
-        """A ball that rests is watched to the end of the run."""
-        return one_by_one(self, settings, draws)
-
-    def asked_fraction(self) -> float:
-        """The default."""
-        return REQUIRED_FRACTION
-
-    def demands(self) -> tuple[Demand, ...]:
-        """Within the time limit."""
-        return (settles_within(self.span(), stated=False),)
-
     def trials(self) -> tuple[Trials, ...]:
         """The drag between its bounds."""
         drag = {each.path: each.value for each in self.settings()}
@@ -168,14 +134,6 @@ class BallBalancer:
     def remedies(self) -> tuple[Remedy, ...]:
         """More oil."""
         return (Remedy(code="drag", changes={"balls.drag": 2.0 * self.scene.balls.drag}),)
-
-    def choices(self) -> tuple[Remedy, ...]:
-        """None."""
-        return ()
-
-    def drawn_input(self, name: str) -> DrawnInput:
-        """A key of its scene."""
-        return drawn_key(self.scene, name)
 
     def on_scene(self, scene: SceneFile) -> BallBalancer:
         """Other balls."""
@@ -206,23 +164,9 @@ class BallBalancer:
         """Nothing is measured."""
         return 0.0
 
-    def span(self) -> float:
-        """The time limit, s."""
-        return self.scene.run.time_limit
-
     def lasting(self, span: float) -> BallBalancer:
         """The same for so long."""
         return BallBalancer(replace(self.scene, run=replace(self.scene.run, time_limit=span)), self.rotors)
-
-    def recommend(
-        self,
-        *,
-        pressure: bool = False,
-        remedies: bool | None = False,
-        progress: Callable[[str], None] | None = None,
-    ) -> Tuning:
-        """The drag under which most devices settle."""
-        return tuned(self, along=pressure, remedies=remedies, progress=progress)
 
     def quantities(self) -> tuple[Quantity, ...]:
         """Both balls side by side, their size left out."""

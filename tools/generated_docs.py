@@ -110,7 +110,7 @@ PARTS: Final[Mapping[str, Callable[[], Mapping[str, str]]]] = MappingProxyType(
         "docs/fit.md": lambda: {"fit_kinds": kind_table("liquid_ring", "eccentric_mass")},
         "docs/findings.md": lambda: {"findings": finding_table()},
         "docs/is-k-50-right.md": document_tables,
-        "README.md": lambda: {"standing": standing_table(_documents())},
+        "docs/standing.md": lambda: {"standing": standing_table(_documents())},
     }
 )
 """Generated parts by page."""

@@ -75,8 +75,8 @@ def check_file(path: Path, *, apart_from: Path | None = None) -> None:
 def read_bounded(path: str | Path, *, what: str, most: int, regular: bool = False) -> tuple[bytes, str]:
     """The bytes of a file, and what is wrong with it: empty, or that it cannot be read or is too large.
 
-    Args: `what`: such as "scene file". `most`: bytes. `regular`: whether a pipe is refused, which nobody may
-        ever write to.
+    Args: `what`: such as "scene file". `most`: bytes that are still read. `regular`: whether a pipe is
+        refused, which nobody may ever write to.
     """
     try:
         if regular and not stat.S_ISREG(os.stat(path).st_mode):

@@ -19,7 +19,6 @@ from ringbalance.verification.evidence import (
     Found,
     Level,
     NotRunError,
-    Reference,
     Series,
     as_found,
     figure,
@@ -64,12 +63,14 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
         Curve("stall by Eq. 19", "Pa", np.full(radius.shape, stall), style="reference"),
     )
     return Evidence(
-        found=as_found(by_eq_19=stall, by_priming=priming(crest)),
-        reference=dict.fromkeys(("by_eq_19", "by_priming"), LOWEST_PRESSURE.reference),
+        found={
+            "by_eq_19": Found(value=stall, reference=LOWEST_PRESSURE),
+            "by_priming": Found(value=priming(crest), reference=LOWEST_PRESSURE),
+        },
         numbers={
-            "by_ring": float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY)),
+            "by_ring": wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY),
             "scene_hump": crest,
-            "velocity_high": float(velocity_high),
+            "velocity_high": velocity_high,
         },
         series=(shown,),
     )
@@ -94,12 +95,11 @@ def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evid
         min(own, full - residual_fill_ratio(scene, law=law)) for law, own in zip(laws, reach, strict=True)
     ]
     return Evidence(
-        found={
-            "gain": Found(value=_gain(scene, laws), numerical=_STANDARD, corrected=raised),
-            "gain_raised": Found(value=raised, numerical=_STANDARD),
-        },
         # Twice the density, twice the ability.
-        reference=dict.fromkeys(("gain", "gain_raised"), Reference(value=2.0)),
+        found={
+            "gain": Found(value=_gain(scene, laws), numerical=_STANDARD, corrected=raised).against(2.0),
+            "gain_raised": Found(value=raised, numerical=_STANDARD).against(2.0),
+        },
         numbers={
             "stall_light": stalls[0],
             "stall_dense": stalls[1],

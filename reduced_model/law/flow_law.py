@@ -30,7 +30,14 @@ _FILL_SLACK: Final = 1e-9
 
 
 class Regime(IntEnum):
-    """How the connecting tube flows."""
+    """How the connecting tube flows.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> flow = rb.paper_law(scene).evaluate(fill_ratio=0.25, gas_pressure=0.0)
+        >>> rb.Regime(int(flow.regime)).name
+        'BLOCKED'
+    """
 
     BLOCKED = 0
     SIPHON = 1
@@ -47,7 +54,14 @@ class Regime(IntEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Flow:
-    """State of the tube for arrays of conditions, all of one shape."""
+    """State of the tube for arrays of conditions, all of one shape.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> flow: rb.Flow = rb.calibrate(scene).flow_law.evaluate(fill_ratio=[0.1, 0.4], gas_pressure=0.7e6)
+        >>> flow.velocity.round(1).tolist()
+        [12.3, 17.2]
+    """
 
     velocity: FloatArray
     """Mean velocity, m/s, positive out of the driven chamber; zero where blocked."""
@@ -60,7 +74,14 @@ class Flow:
 
 
 class FlowLaw(Protocol):
-    """Velocity in the connecting tube; arrays in, arrays out, SI."""
+    """Velocity in the connecting tube; arrays in, arrays out, SI.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> law: rb.FlowLaw = rb.paper_law(scene)
+        >>> law.evaluate(fill_ratio=[0.1, 0.4], gas_pressure=0.7e6).velocity.shape
+        (2,)
+    """
 
     @property
     def name(self) -> str:
@@ -188,7 +209,14 @@ def _plain(value: object) -> Any:
 
 
 class MomentCurve(Protocol):
-    """Balancing moment of a pair of opposite chambers from their fill ratios."""
+    """Balancing moment of a pair of opposite chambers from their fill ratios.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> moment: rb.MomentCurve = rb.calibrate(scene).flow_law.moment
+        >>> f"{moment.pair_moment(fill_ratio=0.4, opposite_fill_ratio=0.1) * 1e6:.0f} g mm"
+        '744 g mm'
+    """
 
     def pair_moment(self, *, fill_ratio: npt.ArrayLike, opposite_fill_ratio: npt.ArrayLike) -> FloatArray:
         """Moment along the pair's axis, positive towards the chamber that has `fill_ratio`.
@@ -232,7 +260,14 @@ class BalancerModel:
 
 
 class CompleteLaw(FlowLaw, Protocol):
-    """A flow law that carries all else that the closed loop needs; what `load_law` returns."""
+    """A flow law that carries all else that the closed loop needs; what `load_law` returns.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> law: rb.CompleteLaw = rb.calibrate(scene).flow_law
+        >>> f"{law.chamber_volume * 1e6:.2f} ml, {law.max_fill_ratio}"
+        '67.69 ml, 0.5'
+    """
 
     @property
     def moment(self) -> MomentCurve:

@@ -1,6 +1,8 @@
 """ringbalance: are the closed formulas of a liquid-ring balancer to be trusted, for your disc?
 
-The names below are loaded when they are first used, so that `import ringbalance` costs nothing.
+Begin with `load_scene`, `calibrate` and `simulate`; then `tune`, `fit`, `compare`, `sweep`, `find_design`,
+`trade`, `extremes`, `plot` and `write_report`. `help(ringbalance.calibrate)` has what it takes and gives, and
+an example. The names are loaded when they are first used, so that `import ringbalance` costs nothing.
 docs/python.md shows them at work.
 """
 

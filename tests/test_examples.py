@@ -5,9 +5,11 @@ from __future__ import annotations
 import cmath
 import doctest
 import inspect
+import pydoc
 from pathlib import Path
 from typing import Final
 
+import generated_docs
 import pytest
 
 import ringbalance as rb
@@ -57,3 +59,14 @@ def test_a_sensor_stands_in_an_example() -> None:
     """An alias has no docstring of its own."""
     (test,) = examples("Measurement")
     assert any("rb.Sensor" in each.source for each in test.examples)
+
+
+def test_the_page_of_names_has_their_docstrings() -> None:
+    page = generated_docs.text_of("docs/api.md")
+    assert generated_docs.fresh(page, generated_docs.PARTS["docs/api.md"]()) == page
+    assert all(f"## `rb.{name}`" in page for name in rb.__all__)
+
+
+def test_help_leads_to_every_name() -> None:
+    text = pydoc.plain(pydoc.render_doc(rb))
+    assert [name for name in rb.__all__ if name not in text] == []

@@ -48,7 +48,14 @@ _OF_RUNS: Final = {
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Sweep(Result):
-    """A row for every point."""
+    """A row for every point.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> table = rb.sweep(scene, {"tube.bore": [1e-3, 1.5e-3]})
+        >>> table.point_scene(table.best).tube.bore
+        0.001
+    """
 
     scene: SceneFile
     plan: Plan

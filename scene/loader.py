@@ -32,6 +32,11 @@ def load_scene(path: str | PathLike[str]) -> AnyScene:
     """The scene of a scene file (TOML), in SI, with its units, defaults and cross-checks.
 
     Raises: SceneError: the file cannot be read, or anything in it is wrong; all of it is said at once.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> scene.tube.bore
+        0.0015
     """
     return read_scene(path)[0]
 
@@ -240,7 +245,12 @@ def _kind(document: Mapping[str, Any]) -> str:
 
 
 def bundled_scene(name: str) -> Path:
-    """Path of a scene that comes with the program, such as "liquid_ring_paper". Raises: SceneError."""
+    """Path of a scene that comes with the program, such as "liquid_ring_paper". Raises: SceneError.
+
+    Example:
+        >>> rb.bundled_scene("six_chamber").name
+        'six_chamber.toml'
+    """
     folder = Path(str(resources.files("ringbalance.scenes")))
     names = sorted(path.stem for path in folder.glob("*.toml"))
     stem = name.removesuffix(".toml")

@@ -23,7 +23,14 @@ from ringbalance.scene.uncertain import NORMAL_95
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class EccentricRun(RunFacts, Result):
-    """One run of the whole strategy on the plant, with what is said of it."""
+    """One run of the whole strategy on the plant, with what is said of it.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("driven_masses_small"))
+        >>> run = rb.simulate(scene)
+        >>> run.settled, run.residual_ratio < 0.1
+        (True, True)
+    """
 
     balancer: ClassVar = "eccentric_mass"
 

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, clipped
+from ringbalance.scene.foreign import plain_number
 from ringbalance.scene.origins import summary_text
 from ringbalance.scene.platform.files import write_whole
 
@@ -108,6 +109,7 @@ class FlowLaw(Protocol):
             gas_pressure: gauge, Pa, in the driven chamber; the opposite one is vented.
             primed: whether the tube holds a continuous column beforehand.
         Returns: Flow, of the broadcast shape of the arguments.
+        Quantities with units of their own, such as pint's, are taken as they are.
         Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
         """
         ...
@@ -144,7 +146,7 @@ class Conditions:
         x = _within(fill_ratio, max_fill_ratio, "fill_ratio")
         opposite = max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
         y = _within(opposite, max_fill_ratio, "opposite_fill_ratio")
-        p = np.asarray(gas_pressure, dtype=np.float64)
+        p = np.asarray(plain_number(gas_pressure, "Pa")[0], dtype=np.float64)
         if not (np.isfinite(p) & (p + ambient_pressure >= 0)).all():
             raise ValueError(
                 f"gas_pressure must be finite and at least minus the ambient {ambient_pressure:g} Pa"
@@ -156,7 +158,7 @@ class Conditions:
 
 
 def _within(fill_ratio: npt.ArrayLike, largest: float, name: str) -> FloatArray:
-    x = np.asarray(fill_ratio, dtype=np.float64)
+    x = np.asarray(plain_number(fill_ratio, "")[0], dtype=np.float64)
     if not ((x >= -_FILL_SLACK) & (x <= largest + _FILL_SLACK)).all():
         raise ValueError(f"{name} must lie within [0, {largest:g}]")
     return clipped(x, 0.0, largest)

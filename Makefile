@@ -24,7 +24,7 @@ env: ## make .venv from requirements/lock.txt and see to off-screen OpenGL; noth
 	@sh tools/make_env.sh $(VENV) requirements/lock.txt
 	@sh tools/make_opengl.sh "$(CURDIR)/$(PYTHON_IN_VENV)"
 	@# Where Python may not write bytecode, the program would be compiled again at every start.
-	@$(PYTHON_IN_VENV) -m compileall -q ringbalance ringbalance/*/
+	@$(PYTHON_IN_VENV) -m compileall -q ringbalance $(CODE)
 
 report: env ## the report on SCENE (the paper's disc) into OUT (out/)
 	$(VENV)/bin/ringbalance report $(SCENE) --out $(OUT)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ringbalance.controller.rotor import CommonRotor, Rotors
 from ringbalance.controller.trials import DrawnInput, Information, Trials, drawn_key
-from ringbalance.reduced_model.law.flow_law import CALIBRATED
+from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED
 from ringbalance.results.requirements import AT_LEAST, AT_MOST
 from ringbalance.results.result import Rows
 from ringbalance.results.rows import Quantity
@@ -393,6 +393,11 @@ def balancer_of(scene: SceneFile, **options: Any) -> Balancer:
 def takes(scene: SceneFile, option: str) -> bool:
     """Whether the balancer of a scene has an option, such as "flow_law"."""
     return option in registered("balancer", scene.balancer).options
+
+
+def quick_balancer(scene: SceneFile) -> Balancer:
+    """The same for runs of many designs: under a law that nothing else has checked, where it has one."""
+    return balancer_of(scene, flow_law=UNCHECKED) if takes(scene, "flow_law") else balancer_of(scene)
 
 
 def balancer_under(law: str, scene: SceneFile) -> Balancer:

@@ -17,11 +17,12 @@ from itertools import product
 from typing import Any, Final
 
 import numpy as np
+from scipy.interpolate import RBFInterpolator
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.trials import Trials
-from ringbalance.design.axes import Point, Range
-from ringbalance.design.racing import DEVICES, SURE, Place, Race, near, race, raced_longer
+from ringbalance.design.axes import Axis, Point, Range
+from ringbalance.design.racing import BLOCK, DEVICES, SURE, Place, Race, near, race, raced_longer
 from ringbalance.design.space import Space
 from ringbalance.design.static import Record, static_rows
 from ringbalance.results.proportion import Proportion
@@ -43,8 +44,10 @@ _SMALLEST, _SPREAD = 18, 18
 _ROUNDS: Final = 9
 _CHILDREN: Final = 17
 """Points that race in a round."""
-_TRIED: Final = 8
-"""Times as many are drawn for them; what cannot work does not race."""
+_TRIED: Final = 16
+"""Drawn for each of them: of those that can work the one races that promises most."""
+_SMOOTHING: Final = 0.01
+"""Of the surface through the fractions of designs that raced."""
 _PARENTS: Final = 5
 _ROOM: Final = 1.06
 """Times the smallest size: of these, the designs that serve most devices have room to become smaller."""
@@ -56,10 +59,8 @@ _SHRINK: Final = 0.85
 """Times the smallest size: that of the first points about the best ones."""
 _SLOWER, _FASTER = 0.6, 1.3
 """Factors of the steps and of the shrinking after a round without a better design, and with one."""
-_HARD: Final = 12
-"""Devices that run first in a round."""
 _LIKE: Final = 16
-"""Designs that say which these are."""
+"""Designs that say which devices run first in a round."""
 _BESIDE: Final = 1
 """Settings that race beside those of the parent."""
 _SWITCH: Final = 0.2
@@ -198,16 +199,16 @@ class _State:
         keys = [repr(sorted(point.items())) for point in points]
         fresh = [i for i, key in enumerate(keys) if key not in self.raced and key not in keys[:i]]
         self.raced |= set(keys)
-        hard = self.hard()
+        blocks = self.hard_blocks()
         calls = [
             partial(
                 race,
                 self.space.hasty,
                 points[i],
                 places=places[i],
-                asked=self.asked,
+                asked=threshold(self.asked),
                 settings=not self.space.sets_controller,
-                hard=hard if places[i] else (),
+                blocks=blocks if places[i] else (),
             )
             for i in fresh
         ]
@@ -216,17 +217,29 @@ class _State:
                 size = self.space.size(points[i])
                 self.candidates.append(Candidate(shares=shares[i], point=points[i], size=size, race=found))
 
-    def hard(self) -> tuple[int, ...]:
-        """Numbers of the devices that fail most often in the best designs, or else settle last."""
+    def hard_blocks(self) -> tuple[int, ...]:
+        """Blocks of devices, first the one in which most fail in the best designs."""
         whole = [each.race for each in _nearest(self.candidates) if each.race.meets.size >= DEVICES][:_LIKE]
-        if not whole:
-            return ()
-        fails, times = np.zeros(DEVICES), np.zeros(DEVICES)
+        met = np.zeros(DEVICES // BLOCK)
         for each in whole:
-            first = np.argsort(each.numbers)[:DEVICES]
-            fails += ~each.meets[first]
-            times += np.argsort(np.argsort(each.times[first]))
-        return tuple(sorted(np.lexsort((-times, -fails))[:_HARD].tolist()))
+            met += each.in_order()[:DEVICES].reshape(-1, BLOCK).sum(axis=1)
+        return tuple(np.argsort(met, kind="stable").tolist())
+
+    def promise(self, shares: FloatArray) -> FloatArray:
+        """Fraction of the devices that designs may serve, after those that raced near them."""
+        known = np.array([self.coordinates(each.shares) for each in self.candidates])
+        served = np.array([_served(each) for each in self.candidates])
+        surface = RBFInterpolator(known, served, kernel="linear", smoothing=_SMOOTHING)
+        found: FloatArray = surface(np.array([self.coordinates(each) for each in shares]))
+        return found
+
+    def coordinates(self, shares: FloatArray) -> FloatArray:
+        """Of a place: entries of a list are equally far from each other."""
+        parts = [
+            share[np.newaxis] if axis.ranges else 0.5 * np.eye(len(axis.choices))[_entry(axis, share)]
+            for axis, share in zip(self.space.axes, shares, strict=True)
+        ]
+        return np.concatenate(parts)
 
     def places(self, parent: Candidate) -> list[Place] | None:
         """The settings of a parent, and others beside them."""
@@ -243,7 +256,16 @@ class _State:
             unsure = [each for each in self.passing[:2] if each.race.meets.size < SURE]
             if not unsure or self.passing[0] not in unsure:
                 return
-            calls = [partial(raced_longer, self.space.hasty, each.point, before=each.race) for each in unsure]
+            calls = [
+                partial(
+                    raced_longer,
+                    self.space.hasty,
+                    each.point,
+                    before=each.race,
+                    asked=threshold(self.asked),
+                )
+                for each in unsure
+            ]
             for each, found in zip(unsure, deal(self.executor, calls), strict=True):
                 self.candidates[self.candidates.index(each)] = replace(each, race=found)
 
@@ -346,16 +368,22 @@ def _round(state: _State, step: float, shrink: float) -> None:
     space, parents = state.space, state.parents()
     most = state.best[0] if space.sized else math.inf
     drawn = state.random.integers(0, len(parents), _CHILDREN * _TRIED).tolist()
-    shares = [_stepped(state, parents[at].shares, step) for at in drawn]
+    shares = np.array([_stepped(state, parents[at].shares, step) for at in drawn])
     if math.isfinite(most):
-        sizes = most * (1 - 2 * (1 - shrink) * state.random.random(len(shares)))
-        shares = [_sized(space, each, size) for each, size in zip(shares, sizes.tolist(), strict=True)]
-    points = space.points(np.array(shares))
-    able = [i for i, row in enumerate(state.static(points)) if state.able(row)]
-    chosen = [i for i in able if space.size(points[i]) < most][:_CHILDREN]
+        sizes = np.repeat(most * (1 - 2 * (1 - shrink) * state.random.random(_CHILDREN)), _TRIED)
+        shares = np.array([_sized(space, each, size) for each, size in zip(shares, sizes, strict=True)])
+    points = space.points(shares)
+    able = [
+        state.able(row) and space.size(point) < most
+        for row, point in zip(state.static(points), points, strict=True)
+    ]
+    promise = np.where(able, state.promise(shares), -math.inf).reshape(_CHILDREN, _TRIED)
+    chosen = [
+        child * _TRIED + int(np.argmax(row)) for child, row in enumerate(promise) if np.isfinite(row.max())
+    ]
     if chosen:
         places = [state.places(parents[drawn[i]]) for i in chosen]
-        state.race(np.array(shares)[chosen], [points[i] for i in chosen], places)
+        state.race(shares[chosen], [points[i] for i in chosen], places)
 
 
 def _stepped(state: _State, shares: FloatArray, step: float) -> FloatArray:
@@ -377,6 +405,10 @@ def _sized(space: Space, shares: FloatArray, target: float) -> FloatArray:
                 wanted = float(point[path]) * (target / space.size(point)) ** power
                 shares[place] = _share_of(axis.ranges[path], wanted)
     return shares
+
+
+def _entry(axis: Axis, share: float) -> int:
+    return min(int(share * len(axis.choices)), len(axis.choices) - 1)
 
 
 def _share_of(wanted: Range, value: float) -> float:

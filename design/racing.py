@@ -1,8 +1,8 @@
 """One design in closed loop: few drawn devices race its controllers' settings.
 
 Settings stand in units of a design's own loop and dead time, so that what served one design is a good start
-for another.  A design that serves few of the first devices is left; only good ones run on all.  The first are
-those that fail most often in other designs, once these are known.
+for another.  A design that serves few of the first devices is left; only good ones run on all.  Devices that
+fail most often in other designs run first, once these are known.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Settings, balancer_of
+from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Settings, quick_balancer
 from ringbalance.controller.judging.judge import Judgement, judged_all
 from ringbalance.controller.judging.search import searched
 from ringbalance.controller.trials import Trials
@@ -30,6 +30,8 @@ Place = tuple[int, tuple[int, ...]]
 """Kind of controller, by its number among the balancer's trials, and levels on its axes."""
 HEATS: Final = (4, 8, 24, 64)
 """Devices after each heat of a race; at last a whole block of draws, whose inputs are spread evenly."""
+BLOCK: Final = 16
+"""Devices that are made together, by consecutive numbers."""
 DEVICES: Final = HEATS[-1]
 """Of a design that stays in the race."""
 SURE: Final = 256
@@ -43,8 +45,6 @@ _BEHIND: Final = 2
 """Devices by which settings may be behind the best after a heat."""
 _LEFT: Final = 0.2
 """By so much below the fraction asked for after a heat, a design is left: three of four devices must do."""
-_MISS: Final = 0.03
-"""The same after the hard devices, if all others did."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,7 +58,7 @@ class Race:
     numbers: tuple[int, ...] = ()
     """Of the devices that ran."""
     unseen: int = 0
-    """Devices that have not run and are taken to meet what is asked: those of which few fail elsewhere."""
+    """Devices that need not run, since too many others fail, and are taken to meet what is asked."""
     meets: BoolArray
     """Of each device that ran."""
     times: FloatArray
@@ -67,9 +67,18 @@ class Race:
     """J, of the gas that was let in."""
 
     @property
+    def failed(self) -> int:
+        """Devices that do not meet every demand."""
+        return int(np.count_nonzero(~self.meets))
+
+    @property
     def fraction(self) -> float:
         """Of the devices that meet every demand."""
-        return (np.count_nonzero(self.meets) + self.unseen) / max(self.meets.size + self.unseen, 1)
+        return 1.0 - self.failed / (self.meets.size + self.unseen) if self.meets.size else 0.0
+
+    def in_order(self) -> BoolArray:
+        """`meets` by number of the devices."""
+        return self.meets[np.argsort(self.numbers)]
 
     @cached_property
     def gas(self) -> float:
@@ -105,31 +114,35 @@ def race(
     places: Sequence[Place] | None,
     asked: float,
     settings: bool,
-    hard: tuple[int, ...] = (),
+    blocks: tuple[int, ...] = (),
 ) -> Race | None:
     """The best settings of a design; None: its scene is refused, or it breaks down.
 
     Args: `places`: settings that race, such as those that raced best on another design; None: all that are
         tried at first. `asked`: fraction of devices. `settings`: whether any are raced but the scene's own.
-        `hard`: numbers of the devices that run first; none: in their order.
+        `blocks`: of devices, in the order in which they run until too many have failed; none: in heats.
     """
     try:
-        balancer = balancer_of(point_scene(scene, point))
+        balancer = quick_balancer(point_scene(scene, point))
         field = _field(balancer.trials(), places) if settings else [(None, {})]
         if not field:
             return None
-        return _raced(balancer, field, asked) if not hard else _hard_first(balancer, field, asked, hard)
+        return _by_blocks(balancer, field, asked, blocks) if blocks else _raced(balancer, field, asked)
     except (SceneError, *FAULTS):
         return None
 
 
-def raced_longer(scene: SceneFile, point: Point, *, before: Race) -> Race:
-    """The same on `SURE` devices; as it was where it breaks down."""
+def raced_longer(scene: SceneFile, point: Point, *, before: Race, asked: float) -> Race:
+    """The same on `SURE` devices, or until too many have failed; as it was where it breaks down."""
+    longer = before
     try:
-        balancer = balancer_of(point_scene(scene, point))
-        return _heat(balancer, [before], range(before.meets.size, SURE), further=FURTHER)[0]
+        balancer = quick_balancer(point_scene(scene, point))
+        while longer.meets.size < SURE and longer.failed <= (1 - asked) * SURE:
+            size = longer.meets.size
+            (longer,) = _heat(balancer, [longer], range(size, size + DEVICES), further=FURTHER)
     except (SceneError, *FAULTS):
         return before
+    return longer
 
 
 def _field(trials: Sequence[Trials], places: Sequence[Place] | None) -> list[tuple[Place | None, Settings]]:
@@ -175,19 +188,21 @@ def _raced(balancer: Balancer, field: Sequence[tuple[Place | None, Settings]], a
     return running[0]
 
 
-def _hard_first(
+def _by_blocks(
     balancer: Balancer,
     field: Sequence[tuple[Place | None, Settings]],
     asked: float,
-    hard: tuple[int, ...],
+    blocks: tuple[int, ...],
 ) -> Race:
-    """The settings that serve most of the hard devices, and then the others where enough of these do."""
-    rest = sorted(set(range(DEVICES)) - set(hard))
-    races = [Race(place=place, settings=settings, unseen=len(rest), **_NOBODY) for place, settings in field]
-    best = min(_heat(balancer, races, hard), key=lambda each: each.order)
-    if best.fraction < asked - _MISS:
-        return best
-    return _heat(balancer, [replace(best, unseen=0)], rest)[0]
+    """The settings that serve most of the first block, on as many blocks as it takes to refuse the design."""
+    running = [Race(place=place, settings=settings, unseen=DEVICES, **_NOBODY) for place, settings in field]
+    for block in blocks:
+        ran = _heat(balancer, running, range(block * BLOCK, (block + 1) * BLOCK))
+        best = min(ran, key=lambda each: each.order)
+        running = [replace(best, unseen=best.unseen - BLOCK)]
+        if running[0].fraction < asked:
+            break
+    return running[0]
 
 
 def _heat(
@@ -226,7 +241,7 @@ def judged_design(
         `most`: devices; default as many as `tune` takes.
     """
     try:
-        balancer = balancer_of(point_scene(scene, point))
+        balancer = quick_balancer(point_scene(scene, point))
         tried = [settings, searched(balancer)] if search else [settings]
         fresh = [each for i, each in enumerate(tried) if each not in tried[:i]]
         judged = judged_all(balancer, fresh, most=most)
@@ -238,7 +253,7 @@ def judged_design(
 def devices_row(scene: SceneFile, point: Point, *, settings: Settings, draws: Draws) -> int | None:
     """How many of some devices meet what is required; None: the point is refused or breaks down."""
     try:
-        balancer = balancer_of(point_scene(scene, point))
+        balancer = quick_balancer(point_scene(scene, point))
         (outcomes,) = balancer.run_all([settings], draws)
         return int(np.count_nonzero(np.all([each.met(outcomes) for each in balancer.demands()], axis=0)))
     except (SceneError, *FAULTS):

@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 from typing import Final
 
-from ringbalance.controller.balancer import balancer_of
+from ringbalance.controller.balancer import quick_balancer
 from ringbalance.controller.judging.judge import judged_all
 from ringbalance.design.axes import Point
 from ringbalance.design.static import EMPTY, FAULTS, REFUSED, Record, point_scene, refusal
+from ringbalance.results.requirements import OPEN
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
 
+_LOOK: Final = 4
+"""Devices after which a design is left if none of them meets what is required: where 7 of 10 do, that happens
+once in a hundred times.  Runs that do not settle take longest."""
 _FIRST: Final = 16
-"""Devices after which the verdict of most designs is known."""
+"""Devices after which the verdict of most other designs is known."""
 
 
 def run_row(scene: SceneFile, point: Point, runs: int) -> Record:
     """What drawn devices of a point come to under the settings of its scene, plain data.
 
-    Args: `runs`: devices at most; they are doubled from 16 until the verdict is known.
+    Args: `runs`: devices at most; they are doubled from 16 until the verdict is known, and only 4 run where
+        none of these meets what is required.
     Returns: `devices` that were run, `fraction` that meets all that the scene requires, `low` and `high`
         (Wilson, 95 %), `verdict`, `settling_time` within which the fraction asked for has settled, s, and
         `settling_time_high`, its upper bound (both None where too few settle), `ended` (devices by code),
         `finding`.
     """
     try:
-        balancer = balancer_of(point_scene(scene, point))
-        (judgement,) = judged_all(balancer, [{}], first=min(_FIRST, runs), most=runs, whole=False)
+        balancer = quick_balancer(point_scene(scene, point))
+        judge = partial(judged_all, balancer, [{}], whole=False)
+        (judgement,) = judge(most=min(_LOOK, runs))
+        if judgement.fraction.count or judgement.verdict == OPEN:
+            (judgement,) = judge(first=min(_FIRST, runs), most=runs)
     except (SceneError, *FAULTS) as error:
         return {**EMPTY, "verdict": REFUSED, "finding": refusal(error)}
     time, high = judgement.settling_time(judgement.asked) or (None, None)

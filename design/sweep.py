@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.design.axes import Plan, Point, unit_of_path
-from ringbalance.design.sensitivity import first_order
+from ringbalance.design.sensitivity import first_order, total_order
 from ringbalance.design.static import EMPTY, Record, content_of, point_scene, static_rows
 from ringbalance.design.store import Store
 from ringbalance.design.work import Done, Progress, answers, tasks_of
@@ -159,10 +159,11 @@ class Sweep(Result):
         source = {"title": self.scene.name, "source": f"ringbalance sweep of {self.scene.source}"}
         return dataset(variables, coords=coords, attrs=source | {"scene_sha256": self.scene.sha256})
 
-    def sensitivity(self) -> dict[str, dict[str, tuple[float, float]]]:
+    def sensitivity(self, *, total: bool = False) -> dict[str, dict[str, tuple[float, float]]]:
         """By result and varied number: the share of the variance that it explains, and its half-width.
 
         Of a sample: see `first_order`. Empty for a grid, and of a result that too few points have.
+        Args: `total`: whether what it explains together with others counts too, see `total_order`.
         """
         columns = {name: _array(values) for name, _, values in self.fields()}
         numbers = {name: each for name, each in columns.items() if each.dtype == np.float64}
@@ -172,7 +173,7 @@ class Sweep(Result):
             known = np.isfinite(np.array([each, *(numbers[path] for path in paths)])).all(axis=0)
             if name not in paths and known.any():
                 inputs = np.array([numbers[path][known] for path in paths]).T
-                shares, widths = first_order(inputs, each[known])
+                shares, widths = (total_order if total else first_order)(inputs, each[known])
                 if np.isfinite(shares).all():
                     found[name] = dict(
                         zip(paths, zip(shares.tolist(), widths.tolist(), strict=True), strict=True)

@@ -1,7 +1,8 @@
-"""The calibrated law for other programs: some four hundred numbers, and one evaluator.
+"""Law, disc and controller for other programs: some four hundred numbers, and one source.
 
-`compact.py` makes the numbers, `point.py` answers one query from them, `translate.py` writes `point.py` in
-other languages, `hosts.py` puts a frame around each.
+`compact.py` makes the law's numbers, `point.py` answers one query from them, `disc.py` and `controller.py` go
+on in time, `blocks.py` has what a host sees, `translate.py` writes them in other languages; `hosts.py`
+and `fmu.py` put frames around them.
 """
 
 if not __name__.startswith("ringbalance."):

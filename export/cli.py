@@ -6,6 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, Literal
 
+from ringbalance.export.blocks import Block, Kind, controller_block, disc_block, law_block
 from ringbalance.export.compact import CompactLaw, compact_law
 from ringbalance.export.fmu import fmu_bytes
 from ringbalance.export.grid import csv_files
@@ -14,6 +15,7 @@ from ringbalance.export.libraries import EXTRA, Version
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.loader import load_scene
+from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.terminal import activity, print_message, results_console
@@ -32,17 +34,20 @@ def export(
     scene: Path,
     *,
     to: Host,
+    block: Kind = "law",
     out: Path = Path("out"),
     name: str = "",
     points: int | None = None,
     all_systems: bool = False,
 ) -> int:
-    """Write the calibrated flow law for another program, the same bits in each.
+    """Write the calibrated flow law, the disc or the controller for another program, the same bits in each.
 
     Args:
         scene: the scene file.
         to: c (C99), fmi2 or fmi3 (a unit for co-simulation, FMI 2.0 or 3.0), st (IEC 61131-3 structured
             text), python (a module that imports nothing of others), or csv (a grid).
+        block: law (velocity and regime of a query), disc (fills, gas and moment of all chambers in time,
+            and the rotor's vibration), or controller (the target-vector one with the scene's settings).
         out: folder for the files.
         name: of files and functions; default that of the scene.
         points: of each axis of the grid of csv, 2 to 1001; default 41.
@@ -57,40 +62,54 @@ def export(
     """
     _check_points(to, points)
     _check_systems(to, all_systems)
-    called = _checked_name(name) if name else identifier(scene.stem)
-    told = liquid_ring_scene(load_scene(scene))
+    if to == "csv" and block != "law":
+        raise SceneError.of_option(
+            option="--block", value=block, problem="csv is a table of the law", allowed="--block law"
+        )
+    called = _checked_name(name) if name else identifier(scene.stem + ("" if block == "law" else f"_{block}"))
+    given = liquid_ring_scene(load_scene(scene))
     with staged(out) as folder:
-        with activity("export", "calibrating ..."):
-            law = compact_law(scene=told, law=calibrate(told).flow_law)
-        if to == "fmi2" or to == "fmi3":
+        made, compact = _made(given, block)
+        if to == "csv" and compact is not None:
+            files = _encoded(csv_files(compact, called, points=points or POINTS, highest=_highest(given)))
+        elif to == "fmi2" or to == "fmi3":
             with activity("export", "compiling ..."):
-                files = _unit(law, called, to, all_systems)
+                files = _unit(made, called, to, all_systems)
         else:
-            highest = _BEYOND * told.gas.pressure if told.gas.pressure > 0 else _WITHOUT_PRESSURE
-            files = _texts(law, called, to, points=points or POINTS, highest=highest)
+            files = _encoded({"c": c_files, "st": st_files, "python": python_files}[to](made, called))
         for file, content in files.items():
             (folder / file).write_bytes(content)
     for file in files:
         results_console().print(str(out / file), highlight=False)
-    size = f"{8 * len(law.constants)} bytes of constants"
-    text = f"{size}, velocities within {law.departure:.1e} of the calibrated law's"
-    print_message(text)
+    size = f"{8 * len(made.constants)} bytes of constants"
+    exact = f", velocities within {compact.departure:.1e} of the calibrated law's" if compact else ""
+    print_message(size + exact)
     return 0
 
 
-def _unit(law: CompactLaw, name: str, version: Version, all_systems: bool) -> dict[str, bytes]:
-    unit, runs = fmu_bytes(law, name, version, all_systems=all_systems)
+def _made(scene: Scene, block: Kind) -> tuple[Block, CompactLaw | None]:
+    if block == "controller":
+        return controller_block(scene), None
+    with activity("export", "calibrating ..."):
+        law = calibrate(scene).flow_law
+        compact = compact_law(scene=scene, law=law)
+    return law_block(compact) if block == "law" else disc_block(scene, law, compact), compact
+
+
+def _highest(scene: Scene) -> float:
+    """Gas pressure that a grid ends at, Pa."""
+    return _BEYOND * scene.gas.pressure if scene.gas.pressure > 0 else _WITHOUT_PRESSURE
+
+
+def _encoded(texts: dict[str, str]) -> dict[str, bytes]:
+    return {file: text.encode() for file, text in texts.items()}
+
+
+def _unit(block: Block, name: str, version: Version, all_systems: bool) -> dict[str, bytes]:
+    unit, runs = fmu_bytes(block, name, version, all_systems=all_systems)
     if not runs:
         print_message("no C compiler here: the unit holds its source alone")
     return {f"{name}.fmu": unit}
-
-
-def _texts(law: CompactLaw, name: str, to: Text, *, points: int, highest: float) -> dict[str, bytes]:
-    if to == "csv":
-        texts = csv_files(law, name, points=points, highest=highest)
-    else:
-        texts = {"c": c_files, "st": st_files, "python": python_files}[to](law, name)
-    return {file: text.encode() for file, text in texts.items()}
 
 
 def _check_systems(to: Host, all_systems: bool) -> None:

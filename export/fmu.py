@@ -1,4 +1,4 @@
-"""The compact law as a functional mock-up unit (FMI 2.0 or 3.0, co-simulation), with the source inside.
+"""A block as a functional mock-up unit (FMI 2.0 or 3.0, co-simulation), with the source inside.
 
 A host that has a compiler builds it from `sources/`; where this machine has one, the unit also runs as it is
 on machines like this one, and with a cross-compiler on all.  Two exports of one law are equal to the byte but
@@ -8,31 +8,25 @@ for what the compiler makes.
 from __future__ import annotations
 
 import hashlib
-import tomllib
-from importlib.resources import files
 from io import BytesIO
-from typing import Any, Final
+from typing import Final
 from xml.etree import ElementTree as ET
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from ringbalance.export.compact import CompactLaw
-from ringbalance.export.hosts import c_files, filled
+from ringbalance.export.blocks import Block, Variable, declared_units
+from ringbalance.export.hosts import block_c_files, filled
 from ringbalance.export.libraries import Version, every_library, local_library
+from ringbalance.export.reference import reference_files
 from ringbalance.export.translate import number_text
-from ringbalance.results.result import csv_text
 
 _DATE: Final = (1980, 1, 1, 0, 0, 0)
 """Of every file inside, so that two exports are equal."""
-_PRESSURES: Final = (0.0, 1e5, 2e5, 4e5, 8e5)
-"""Pa, of the reference results."""
 _KINDS: Final = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
 """Names of types in FMI 3.0 by those in FMI 2.0."""
 _ABLE: Final = ("canHandleVariableCommunicationStepSize", "canGetAndSetFMU{}tate", "canSerializeFMU{}tate")
 
 
-def fmu_bytes(
-    law: CompactLaw, name: str, version: Version, *, all_systems: bool = False
-) -> tuple[bytes, bool]:
+def fmu_bytes(block: Block, name: str, version: Version, *, all_systems: bool = False) -> tuple[bytes, bool]:
     """The unit, and whether it has a library.
 
     It holds the model description, the sources, reference results, and the library for machines like this one
@@ -40,19 +34,14 @@ def fmu_bytes(
 
     Raises: OSError: no cross-compiler for all systems.
     """
-    words = {
-        "flow": f"{name}_flow",
-        "answer": f"{name}_answer",
-        "guid": guid_of(law),
-        "start_fill": number_text(law.max_fill_ratio / 2),
-    }
-    core = filled("unit", law, name, **words)
-    sources = {**c_files(law, name), f"{version}.c": filled(version, law, name, core=core, **words)}
-    described = _model_2(law, name) if version == "fmi2" else _model_3(law, name)
+    words = _words(block, name)
+    core = filled("unit", block, name, **words)
+    sources = {**block_c_files(block, name), f"{version}.c": filled(version, block, name, core=core, **words)}
+    described = _model_2(block, name) if version == "fmi2" else _model_3(block, name)
     parts = {
         "modelDescription.xml": described,
         **{f"sources/{file}": text.encode() for file, text in sources.items()},
-        "documentation/reference.csv": _reference(law).encode(),
+        **reference_files(block, name),
     }
     if version == "fmi3":
         parts["sources/buildDescription.xml"] = _build(name)
@@ -60,75 +49,95 @@ def fmu_bytes(
     return _zipped({**parts, **libraries}), bool(libraries)
 
 
-def _declared(law: CompactLaw) -> dict[str, Any]:
-    """Variables and units, with the law's largest fill ratio."""
-    most = law.max_fill_ratio
-    text = files("ringbalance.export").joinpath("templates/unit.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text.replace("MOST", number_text(most)).replace("HALF", number_text(most / 2)))
+def _words(block: Block, name: str) -> dict[str, str]:
+    """Counts and places of the variables, and how one is read."""
+    of = {kind: [each for each in block.variables if each.kind == kind] for kind in _KINDS}
+    read = "return {}->block.w[PLACES[reference]];"
+    shown = read.format("s")
+    if not block.timed:
+        seen = f"state seen = *s;\n    {name}_step(&seen.block, 0.0);"
+        shown = f"{seen}\n    return seen.block.w[PLACES[reference]];"
+    return {
+        "guid": guid_of(block),
+        "reals": str(len(of["Real"])),
+        "integers": str(len(of["Integer"])),
+        "booleans": str(len(of["Boolean"])),
+        "real_inputs": str(sum(each.input for each in of["Real"])),
+        "boolean_inputs": str(sum(each.input for each in of["Boolean"])),
+        "all_places": ", ".join(str(each.place) for each in block.variables),
+        "shown": shown,
+    }
 
 
-def _model_2(law: CompactLaw, name: str) -> bytes:
-    declared = _declared(law)
-    root = _root("2.0", law, name, guid=guid_of(law), variableNamingConvention="flat")
+def _model_2(block: Block, name: str) -> bytes:
+    root = _root("2.0", block, name, guid=guid_of(block), variableNamingConvention="flat")
     able = {each.format("s"): "true" for each in (*_ABLE, "canNotUseMemoryManagementFunctions")}
     unit = ET.SubElement(root, "CoSimulation", {"modelIdentifier": name, **able})
     listed = ET.SubElement(unit, "SourceFiles")
     for file in (f"{name}.c", "fmi2.c"):
         ET.SubElement(listed, "File", name=file)
-    _add_units(root, declared)
+    _add_units(root, block)
     ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.01")
     variables = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
     groups = [ET.SubElement(structure, group) for group in ("Outputs", "InitialUnknowns")]
-    for place, each in enumerate(declared["variable"]):
+    for place, each in enumerate(block.variables):
         variable = ET.SubElement(variables, "ScalarVariable", _heads(each, place))
-        ET.SubElement(variable, each["kind"], each["range"])
-        for group in groups if each["causality"] == "output" else ():
+        ET.SubElement(variable, each.kind, _range(block, each))
+        for group in groups if not each.input else ():
             ET.SubElement(group, "Unknown", index=str(place + 1))
     return _xml(root)
 
 
-def _model_3(law: CompactLaw, name: str) -> bytes:
-    declared = _declared(law)
-    root = _root("3.0", law, name, instantiationToken=guid_of(law))
+def _model_3(block: Block, name: str) -> bytes:
+    root = _root("3.0", block, name, instantiationToken=guid_of(block))
     able = {each.format("S"): "true" for each in _ABLE}
     ET.SubElement(root, "CoSimulation", {"modelIdentifier": name, **able})
-    _add_units(root, declared)
+    _add_units(root, block)
     ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize="0.01")
     variables = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
-    for place, each in enumerate(declared["variable"]):
-        ET.SubElement(variables, _KINDS[each["kind"]], {**_heads(each, place), **each["range"]})
-    heads = {"name": "time", "valueReference": str(len(declared["variable"])), "description": "of the host"}
+    for place, each in enumerate(block.variables):
+        ET.SubElement(variables, _KINDS[each.kind], {**_heads(each, place), **_range(block, each)})
+    heads = {"name": "time", "valueReference": str(len(block.variables)), "description": "of the host"}
     ET.SubElement(variables, "Float64", {**heads, "causality": "independent", "variability": "continuous"})
     for group in ("Output", "InitialUnknown"):
-        for place, each in enumerate(declared["variable"]):
-            if each["causality"] == "output":
+        for place, each in enumerate(block.variables):
+            if not each.input:
                 ET.SubElement(structure, group, valueReference=str(place))
     return _xml(root)
 
 
-def _root(version: str, law: CompactLaw, name: str, **further: str) -> ET.Element:
+def _range(block: Block, variable: Variable) -> dict[str, str]:
+    """Unit and range, and of an input its value at the start."""
+    start = block.start[variable.place]
+    text = number_text(start) if variable.kind == "Real" else str(bool(start)).lower()
+    return {**variable.range, "start": text} if variable.input else dict(variable.range)
+
+
+def _root(version: str, block: Block, name: str, **further: str) -> ET.Element:
     heads = {"fmiVersion": version, "modelName": name, **further}
     words = {"license": "BSD-3-Clause", "generationTool": "ringbalance"}
-    title = f"Flow law of a liquid-ring balancer, calibrated from {law.scene.rpartition('/')[2]}"
+    title = f"{block.title}, from {block.scene.rpartition('/')[2]}"
     return ET.Element("fmiModelDescription", {**heads, "description": title, **words})
 
 
-def _heads(variable: dict[str, Any], place: int) -> dict[str, str]:
+def _heads(variable: Variable, place: int) -> dict[str, str]:
     return {
-        "name": variable["name"],
+        "name": variable.name,
         "valueReference": str(place),
-        "causality": variable["causality"],
-        "variability": "continuous" if variable["kind"] == "Real" else "discrete",
-        "description": variable["description"],
+        "causality": "input" if variable.input else "output",
+        "variability": "continuous" if variable.kind == "Real" else "discrete",
+        "description": variable.description,
     }
 
 
-def _add_units(root: ET.Element, declared: dict[str, Any]) -> None:
+def _add_units(root: ET.Element, block: Block) -> None:
     units = ET.SubElement(root, "UnitDefinitions")
-    for name, base in declared["units"].items():
-        ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", base)
+    used = {each.range.get("unit") for each in block.variables}
+    for name, base in declared_units().items():
+        if name in used:
+            ET.SubElement(ET.SubElement(units, "Unit", name=name), "BaseUnit", dict(base))
 
 
 def _build(name: str) -> bytes:
@@ -147,39 +156,10 @@ def _xml(root: ET.Element) -> bytes:
     return text
 
 
-def guid_of(law: CompactLaw) -> str:
-    """One for each law: another one makes another unit."""
-    text = ",".join(number_text(value) for value in law.constants)
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-def _reference(law: CompactLaw) -> str:
-    """Answers that a host can compare its own with."""
-    most = law.max_fill_ratio
-    queries = [
-        (share * most, (1 - share) * most, pressure, primed)
-        for share in (0.1, 0.3, 0.5, 0.8)
-        for pressure in _PRESSURES
-        for primed in (False, True)
-    ]
-    answers = [
-        law.answer(fill_ratio=x, opposite_fill_ratio=y, gas_pressure=p, primed=primed)
-        for x, y, p, primed in queries
-    ]
-    heads = ("fill_ratio", "opposite_fill_ratio", "gas_pressure", "primed")
-    columns = dict(
-        zip(heads, zip(*((*map(repr, each[:3]), int(each[3])) for each in queries), strict=True), strict=True)
-    )
-    return csv_text(
-        {
-            **columns,
-            "velocity": [repr(each.velocity) for each in answers],
-            "velocity_uncertainty": [repr(each.uncertainty) for each in answers],
-            "regime": [each.regime for each in answers],
-            "status": [each.status for each in answers],
-            "primed_after": [int(each.primed) for each in answers],
-        }
-    )
+def guid_of(block: Block) -> str:
+    """One for each block: other numbers make another unit."""
+    text = ",".join(number_text(value) for value in (*block.constants, *block.start))
+    return hashlib.sha256(f"{block.kind},{text}".encode()).hexdigest()[:32]
 
 
 def _zipped(parts: dict[str, bytes]) -> bytes:

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
+from ringbalance.export.blocks import law_facts
 from ringbalance.export.compact import Answer, CompactLaw
-from ringbalance.export.hosts import facts
 from ringbalance.scene.arrays import FloatArray
 
 COLUMNS: Final = (
@@ -47,7 +47,7 @@ def _header(law: CompactLaw, errors: tuple[FloatArray, float]) -> list[str]:
     return [
         f"# {line.strip()}"
         for line in (
-            *facts(law).splitlines(),
+            *law_facts(law).splitlines(),
             "units: fill ratios in 1, gauge pressures in Pa, velocities in m/s; uncertainty expanded (95 %)",
             "regime: 0 blocked, 1 siphon, 2 separated, 3 reverse, 4 siphon or separated",
             "status: 0 ok, 1 extrapolated, 2 blocked, 3 undecided, 4 invalid",

@@ -1,19 +1,19 @@
-"""The compact law as files of other programs: a frame around one source."""
+"""A block as files of other programs: a frame around one source."""
 
 from __future__ import annotations
 
-import inspect
 import re
 from importlib.resources import files
 from string import Template
 from typing import Final
 
-from ringbalance.export import point
-from ringbalance.export.compact import VELOCITIES, CompactLaw
-from ringbalance.export.translate import Source, c_functions, number_text, st_functions
+from ringbalance.export.blocks import RANGE, Block, Variable
+from ringbalance.export.translate import c_functions, number_text, python_functions, st_functions
 
 _PER_LINE: Final = 4
-_RANGE: Final = "{:g} to {:g} m/s".format(*VELOCITIES)
+_OF_CHAMBER: Final = ("surface_radius", "moment", "moment_uncertainty")
+"""Functions of the law for one chamber, which a caller may ask for by themselves."""
+_ST_TYPES: Final = {"Real": "LREAL", "Integer": "DINT", "Boolean": "BOOL"}
 
 
 def identifier(text: str) -> str:
@@ -22,60 +22,116 @@ def identifier(text: str) -> str:
     return f"law_{name}" if name[0].isdigit() else name
 
 
-def c_files(law: CompactLaw, name: str) -> dict[str, str]:
+def c_files(block: Block, name: str) -> dict[str, str]:
     """Text of the source and of the header by file name; `name`: of file and functions."""
-    functions = c_functions(Source.of(point))
-    return {
-        f"{name}.h": filled("h", law, name),
-        f"{name}.c": filled("c", law, name, functions=functions),
-    }
+    if block.kind == "law":
+        head = _head(block, name, ("answer", *_OF_CHAMBER))
+        return {f"{name}.h": filled("h", block, name), f"{name}.c": filled("c", block, name, head=head)}
+    return block_c_files(block, name)
 
 
-def st_files(law: CompactLaw, name: str) -> dict[str, str]:
+def block_c_files(block: Block, name: str) -> dict[str, str]:
+    """The same with the names that all blocks have."""
+    upper = name.upper()
+    places = [f"    {upper}_{each.name.upper()} = {each.place}" for each in block.variables]
+    run = f"{block.steps}(CONSTANTS, s->w{', time' if block.timed else ''});"
+    source = filled("block_c", block, name, head=_head(block, name), run=run)
+    header = filled("block_h", block, name, places=",\n".join(places))
+    return {f"{name}.h": header, f"{name}.c": source}
+
+
+def _head(block: Block, name: str, entries: tuple[str, ...] = ()) -> str:
+    functions = c_functions(block.source(entries))
+    return filled("head_c", block, name, functions=functions)
+
+
+def st_files(block: Block, name: str) -> dict[str, str]:
     """Structured text: functions, and a function block `FB_name`."""
-    sizes = {"Law": len(law.constants), "Query": point.PLACES_OF_QUERY}
-    functions = st_functions(Source.of(point), prefix=name, sizes=sizes)
-    return {f"{name}.st": filled("st", law, name, functions=functions)}
-
-
-def python_files(law: CompactLaw, name: str) -> dict[str, str]:
-    """A module that needs nothing but Python."""
-    source = inspect.getsource(point).split('"""\n', 1)[1]
-    return {f"{name}.py": filled("python", law, name, source=source.strip())}
-
-
-def facts(law: CompactLaw) -> str:
-    """What a law holds and how exact it is, in sentences."""
-    return (
-        f"{len(law.constants)} constants, {8 * len(law.constants)} bytes; velocities {_RANGE}, beyond\n"
-        f"   extrapolated. Largest error of tabulation: {law.departure:.1e} of a velocity,\n"
-        f"   {law.level_error:.1e} Pa of a chamber's level; both are part of the uncertainty."
+    sizes = {"Law": len(block.constants), "Query": len(block.start)}
+    entries = ("answer", *_OF_CHAMBER) if block.kind == "law" else ()
+    functions = st_functions(block.source(entries), prefix=name, sizes=sizes)
+    if block.kind == "law":
+        return {f"{name}.st": filled("st", block, name, functions=functions)}
+    inputs, outputs = _sides(block)
+    text = filled(
+        "block_st",
+        block,
+        name,
+        functions=functions,
+        inputs="\n".join(map(_st_declared, inputs)),
+        outputs="\n".join(map(_st_declared, outputs)),
+        set="\n".join(map(_st_set, inputs)),
+        get="\n".join(map(_st_get, outputs)),
+        steps=block.steps,
     )
+    return {f"{name}.st": text}
 
 
-def filled(template: str, law: CompactLaw, name: str, **parts: str) -> str:
-    """A template with a law in it. Args: `parts`: further words of that template."""
+def _sides(block: Block) -> tuple[list[Variable], list[Variable]]:
+    """Inputs and outputs."""
+    every = block.variables
+    return [each for each in every if each.input], [each for each in every if not each.input]
+
+
+def _st_declared(each: Variable) -> str:
+    unit = f", {each.range['unit']}" if "unit" in each.range else ""
+    return f"    {each.name} : {_ST_TYPES[each.kind]}; (* {each.description}{unit} *)"
+
+
+def _st_set(each: Variable) -> str:
+    if each.kind == "Boolean":
+        return f"w[{each.place}] := 0.0;\nIF {each.name} THEN\n    w[{each.place}] := 1.0;\nEND_IF;"
+    return f"w[{each.place}] := {each.name};"
+
+
+def _st_get(each: Variable) -> str:
+    value = f"w[{each.place}]"
+    if each.kind == "Boolean":
+        return f"{each.name} := {value} <> 0.0;"
+    return f"{each.name} := LREAL_TO_DINT({value});" if each.kind == "Integer" else f"{each.name} := {value};"
+
+
+def python_files(block: Block, name: str) -> dict[str, str]:
+    """A module that needs nothing but Python."""
+    law = block.kind == "law"
+    source = python_functions(block.source(("answer", *_OF_CHAMBER) if law else ()))
+    if law:
+        return {f"{name}.py": filled("python", block, name, source=source)}
+    inputs, outputs = ("\n".join(f'    "{v.name}": {v.place},' for v in side) for side in _sides(block))
+    run = f"{block.steps}(CONSTANTS, self.w, time)"
+    text = filled(
+        "block_python", block, name, source=source, inputs=inputs, outputs=outputs, run=run, kind=block.kind
+    )
+    return {f"{name}.py": text}
+
+
+def filled(template: str, block: Block, name: str, **parts: str) -> str:
+    """A template with a block in it. Args: `parts`: further words of that template."""
     text = files("ringbalance.export").joinpath(f"templates/{template}.txt").read_text(encoding="utf-8")
+    most = next((each.range["max"] for each in block.variables if each.range.get("unit") == "1"), "")
     return Template(text).substitute(
-        title=f"Flow law of a liquid-ring balancer, calibrated by ringbalance from {_named(law)}.",
-        facts=facts(law),
+        title=f"{block.title}, made by ringbalance from {_named(block)}.",
+        facts=block.facts,
         name=name,
         upper=name.upper(),
-        range=_RANGE,
-        most=number_text(law.max_fill_ratio),
-        count=len(law.constants),
-        last=len(law.constants) - 1,
-        last_of_query=point.PLACES_OF_QUERY - 1,
-        constants=_lines([number_text(value) for value in law.constants]),
+        range=RANGE,
+        most=most,
+        count=len(block.constants),
+        last=len(block.constants) - 1,
+        row=len(block.start),
+        last_of_row=len(block.start) - 1,
+        constants=_lines(block.constants),
+        start=_lines(block.start),
         **parts,
     )
 
 
-def _named(law: CompactLaw) -> str:
+def _named(block: Block) -> str:
     """The scene's file without what could end a comment."""
-    return re.sub(r"[^\w./ -]", "_", law.scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
+    return re.sub(r"[^\w./ -]", "_", block.scene.replace("\\", "/").rpartition("/")[2], flags=re.ASCII)
 
 
-def _lines(values: list[str]) -> str:
-    rows = [values[at : at + _PER_LINE] for at in range(0, len(values), _PER_LINE)]
+def _lines(values: tuple[float, ...]) -> str:
+    texts = [number_text(value) for value in values]
+    rows = [texts[at : at + _PER_LINE] for at in range(0, len(texts), _PER_LINE)]
     return ",\n".join("    " + ", ".join(row) for row in rows)

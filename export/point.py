@@ -21,8 +21,8 @@ VAPOUR, RELEASED, CAVITY_KNOWN, FROUDE, STAYS, CLEARS = 8, 9, 10, 11, 12, 13
 OF_DENSITY, OF_SPEED, OF_GAS, OF_CREST, TABULATION, LOWEST, HIGHEST = 14, 15, 16, 17, 18, 19, 20
 # Where a table begins, and behind it the number of its knots.
 FILLS, CHAMBER, SIPHON, THERE, BACK = 21, 23, 25, 27, 29
-# Column of the way back in the table of the siphon.
-BACK_SHARE, PLACES = 31, 32
+# Column of the way back in the table of the siphon; where a block that builds on the law has its own numbers.
+BACK_SHARE, BLOCK, PLACES = 31, 32, 33
 # Columns: value, slope and curvature, or values that are straight between knots.
 LEVEL_WIDTH_COLUMN, MOMENT_COLUMN, MOMENT_WIDTH_COLUMN = 4, 3, 5
 LOSS_COLUMN, SHARE_WIDTH_COLUMN, SHARE_COLUMN = 3, 4, 5
@@ -34,7 +34,9 @@ VELOCITY, UNCERTAINTY, REGIME, STATUS, PRIMED_AFTER = 4, 5, 6, 7, 8
 UP_GAS, DOWN_GAS, UP_LEVEL, UP_WIDTH, DOWN_LEVEL, DOWN_WIDTH = 9, 10, 11, 12, 13, 14
 DISCHARGE, DRIVING, RESTING, CAVITY, LEAST, MOST, GAS_THERE = 15, 16, 17, 18, 19, 20, 21
 # Velocities with d ln(velocity)/d ln(head), half-width of the loss, knot before, and place behind it.
-FULL, BROKEN, OTHER, PLACES_OF_QUERY = 22, 27, 32, 37
+FULL, BROKEN, OTHER = 22, 27, 32
+# Of the driven chamber, where these are asked for too.
+RADIUS, MOMENT, PLACES_OF_QUERY = 37, 38, 39
 EXPONENT, LOSS, KNOT, BEHIND = 1, 2, 3, 4
 
 BLOCKED, SIPHONING, SEPARATED, REVERSE, UNDECIDED = 0.0, 1.0, 2.0, 3.0, 4.0
@@ -379,3 +381,10 @@ def answer(c: Law, w: Query) -> None:
     w[UNCERTAINTY] = sqrt(w[UNCERTAINTY] * w[UNCERTAINTY] + part * part)
     if w[REGIME] == REVERSE:
         w[VELOCITY] = -w[VELOCITY]
+
+
+def answer_all(c: Law, w: Query) -> None:
+    """The answer, and surface radius, m, and moment, kg m, of the driven chamber."""
+    answer(c, w)
+    w[RADIUS] = surface_radius(c, w[FILL])
+    w[MOMENT] = moment(c, w[FILL])

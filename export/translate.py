@@ -33,6 +33,8 @@ class Function:
     """Name to type."""
     result: str
     body: Sequence[ast.stmt]
+    text: str
+    """In Python."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +51,26 @@ class Source:
         Raises: ValueError: something in it that is not of the subset.
         """
         return cls.of_text(inspect.getsource(module))
+
+    @classmethod
+    def of_modules(cls, modules: Sequence[ModuleType], entries: Sequence[str]) -> Source:
+        """What some functions need of modules that import each other's names, a later one's before.
+
+        Raises: ValueError: something in it that is not of the subset.
+        """
+        whole = [cls.of(each) for each in modules]
+        functions = {name: each for source in whole for name, each in source.functions.items()}
+        constants = {name: each for source in whole for name, each in source.constants.items()}
+        needed, todo = set(entries), list(entries)
+        while todo:
+            nodes = [node for each in functions[todo.pop()].body for node in ast.walk(each)]
+            names = {node.id for node in nodes if isinstance(node, ast.Name)}
+            todo += [name for name in names - needed if name in functions]
+            needed |= names
+        return cls(
+            constants={name: value for name, value in constants.items() if name in needed},
+            functions={name: each for name, each in functions.items() if name in needed},
+        )
 
     @classmethod
     def of_text(cls, text: str) -> Source:
@@ -80,6 +102,7 @@ def _function(node: ast.FunctionDef) -> Function:
         arguments={each.arg: ast.unparse(each.annotation or ast.Constant("?")) for each in node.args.args},
         result=ast.unparse(node.returns or ast.Constant("?")),
         body=node.body[1 if documented else 0 :],
+        text=ast.unparse(node),
     )
 
 
@@ -333,6 +356,12 @@ def number_text(value: float) -> str:
         return text
     digits, _, exponent = text.partition("e")
     return f"{digits}.0e{exponent}" if exponent else f"{digits}.0"
+
+
+def python_functions(source: Source) -> str:
+    """Constants and functions of a source in Python."""
+    constants = "".join(f"{name} = {value!r}\n" for name, value in source.constants.items())
+    return constants + "".join(f"\n\n{each.text}\n" for each in source.functions.values())
 
 
 def c_functions(source: Source) -> str:

@@ -8,18 +8,18 @@ from typing import Final
 import numpy as np
 
 from ringbalance.physics.tube.loss import VELOCITIES, tube_loss
-from ringbalance.reduced_model.calibration_record import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration, OperatingPoint
 from ringbalance.reduced_model.calibration_rows import calibration_rows
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, calibrate_chamber
+from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.documents import calibration_document
 from ringbalance.reduced_model.gas_line import line_answers
-from ringbalance.reduced_model.instability import AsynchronousInstability
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, calibrated_law
 from ringbalance.reduced_model.law.files import load_law
-from ringbalance.reduced_model.law.flow_law import CALIBRATED, BalancerModel
+from ringbalance.reduced_model.law.flow_law import CALIBRATED, UNCHECKED, BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
-from ringbalance.reduced_model.operating_point import OperatingPoint, TubeLiquid
+from ringbalance.reduced_model.pressure_profile import TubeLiquid
 from ringbalance.reduced_model.residual_liquid import ResidualLiquid
 from ringbalance.reduced_model.terms import models_used
 from ringbalance.reduced_model.tube.heads import TubeHeads
@@ -68,29 +68,30 @@ def calibrate(scene: AnyScene) -> Calibration:
     )
 
 
-def calibrated_model(scene: Scene) -> BalancerModel:
+def calibrated_model(scene: Scene, *, checked: bool = True) -> BalancerModel:
     """The balancer that `calibrate` finds, without what it reports beside: half the work.
 
+    Args: `checked`: whether finite elements check the chamber, which takes half of the rest.
     Raises: SceneError, ValueError: as `calibrate`.
     """
-    return BalancerModel.of(chamber_and_law(scene)[1])
+    return BalancerModel.of(chamber_and_law(scene, checked=checked)[1])
 
 
 def law_by_name(scene: Scene, law: str) -> BalancerModel:
-    """Model of a scene under the law "calibrated", "paper", or that of a saved file.
+    """Model of a scene under the law "calibrated", `UNCHECKED`, "paper", or that of a saved file.
 
     Raises: SceneError: a scene that cannot be calibrated, or a file that holds no law.
     """
-    if law == CALIBRATED:
-        return calibrated_model(scene)
+    if law in (CALIBRATED, UNCHECKED):
+        return calibrated_model(scene, checked=law == CALIBRATED)
     return paper_model(scene) if law == "paper" else BalancerModel.of(load_law(Path(law)))
 
 
-def chamber_and_law(scene: Scene) -> tuple[ChamberCalibration, CalibratedLaw]:
+def chamber_and_law(scene: Scene, *, checked: bool = True) -> tuple[ChamberCalibration, CalibratedLaw]:
     """The chamber, and the law.
 
     Raises: SceneError, ValueError: as `calibrate`.
     """
     check_ring(scene)
-    chamber = calibrate_chamber(scene)
+    chamber = calibrate_chamber(scene, checked=checked)
     return chamber, calibrated_law(scene=scene, chamber=chamber, heads=TubeHeads.of(scene))

@@ -9,25 +9,28 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
-from ringbalance.physics.tube.loss import TubeLoss
+from ringbalance.physics.tube.loss import INPUT_PART, TubeLoss, tube_loss
+from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.chamber.calibration import ChamberCalibration, Curve
+from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.reduced_model.chamber.values import drawing_shares
 from ringbalance.reduced_model.core import Answers
 from ringbalance.reduced_model.gas_line import LineAnswer
-from ringbalance.reduced_model.instability import AsynchronousInstability
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.operating_point import OperatingPoint, TubeLiquid
+from ringbalance.reduced_model.pressure_profile import HumpProfile, TubeLiquid
 from ringbalance.reduced_model.residual_liquid import Holding, ResidualLiquid
 from ringbalance.reduced_model.terms import ModelUsed
+from ringbalance.reduced_model.tube import regime
 from ringbalance.reduced_model.tube.directed_flow import DriveUncertainty
-from ringbalance.reduced_model.tube.regime import TubeEnds, gas_over_crest, possible_cavity
+from ringbalance.reduced_model.tube.regime import TubeEnds, gas_over_crest, possible_cavity, stall_pressure
 from ringbalance.results.result import PresentedResult
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.designs import Designs, input_effects
-from ringbalance.scene.models import Scene
+from ringbalance.scene.models import HumpGas, Scene
 from ringbalance.scene.uncertain import UNCERTAIN_QUANTITIES
 
 UNITS: Final = {
@@ -53,6 +56,111 @@ UNSTATED: Final = (
 )
 _NEGLIGIBLE: Final = 1e-12
 """Relative change of a quantity that counts as rounding, not as an effect of an input."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatingPoint:
+    """Equal fills, the scene's gas pressure, an empty tube beforehand."""
+
+    fill_ratio: float
+    """x of both chambers."""
+    gas_pressure: float
+    """Gauge, Pa."""
+    regime: Regime
+    """Of the flow."""
+    velocity: float
+    """u, m/s; zero when blocked."""
+    velocity_uncertainty: float
+    """Expanded uncertainty (95 %), m/s."""
+    loss_velocity: float
+    """Velocity at which k is given: u or, when blocked, that of a primed tube, m/s; zero if none."""
+    k: float | None
+    """Loss coefficient there; None without any velocity."""
+    k_uncertainty: float | None
+    """Expanded uncertainty (95 %)."""
+    k_model_uncertainty: float | None
+    """Its part by correlations, without the inputs."""
+    priming_vented: float | None
+    """Gauge pressure that starts a flow, crest gas vented, driven chamber empty, Pa; None: no crest."""
+    priming_trapped: float | None
+    """The same with that gas trapped, at equal fills."""
+    stall: float
+    """Gauge pressure at which a full siphon stalls with the driven chamber empty, Pa."""
+    stall_paper: float
+    """The same by Eq. 19."""
+    hump_pressure: float | None
+    """Pressure over the crest, gauge, Pa; None: no crest."""
+    cavity_pressure: float | None
+    """At which the column separates there, gauge, Pa."""
+    cavitation_margin: float | None
+    """Pressure over the crest of a full siphon, of a primed tube when blocked, less `cavity_pressure`, Pa."""
+    cavitation_margin_uncertainty: float | None
+    """Expanded uncertainty (95 %), Pa."""
+
+    @classmethod
+    def of(cls, *, scene: Scene, law: CalibratedLaw) -> OperatingPoint:
+        """Evaluate the law at equal fills under the scene's gas pressure.
+
+        Source: the law itself; thresholds by hydrostatics.
+        """
+        x, pressure = law.max_fill_ratio / 2, scene.gas.pressure
+        flow = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure)
+        full = law.evaluate(fill_ratio=x, opposite_fill_ratio=x, gas_pressure=pressure, primed=True)
+        u = abs(float(flow.velocity)) or abs(float(full.velocity))
+        loss = tube_loss(scene, u) if u > 0 else None
+        hump = HumpProfile.of(scene=scene, law=law, fill_ratio=x, opposite_fill_ratio=x, points=2)
+        vented = priming_pressure(law=law, fill_ratio=0.0, hump_gas="vented")
+        trapped = priming_pressure(law=law, fill_ratio=x, opposite_fill_ratio=x, hump_gas="trapped")
+        return cls(
+            fill_ratio=x,
+            gas_pressure=pressure,
+            regime=Regime(int(flow.regime)),
+            velocity=float(flow.velocity),
+            velocity_uncertainty=float(flow.uncertainty),
+            loss_velocity=u,
+            k=None if loss is None else float(loss.k.value),
+            k_uncertainty=None if loss is None else float(loss.k.uncertainty),
+            k_model_uncertainty=None if loss is None else _model_part(loss.uncertainty_parts),
+            priming_vented=None if vented is None else float(vented),
+            priming_trapped=None if trapped is None else float(trapped),
+            stall=max(float(stall_pressure(law.path, law.ends(fill_ratio=0.0))) / law.gas_factor, 0.0),
+            stall_paper=paper.stall_pressure(
+                disc=scene.disc, density=scene.liquid.density, angular_velocity=scene.rotor.speed
+            ),
+            hump_pressure=hump.hump_pressure,
+            cavity_pressure=hump.cavity_pressure,
+            cavitation_margin=hump.cavitation_margin,
+            cavitation_margin_uncertainty=hump.cavitation_margin_uncertainty,
+        )
+
+
+def priming_pressure(
+    *,
+    law: CalibratedLaw,
+    fill_ratio: npt.ArrayLike,
+    opposite_fill_ratio: npt.ArrayLike | None = None,
+    hump_gas: HumpGas,
+) -> FloatArray | None:
+    """Gas pressure that primes the tube: it lifts the liquid over the siphon crest.
+
+    vented: rho omega^2 (a_A^2 - r_m^2)/2; trapped: that and rho omega^2 (r_p^2 - a_C^2)/2.
+    Args: `law`: the flow law. `fill_ratio`: x of the driven chamber, any shape. `opposite_fill_ratio`: of the
+        opposite chamber; default max_fill_ratio - fill_ratio. `hump_gas`: which of the two bounds, whatever
+        the law itself uses.
+    Returns: Gauge pressure, Pa, of the broadcast shape; None without a crest.
+    Source: hydrostatics of the two legs in the rotating frame. For the liquid-ring paper's disc a crest at
+        31.5 mm gives its 0.54 MPa, vented with the driven chamber nearly empty or trapped at equal fills: an
+        inference, because the paper does not say what its figure means.
+    """
+    if not law.path.crest:
+        return None
+    path = replace(law.path, trapped=hump_gas == "trapped")
+    ends = law.ends(fill_ratio=fill_ratio, opposite_fill_ratio=opposite_fill_ratio)
+    return np.asarray(regime.priming_pressure(path, ends)) / law.gas_factor
+
+
+def _model_part(parts: Mapping[str, FloatArray]) -> float:
+    return math.hypot(*(float(part) for name, part in parts.items() if not name.startswith(INPUT_PART)))
 
 
 @dataclass(frozen=True, kw_only=True)

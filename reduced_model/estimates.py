@@ -51,19 +51,6 @@ from ringbalance.scene.loop_models import Sensor
 from ringbalance.scene.models import Scene
 
 
-def first_gas_time(scene: Scene) -> float:
-    """Valve-open time of the first injection, s: Kc times the initial amplitude, or the first trial.
-
-    The controller's limits hold; without a vibration it is the longest valve-open time.
-    Source: section 4 of the liquid-ring paper.
-    """
-    control = scene.controller
-    commanded = control.proportional * scene.rotor.initial_amplitude
-    if control.kind == "trial":
-        commanded = control.first_trial
-    return _within_limits(scene, commanded) or control.maximum_gas_time
-
-
 def deciding_gas_time(scene: Scene, *, rate: float) -> float:
     """Valve-open time of the shortest injection that matters, s: the one commanded at the limit of the
     vibration.
@@ -82,11 +69,7 @@ def deciding_gas_time(scene: Scene, *, rate: float) -> float:
         commanded = min(control.first_trial, control.short_step if fine else control.long_step)
     elif control.kind == "law_based":
         commanded = control.limit / rate if rate > 0 else control.maximum_gas_time
-    return _within_limits(scene, commanded) or control.maximum_gas_time
-
-
-def _within_limits(scene: Scene, commanded: float) -> float:
-    return min(max(commanded, scene.controller.minimum_gas_time), scene.controller.maximum_gas_time)
+    return min(max(commanded, control.minimum_gas_time), control.maximum_gas_time) or control.maximum_gas_time
 
 
 def long_start_up_loss(start_up: float, *, laminar: float = 0.0) -> float:

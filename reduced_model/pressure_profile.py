@@ -1,6 +1,7 @@
 """The pressure along the tube's path, from the driven chamber over the crest to the opposite one.
 
-A tube at rest without liquid over its crest: how far each leg is full, and what lies between.
+A tube at rest without liquid over its crest: how far each leg is full, and what lies between.  What liquid is
+in the tube before, during and after an injection, and what it does to the vibration.
 """
 
 from __future__ import annotations
@@ -12,16 +13,17 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ringbalance.physics.gas import vented_pressure
-from ringbalance.physics.pressure.hydrostatics import column_radius
 from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.physics.tube.state import TubeState
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import Flow, Regime
-from ringbalance.reduced_model.tube.flow import column_pressure
+from ringbalance.reduced_model.tube.flow import column_pressure, column_radius
 from ringbalance.reduced_model.tube.path import (
     Places,
+    crest_middle,
     crest_span,
     lowest_place,
+    path_angle,
     path_radius,
     reversed_tube,
     share_at_radius,
@@ -259,31 +261,20 @@ def _blocked(scene: Scene, law: CalibratedLaw, ends: TubeEnds, primed: bool, poi
         pressure = np.where(first, near, far) - path.port_pressure
         return _Line(share=at.share, pressure=pressure, full=np.ones(first.shape, dtype=np.bool_))
     cavity = float(cavity_pressure(path, ends)) if primed and is_covered else None
-    stop = _rest(scene=scene, path=path, ends=ends, cavity=cavity)
-    at = Places.along(tube=scene.tube, points=points, doubled=(stop.near, stop.far))
+    first, last, between = _rest(scene, path, ends, cavity)
+    at = Places.along(tube=scene.tube, points=points, doubled=(first, last))
     hydrostatic = column_pressure(scene=scene, radius=path_radius(tube=scene.tube, share=at.share))
-    in_near = ((at.share < stop.near) | ((at.share == stop.near) & ~at.after)) & is_covered
-    in_far = ((at.share > stop.far) | ((at.share == stop.far) & at.after)) & (not is_open)
-    pressure = np.where(in_near, near - hydrostatic, np.where(in_far, far - hydrostatic, stop.between))
+    in_near = ((at.share < first) | ((at.share == first) & ~at.after)) & is_covered
+    in_far = ((at.share > last) | ((at.share == last) & at.after)) & (not is_open)
+    pressure = np.where(in_near, near - hydrostatic, np.where(in_far, far - hydrostatic, between))
     # A chamber that leaves its port open shows its own gas there.
     pressure[0] = pressure[0] if is_covered else max(pressure[0], ends.upstream_gas)
     return _Line(share=at.share, pressure=pressure, full=in_near | in_far)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Rest:
-    """Two columns and what lies between them."""
-
-    near: float
-    """s/L up to which the leg of the driven chamber is full."""
-    far: float
-    """s/L from which on the other leg is full."""
-    between: float
-    """Pressure of what lies between, gauge, Pa."""
-
-
-def _rest(*, scene: Scene, path: TubePath, ends: TubeEnds, cavity: float | None) -> _Rest:
-    """Find the two columns of a tube at rest.
+def _rest(scene: Scene, path: TubePath, ends: TubeEnds, cavity: float | None) -> tuple[float, float, float]:
+    """Shares s/L up to which and from which on the two legs of a tube at rest are full, and the pressure of
+    what lies between, gauge, Pa.
 
     A separated column leaves a cavity at a given pressure.  An unprimed tube holds gas: vented, it is at the
     opposite chamber's pressure; trapped, it is compressed isothermally from the hydrostatic pressures alone
@@ -292,17 +283,12 @@ def _rest(*, scene: Scene, path: TubePath, ends: TubeEnds, cavity: float | None)
         supports no column. `cavity`: pressure of the cavity of a separated column, gauge, Pa; None for gas.
     Source: hydrostatics in the rotating frame; Boyle's law.
     """
-    outer, is_covered, is_open = scene.disc.outer_radius, covered(path, ends), discharges_openly(path, ends)
+    is_covered, is_open = covered(path, ends), discharges_openly(path, ends)
     near, far = ends.upstream_pressure(), ends.downstream_pressure()
 
     def leg(pressure: float, *, far_leg: bool) -> float:
         """Fraction of the path where a column ends that a pressure at the outer wall supports."""
-        radius = column_radius(
-            density=scene.liquid.density,
-            angular_velocity=scene.rotor.speed,
-            pressure=max(pressure, 0.0),
-            outer=outer,
-        )
+        radius = column_radius(scene=scene, pressure=max(pressure, 0.0))
         return share_at_radius(tube=scene.tube, radius=radius, far_leg=far_leg)
 
     def filled(pressure: float, near: float) -> tuple[float, float]:
@@ -318,8 +304,7 @@ def _rest(*, scene: Scene, path: TubePath, ends: TubeEnds, cavity: float | None)
         between = 0.0
     else:
         between = _trapped(vented_pressure(scene), path, ends, filled)
-    first, last = filled(between, near)
-    return _Rest(near=first, far=last, between=between)
+    return *filled(between, near), between
 
 
 def _trapped(ambient: float, path: TubePath, ends: TubeEnds, filled: _Filled) -> float:
@@ -336,3 +321,116 @@ def _trapped(ambient: float, path: TubePath, ends: TubeEnds, filled: _Filled) ->
         return 0.0
     root = largest if excess(largest) < 0 else 0.0 if excess(0.0) >= 0 else brentq(excess, 0.0, largest)
     return float(np.clip(max(root, near_pressure - path.column_pressure), 0.0, largest))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _HeldLiquid:
+    """Liquid in a tube in one state."""
+
+    state: str
+    """ "full", "separated" (a cavity between the legs), or "legs" (gas between them)."""
+    mass: float
+    """kg."""
+    along: float
+    """Moment towards the driven chamber, kg m."""
+    across: float
+    """Moment a quarter of a turn ahead of it, towards the crest, kg m."""
+    rounding: float
+    """Of the moment, at most, kg m."""
+
+    @property
+    def moment(self) -> complex:
+        """Along and across, kg m."""
+        return complex(self.along, self.across)
+
+    def change_from(self, before: _HeldLiquid) -> float:
+        """Size of the difference of two moments, kg m; zero where that is rounding."""
+        change = abs(self.moment - before.moment)
+        return change if change > self.rounding + before.rounding else 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TubeLiquid:
+    """Liquid in the tube of a pair around its first injection, at equal fills."""
+
+    before: _HeldLiquid
+    """At rest, gas over the crest."""
+    flowing: _HeldLiquid
+    """Under the scene's gas pressure."""
+    after: _HeldLiquid
+    """At rest after venting: a column that stays whole, or legs on both sides of a cavity or of gas."""
+    flowing_vibration: float
+    """Change of the vibration's amplitude while the tube flows, at most, m."""
+    lasting_vibration: float
+    """The same that stays after venting, m."""
+    limit: float
+    """Of the vibration, m."""
+    returned_volume: float
+    """Liquid that each injection lifts to the middle of the crest and that falls back when the gas is vented,
+    m^3; runs lift it from the level, where gas lies over the crest."""
+
+    @classmethod
+    def of(cls, scene: Scene, *, law: CalibratedLaw) -> TubeLiquid:
+        """Follow the liquid in the tube through an injection at equal fills.
+
+        M = rho S int r e^(i phi) ds over the part of the path that is full, where pressure at rest or in flow
+        puts the ends of the columns.  The chambers' levels change too little in one injection to matter.
+        Source: first moment; `HumpProfile.of`.
+        """
+        fill, gas = law.max_fill_ratio / 2, scene.gas.pressure
+
+        def state(gas_pressure: float, *, primed: bool) -> HumpProfile:
+            return HumpProfile.of(
+                scene=scene, law=law, fill_ratio=fill, gas_pressure=gas_pressure, primed=primed
+            )
+
+        primes = law.evaluate(fill_ratio=fill, gas_pressure=gas).primed
+        profiles = state(0.0, primed=False), state(gas, primed=False), state(0.0, primed=bool(primes))
+        before, flowing, after = (_held(scene, profile) for profile in profiles)
+        influence = scene.rotor.influence_coefficient
+        return cls(
+            before=before,
+            flowing=flowing,
+            after=after,
+            flowing_vibration=influence * flowing.change_from(before),
+            lasting_vibration=influence * after.change_from(before),
+            limit=scene.controller.limit,
+            returned_volume=_returned(scene, flowing=profiles[1], after=profiles[2]),
+        )
+
+
+def _held(scene: Scene, profile: HumpProfile) -> _HeldLiquid:
+    share = profile.path / scene.tube.length
+    arm = profile.radius * np.exp(1j * path_angle(tube=scene.tube, share=share))
+    # A piece counts where both of its ends are full; where fullness changes a place stands twice.
+    wet = profile.full[1:] & profile.full[:-1]
+    line = scene.liquid.density * scene.tube.area * np.diff(profile.path) * wet
+    pieces = line * (arm[1:] + arm[:-1]) / 2
+    moment = complex(np.sum(pieces))
+    return _HeldLiquid(
+        state=_state(profile),
+        mass=float(np.sum(line)),
+        along=moment.real,
+        across=moment.imag,
+        rounding=pieces.size * float(np.finfo(float).eps * np.sum(np.abs(pieces))),
+    )
+
+
+def _state(profile: HumpProfile) -> str:
+    if np.all(profile.full):
+        return "full"
+    gap = profile.pressure[~profile.full]
+    cavity = profile.cavity_pressure
+    return "separated" if cavity is not None and float(np.max(gap)) <= cavity + 1.0 else "legs"
+
+
+def _returned(scene: Scene, *, flowing: HumpProfile, after: HumpProfile) -> float:
+    """Volume between where the near column ends at rest and the crest's middle; none in a full tube.
+
+    What lies on the crest's circle is pulled to neither side and drains to both.
+    """
+    if flowing.velocity == 0 or scene.tube.hump_radius is None or np.all(after.full):
+        return 0.0
+    near = float(after.path[int(np.argmin(after.full))])
+    parts = crest_middle(scene.tube) * scene.tube.length
+    return scene.tube.area * max(parts - near, 0.0)

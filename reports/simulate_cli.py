@@ -55,8 +55,7 @@ def simulate(
     check_output("--plot", plot, ".svg")
     told = _with_seed(with_tolerance(load_scene(scene), tolerance=tolerance, models=models), seed)
     balancer = balancer_under(law, told)
-    # The first run on a machine compiles for ten to twenty seconds; later ones take the code that is kept.
-    with activity("simulate", "closed loop (the first run compiles) ...") as shown:
+    with activity("simulate", "closed loop ...") as shown:
         outcomes = balancer.run({}, AS_GIVEN, trace=True, progress=_clock(shown))
         run, met = outcomes.traced[0].run, all(each.met(outcomes).all() for each in balancer.demands())
         document = run.to_dict() if json else {}

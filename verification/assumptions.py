@@ -99,9 +99,7 @@ def widened(
         return evidence
 
     def errors(of: Any) -> Mapping[str, float]:
-        there = at(of)
-        exact = {name: reference.value for name, reference in there.reference.items()}
-        return {name: found.value - exact.get(name, 0.0) for name, found in there.found.items()}
+        return {name: found.error for name, found in at(of).found.items()}
 
     here = errors(scene)
     paths = [one.path for one in assumptions]

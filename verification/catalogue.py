@@ -31,7 +31,6 @@ from ringbalance.verification.evidence import (
     Level,
     NotRunError,
     Reference,
-    as_found,
 )
 
 _PAPERS: Final = ("liquid_ring", "eccentric_mass")
@@ -149,24 +148,29 @@ class _Code:
     def compute(self, scene: Any, level: Level, defect: str | None = None) -> Evidence:
         """As `CaseCode.compute`."""
         arguments = (scene, level, defect) if self.takes_defect else (scene, level)
-        found = self._called(self.module.compute, *arguments)
-        if isinstance(found, Mapping):
-            found = Evidence(found=self._numbers("compute", found, Found, as_found))
-        if not isinstance(found, Evidence):
+        result = self._called(self.module.compute, *arguments)
+        if isinstance(result, Mapping):
+            result = Evidence(found=self._records("compute", result, Found))
+        if not isinstance(result, Evidence):
             raise CaseError(
-                f"{self.path}: compute gives {_kind(found)}, not an Evidence or numbers by quantity"
+                f"{self.path}: compute gives {_kind(result)}, not an Evidence or numbers by quantity"
             )
-        self._check_names("compute", found.found, complete=True)
-        return dataclasses.replace(found, reference={**found.reference, **self._reference(scene)})
+        self._check_names("compute", result.found, complete=True)
+        against = self._references(scene)
+        found = {
+            name: found.against(against[name]) if name in against else found
+            for name, found in result.found.items()
+        }
+        return dataclasses.replace(result, found=found)
 
-    def _reference(self, scene: Any) -> Mapping[str, Reference]:
+    def _references(self, scene: Any) -> Mapping[str, Reference]:
         """What judged quantities are compared with, by name; nothing where the case has none."""
         given = getattr(self.module, "reference", {})
         values = self._called(given, scene) if callable(given) else given
         if not isinstance(values, Mapping):
             raise CaseError(f"{self.path}: reference gives {_kind(values)}, not references by quantity")
         self._check_names("reference", values, complete=False)
-        return self._numbers("reference", values, Reference, _as_references)
+        return self._records("reference", values, Reference)
 
     def _called(self, function: Callable[..., Any], *arguments: Any) -> Any:
         try:
@@ -176,18 +180,18 @@ class _Code:
         except Exception as error:
             raise CaseError(f"{self.path}: {_described(error, self.path)}") from error
 
-    def _numbers(
-        self, where: str, values: Mapping[str, Any], kind: type, made: Callable[..., Any]
-    ) -> Mapping[str, Any]:
-        """Records by name, plain numbers made into such."""
-        plain = {name: _number(value) for name, value in values.items() if not isinstance(value, kind)}
-        for name, number in plain.items():
-            if number is None:
+    def _records(self, where: str, values: Mapping[str, Any], kind: Callable[..., Any]) -> dict[str, Any]:
+        """Records of a kind by name, plain numbers made into such."""
+        records = {}
+        for name, value in values.items():
+            number = _number(value)
+            if type(value) is not kind and number is None:
                 raise CaseError(
-                    f'{self.path}: {where} gives {_kind(values[name])} for "{name}", not a number or a '
+                    f'{self.path}: {where} gives {_kind(value)} for "{name}", not a number or a '
                     f"{kind.__name__}"
                 )
-        return {**values, **made(**plain)}
+            records[name] = value if number is None else kind(value=number)
+        return records
 
     def _check_names(self, where: str, values: Mapping[str, Any], *, complete: bool) -> None:
         strange = [name for name in values if name not in self.judged]
@@ -247,10 +251,6 @@ def _number(value: object) -> float | None:
     if isinstance(value, str) or not isinstance(value, SupportsFloat) or np.ndim(cast(Any, value)):
         return None
     return float(value)
-
-
-def _as_references(**values: float) -> Mapping[str, Reference]:
-    return {name: Reference(value=value) for name, value in values.items()}
 
 
 def _described(error: Exception, path: Path) -> str:

@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Literal, Protocol, SupportsFloat
+from typing import Any, Literal, Protocol, Self, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,8 @@ Level = Literal["light", "heavy"]
 CurveStyle = Literal["paper", "found", "reference", "points"]
 COVERAGE_FACTOR = 2.0
 """Half-widths at 95 % per standard uncertainty."""
+ROUND_OFF = 1e-13
+"""Relative errors below this say nothing about an order."""
 
 
 def from_half_width(half_width: float) -> float:
@@ -75,7 +77,27 @@ class Reference:
     """u_D, standard uncertainty."""
 
     def __post_init__(self) -> None:
-        _finite(self.value, self.uncertainty)
+        _check(self.value, uncertainties=(self.uncertainty,))
+
+
+def printed(value: float, *, last_digit: float) -> Reference:
+    """A printed number with the uncertainty of its rounding, from one unit of its last digit."""
+    return Reference(value=value, uncertainty=from_rounding(last_digit))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A found number S against a reference D."""
+
+    error: float
+    """E = S - D."""
+    half_width: float
+    """2 u_val, the expanded uncertainty (95 %) that |E| is compared with."""
+
+    @property
+    def consistent(self) -> bool:
+        """Whether |E| <= 2 u_val: the comparison sees no difference."""
+        return abs(self.error) <= self.half_width
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,21 +116,44 @@ class Found:
     """The number once the correction that the case's text names is made; None where there is none."""
     conclusive: bool = True
     """False when the sequence behind the number is not asymptotic, or a solve did not succeed."""
+    reference: Reference | None = None
+    """What it is compared with; None where a limit alone judges it."""
 
     def __post_init__(self) -> None:
         corrected = 0.0 if self.corrected is None else self.corrected
-        _finite(self.value, self.numerical, self.input, corrected, *self.reach)
+        _check(self.value, corrected, *self.reach, uncertainties=(self.numerical, self.input))
+
+    @classmethod
+    def within(cls, value: SupportsFloat, half_width: SupportsFloat, *, conclusive: bool = True) -> Self:
+        """A calculated number with its expanded uncertainty (95 %)."""
+        numerical = from_half_width(float(half_width))
+        return cls(value=float(value), numerical=numerical, conclusive=conclusive)
+
+    @property
+    def error(self) -> float:
+        """E = S - D, the number itself where it is compared with nothing."""
+        return self.value - (0.0 if self.reference is None else self.reference.value)
+
+    def against(self, reference: Reference | SupportsFloat) -> Found:
+        """The number beside what it is compared with; a plain number is exact."""
+        exact = reference if isinstance(reference, Reference) else Reference(value=float(reference))
+        return dataclasses.replace(self, reference=exact)
+
+    def compared(self, reference: Reference) -> Comparison:
+        """E = S - D with u_val = sqrt(u_num^2 + u_input^2 + u_D^2).
+
+        A few units in the last place of the larger number are added for round-off.
+        Source: ASME V&V 20-2009, sections 1 and 6; independent uncertainties.
+        """
+        round_off = 4 * math.ulp(max(abs(self.value), abs(reference.value)))
+        u_val = math.hypot(self.numerical, self.input, reference.uncertainty, round_off)
+        return Comparison(error=self.value - reference.value, half_width=COVERAGE_FACTOR * u_val)
 
     def moved(self, low: float, high: float) -> Found:
         """The number with more inputs that move it: reaches add, as an assumption is no random error."""
         return dataclasses.replace(
             self, reach=(self.reach[0] + min(low, 0.0), self.reach[1] + max(high, 0.0))
         )
-
-    @property
-    def input_standard_uncertainty(self) -> float:
-        """u_input with the assumed inputs, the number equally likely within their reach (GUM, 4.3.7)."""
-        return math.hypot(self.input, from_range(self.reach))
 
     def scaled(self, factor: float) -> Found:
         """The number times a positive constant."""
@@ -118,12 +163,16 @@ class Found:
 
     def with_correction(self) -> Found:
         """The number with its correction made: what a case finds once the plates are left out."""
-        return Found(value=self.value if self.corrected is None else self.corrected)
+        corrected = self.value if self.corrected is None else self.corrected
+        return Found(value=corrected, reference=self.reference)
 
 
-def as_found(**values: SupportsFloat) -> dict[str, Found]:
-    """Numbers without an uncertainty of their own, by the names of the quantities that are judged."""
-    return {name: Found(value=float(value)) for name, value in values.items()}
+def as_found(**values: Found | SupportsFloat) -> dict[str, Found]:
+    """Judged quantities by name; a plain number has no uncertainty of its own."""
+    return {
+        name: value if isinstance(value, Found) else Found(value=float(value))
+        for name, value in values.items()
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,7 +219,7 @@ class Convergence:
     """Errors, or values, of one quantity over a sequence of levels, coarse to fine."""
 
     quantity: str
-    unit: str
+    unit: str = "1"
     formal_order: float
     size: Sequence[float]
     """h, relative to the coarsest, coarse to fine."""
@@ -185,6 +234,62 @@ class Convergence:
     geometry: str = ""
     """ "quadratic" or "straight" where it matters."""
     note: str = ""
+
+    @classmethod
+    def of_errors(
+        cls,
+        quantity: str,
+        formal_order: float,
+        *,
+        size: Sequence[float],
+        error: Sequence[float],
+        geometry: str = "",
+        note: str = "",
+    ) -> Self:
+        """Observed orders p = ln(e_i/e_(i+1))/ln(h_i/h_(i+1)) of relative errors, coarse to fine.
+
+        Raises: ValueError: lengths that differ, sizes that do not fall, errors that are negative, not finite
+            or at round-off, where no order can be seen.
+        """
+        h, e = np.asarray(size, dtype=np.float64), np.asarray(error, dtype=np.float64)
+        if h.shape != e.shape or h.size < 2:
+            raise ValueError("an order study needs at least two levels, with one error each")
+        if not (np.all(np.isfinite(h)) and np.all(h > 0) and np.all(np.diff(h) < 0)):
+            raise ValueError("sizes must be positive and fall from level to level")
+        if not (np.all(np.isfinite(e)) and np.all(e > ROUND_OFF)):
+            raise ValueError("errors must be finite and above round-off for an order to be seen")
+        return cls(
+            quantity=quantity,
+            formal_order=formal_order,
+            size=h.tolist(),
+            error=e.tolist(),
+            observed_order=(np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])).tolist(),
+            geometry=geometry,
+            note=note,
+        )
+
+    @property
+    def finest_error(self) -> float:
+        """Error on the finest level."""
+        return (self.error or ())[-1]
+
+    @property
+    def settled_order(self) -> float:
+        """The lowest order among the two finest pairs: earlier ones are not yet asymptotic."""
+        return min(self.observed_order[-2:])
+
+
+def orders_found(studies: Mapping[str, Convergence]) -> dict[str, Found]:
+    """The settled order and the finest error of each study as judged quantities, by its name."""
+    orders = {f"{name}_order": study.settled_order for name, study in studies.items()}
+    return as_found(**orders, **{f"{name}_error": study.finest_error for name, study in studies.items()})
+
+
+def order_figure(studies: Mapping[str, Convergence]) -> Series:
+    """Errors of several studies on the same meshes, by the name of their curve."""
+    size = next(iter(studies.values())).size
+    curves = (Curve(name, "1", np.array(study.error)) for name, study in studies.items())
+    return figure("error against mesh size", ("relative mesh size", "1", size), *curves, log=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,14 +307,16 @@ class Evidence:
 
     found: Mapping[str, Found]
     """By the names of the case's quantities."""
-    reference: Mapping[str, Reference] = field(default_factory=dict)
-    """What they are compared with, by the same names; a quantity that is not named has none."""
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    """Further numbers, SI, for the placeholders of the case's text."""
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    """Further numbers, SI, for the placeholders of the case's text; kept as floats."""
     series: Sequence[Series] = ()
     convergence: Sequence[Convergence] = ()
     tables: Sequence[Table] = ()
     status: Status = field(default_factory=Status)
+
+    def __post_init__(self) -> None:
+        numbers = {name: float(value) for name, value in self.numbers.items()}
+        object.__setattr__(self, "numbers", numbers)
 
 
 class CaseCode(Protocol):
@@ -228,9 +335,11 @@ class NotRunError(Exception):
     """Raised by a case that cannot be run on this scene, or not yet; its text says why."""
 
 
-def _finite(*values: float) -> None:
-    if not all(math.isfinite(value) for value in values):
-        raise ValueError(f"evidence must be finite, not {values}")
+def _check(*values: float, uncertainties: Sequence[float]) -> None:
+    if not all(map(math.isfinite, (*values, *uncertainties))) or min(uncertainties) < 0:
+        raise ValueError(
+            f"evidence must be finite, with uncertainties of zero or more, not {values}, {uncertainties}"
+        )
 
 
 Kind = Literal["validation", "code_verification", "solution_verification", "claim"]
@@ -263,51 +372,7 @@ VOCABULARY: dict[Kind, tuple[Verdict, ...]] = {
 """Verdicts of each kind of case, the one that decides the case first."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
-    """A found number against a reference."""
-
-    error: float
-    """E = S - D."""
-    validation_uncertainty: float
-    """u_val, standard."""
-
-    @property
-    def half_width(self) -> float:
-        """2 u_val, the expanded uncertainty (95 %) that |E| is compared with."""
-        return COVERAGE_FACTOR * self.validation_uncertainty
-
-    @property
-    def consistent(self) -> bool:
-        """Whether |E| <= 2 u_val: the comparison sees no difference."""
-        return abs(self.error) <= self.half_width
-
-
-def compare(
-    *,
-    found: float,
-    reference: float,
-    numerical: float = 0.0,
-    input_: float = 0.0,
-    reference_uncertainty: float = 0.0,
-) -> Comparison:
-    """Compare a found number S with a reference D: E = S - D, u_val = sqrt(u_num^2 + u_input^2 + u_D^2).
-
-    A few units in the last place of the larger number are added for round-off.
-    Args: `numerical`, `input_` and `reference_uncertainty` are standard uncertainties in the unit of S.
-    Raises: ValueError: a number that is not finite, or a negative uncertainty.
-    Source: ASME V&V 20-2009, sections 1 and 6; independent uncertainties.
-    """
-    parts = (numerical, input_, reference_uncertainty)
-    if not all(math.isfinite(value) for value in (found, reference, *parts)) or min(parts) < 0:
-        raise ValueError("a comparison needs finite numbers and uncertainties that are not negative")
-    round_off = 4 * math.ulp(max(abs(found), abs(reference)))
-    return Comparison(error=found - reference, validation_uncertainty=math.hypot(*parts, round_off))
-
-
-def judge_quantity(
-    *, kind: Kind, metric: Metric, limit: float, found: Found, reference: Reference | None
-) -> tuple[Verdict, Comparison]:
+def judge_quantity(*, kind: Kind, metric: Metric, limit: float, found: Found) -> tuple[Verdict, Comparison]:
     """Judge one quantity by its metric and limit, compared with its reference, or with the limit as a bound.
 
     `validation` (claims) and `within_uncertainty`: E = S - D against 2 u_val, without what assumed inputs
@@ -318,25 +383,19 @@ def judge_quantity(
     Raises: ValueError: a metric that needs a reference, without one.
     """
     bound = metric in ("at_most", "at_least")
-    if reference is None and not bound:
+    reference = Reference(value=limit) if bound else found.reference
+    if reference is None:
         raise ValueError(f'metric "{metric}" needs a reference')
-    against = Reference(value=limit) if bound or reference is None else reference
-    comparison = compare(
-        found=found.value,
-        reference=against.value,
-        numerical=found.numerical,
-        input_=found.input,
-        reference_uncertainty=against.uncertainty,
-    )
+    comparison = found.compared(reference)
     if not found.conclusive:
         return Verdict.INCONCLUSIVE, comparison
     if bound:
         verdict = _by_bound(kind, metric, found, comparison)
     elif metric in ("relative", "absolute"):
-        scale = abs(against.value) if metric == "relative" else 1.0
+        scale = abs(reference.value) if metric == "relative" else 1.0
         verdict = _yes_or_no(kind, abs(comparison.error) <= limit * scale)
     else:
-        verdict = _by_uncertainty(kind, limit, found, against, comparison)
+        verdict = _by_uncertainty(kind, limit, found, reference, comparison)
     return verdict, comparison
 
 

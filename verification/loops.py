@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -21,7 +22,7 @@ from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene.loop_models import ControllerKind
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import Curve, Found, Series, figure
+from ringbalance.verification.evidence import Curve, Found, Series, Table, figure
 
 PHASES: Final = tuple(math.radians(angle) for angle in (90, 180, 270, 360))
 """Of the initial vibration, the four cases of Fig. 6."""
@@ -121,6 +122,40 @@ def settled_after(runs: Sequence[Simulation]) -> float | str:
     """The longest settling time of some runs, s, for a table."""
     time = max(map(settling, runs))
     return time if math.isfinite(time) else "not settled"
+
+
+def worst(runs: Sequence[Simulation]) -> float:
+    """Most misadjustments in one of some runs."""
+    return float(max(run.misadjustments for run in runs))
+
+
+def _most_overshoots(runs: Sequence[Simulation]) -> float:
+    return float(max(run.overshoots for run in runs))
+
+
+_SHOWN: Final[Mapping[str, Callable[[Sequence[Simulation]], float | str]]] = MappingProxyType(
+    {
+        "settled after": settled_after,
+        "misadjustments": worst,
+        "overshoots": _most_overshoots,
+        "most in one run": _most_overshoots,
+        "runs that overshoot": overshooting,
+    }
+)
+
+
+def runs_table(
+    name: str,
+    settings: Mapping[str, Sequence[float | str]],
+    groups: Sequence[Sequence[Simulation]],
+    *,
+    shown: Sequence[str] = ("settled after", "misadjustments"),
+    units: Mapping[str, str],
+) -> Table:
+    """What became of groups of runs, each at one value of every setting: the worst of a group."""
+    columns = {what: [_SHOWN[what](runs) for runs in groups] for what in shown}
+    times = {"settled after": "s"} if "settled after" in shown else {}
+    return Table(name=name, columns={**settings, **columns}, units={**units, **times})
 
 
 def over_period(numbers: Sequence[float]) -> Found:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Final
 
@@ -22,48 +22,28 @@ from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray, IntArray
 from ringbalance.scene.keys.declaration import keys_of
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import (
-    Reference,
-    from_rounding,
-    input_uncertainty,
-)
+from ringbalance.verification.evidence import input_uncertainty, printed
 
-
-@dataclass(frozen=True, kw_only=True)
-class _Printed:
-    """A printed number."""
-
-    value: float
-    """SI."""
-    last_digit: float
-    """One unit of the last digit printed, SI."""
-
-    @property
-    def reference(self) -> Reference:
-        """The number with the standard uncertainty of its rounding."""
-        return Reference(value=self.value, uncertainty=from_rounding(self.last_digit))
-
-
-CHAMBER_VOLUME: Final = _Printed(value=67.7e-6, last_digit=0.1e-6)
+CHAMBER_VOLUME: Final = printed(67.7e-6, last_digit=0.1e-6)
 """Eq. 4."""
-MAX_LIQUID_VOLUME: Final = _Printed(value=33.9e-6, last_digit=0.1e-6)
+MAX_LIQUID_VOLUME: Final = printed(33.9e-6, last_digit=0.1e-6)
 """Eq. 5."""
-INITIAL_LIQUID_VOLUME: Final = _Printed(value=16.9e-6, last_digit=0.1e-6)
+INITIAL_LIQUID_VOLUME: Final = printed(16.9e-6, last_digit=0.1e-6)
 """Eq. 6."""
-RING_RADIUS: Final = _Printed(value=34.9e-3, last_digit=0.1e-3)
+RING_RADIUS: Final = printed(34.9e-3, last_digit=0.1e-3)
 """R1'min, after Eq. 6."""
-CHAMBER_MOMENT: Final = _Printed(value=1333e-6, last_digit=1e-6)
+CHAMBER_MOMENT: Final = printed(1333e-6, last_digit=1e-6)
 """After Eq. 7."""
-DISC_MOMENT: Final = _Printed(value=1885e-6, last_digit=1e-6)
+DISC_MOMENT: Final = printed(1885e-6, last_digit=1e-6)
 """Eq. 8."""
-DENSE_DISC_MOMENT: Final = _Printed(value=3770e-6, last_digit=10e-6)
+DENSE_DISC_MOMENT: Final = printed(3770e-6, last_digit=10e-6)
 """After Eq. 8, twice 1885 and so known to ten."""
-LOWEST_PRESSURE: Final = _Printed(value=0.54e6, last_digit=0.01e6)
-HIGHEST_PRESSURE: Final = _Printed(value=1.77e6, last_digit=0.01e6)
+LOWEST_PRESSURE: Final = printed(0.54e6, last_digit=0.01e6)
+HIGHEST_PRESSURE: Final = printed(1.77e6, last_digit=0.01e6)
 """Working range, after Eq. 19."""
-DEPARTURE_LOW: Final = _Printed(value=0.456, last_digit=0.001)
+DEPARTURE_LOW: Final = printed(0.456, last_digit=0.001)
 """Under Fig. 4, at LOW_PRESSURE."""
-DEPARTURE_HIGH: Final = _Printed(value=0.229, last_digit=0.001)
+DEPARTURE_HIGH: Final = printed(0.229, last_digit=0.001)
 """Under Fig. 4, at HIGH_PRESSURE."""
 LOW_PRESSURE: Final = 0.7e6
 HIGH_PRESSURE: Final = 1.5e6
@@ -81,7 +61,7 @@ def at_paper_density(scene: Scene) -> Scene:
 
 def rounded_radius(quantity: Callable[[float], float]) -> float:
     """Standard uncertainty that the rounding of the printed R1'min gives to a quantity of it."""
-    return input_uncertainty([(quantity, RING_RADIUS.value, from_rounding(RING_RADIUS.last_digit))])
+    return input_uncertainty([(quantity, RING_RADIUS.value, RING_RADIUS.uncertainty)])
 
 
 def with_plate(disc: Disc, thickness: float) -> Disc:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from ringbalance.results.numbers import given
 from ringbalance.results.result import Result, Rows, Table
@@ -18,9 +18,12 @@ from ringbalance.verification.evidence import (
     Comparison,
     Evidence,
     Found,
+    Kind,
     Level,
     Reference,
     Verdict,
+    from_range,
+    judge_quantity,
 )
 from ringbalance.verification.typed_record import plain
 
@@ -48,8 +51,20 @@ class QuantityResult:
     quantity: Quantity
     verdict: Verdict
     found: Found | None = None
-    reference: Reference | None = None
     comparison: Comparison | None = None
+
+    @classmethod
+    def of(cls, kind: Kind, quantity: Quantity, found: Found) -> Self:
+        """Judge what a case found."""
+        verdict, comparison = judge_quantity(
+            kind=kind, metric=quantity.metric, limit=quantity.limit, found=found
+        )
+        return cls(quantity=quantity, verdict=verdict, found=found, comparison=comparison)
+
+    @property
+    def reference(self) -> Reference | None:
+        """What the number is compared with, or beside which it is shown."""
+        return None if self.found is None else self.found.reference
 
     @property
     def half_width(self) -> float | None:
@@ -74,13 +89,13 @@ class QuantityResult:
             "reference": None if reference is None else reference.value,
             "uncertainty": self.half_width,
             "reference_uncertainty": None if reference is None else COVERAGE_FACTOR * reference.uncertainty,
-            **_found(found, reference),
+            **_found(found),
             "verdict": self.verdict.value,
         }
 
     def row(self) -> Row:
         """The found number with its interval."""
-        quantity, document = self.quantity, _found(self.found, self.reference)
+        quantity, document = self.quantity, _found(self.found)
         exact = not document["value_uncertainty"]
         return Row(
             key=quantity.name,
@@ -273,17 +288,18 @@ def _part(definition: CaseDefinition, names: set[str]) -> Document:
     return {name: value for name, value in plain(definition).items() if name in names}
 
 
-def _found(found: Found | None, reference: Reference | None) -> Document:
+def _found(found: Found | None) -> Document:
     """Expanded uncertainties of a found number, and the standard ones of V&V 20 by their symbols there."""
     if found is None:
         names = ("error", "value_uncertainty", "value_low", "value_high", "numerical_uncertainty")
         return dict.fromkeys((*names, "input_uncertainty", "corrected", "validation"))
-    low, high = found.reach
-    error = None if reference is None else found.value - reference.value
+    (low, high), reference = found.reach, found.reference
+    error = None if reference is None else found.error
     known = COVERAGE_FACTOR * math.hypot(found.numerical, found.input)
     parts = {
         "u_num": found.numerical,
-        "u_input": found.input_standard_uncertainty,
+        # An assumed input is equally likely anywhere within its reach.
+        "u_input": math.hypot(found.input, from_range(found.reach)),
         "u_D": 0.0 if reference is None else reference.uncertainty,
     }
     return {

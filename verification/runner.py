@@ -14,18 +14,15 @@ from ringbalance.scene import AnyScene, bundled_scene, liquid_ring_scene, load_s
 from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.assumptions import assumptions_of, overridden, widened
-from ringbalance.verification.case import NEEDS_REFERENCE, CaseDefinition, Mutation, Quantity
+from ringbalance.verification.case import CaseDefinition, Mutation
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
 from ringbalance.verification.evidence import (
     CaseCode,
     Evidence,
-    Found,
     Level,
     NotRunError,
-    Reference,
     Verdict,
     combine,
-    judge_quantity,
 )
 from ringbalance.verification.papers import driven_scene
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
@@ -149,35 +146,12 @@ def _evidence_at(
 
 def _quantities(definition: CaseDefinition, evidence: Evidence) -> tuple[QuantityResult, ...]:
     """Every quantity of a case. Raises: ValueError: what was found is not what the case judges."""
-    against = evidence.reference
     names = {quantity.name for quantity in definition.quantity}
-    if set(evidence.found) != names or not set(against) <= names:
-        raise ValueError(
-            f"{definition.id}: judged are {sorted(names)}, found {sorted(evidence.found)}, "
-            f"referenced {sorted(against)}"
-        )
+    if set(evidence.found) != names:
+        raise ValueError(f"{definition.id}: judged are {sorted(names)}, found {sorted(evidence.found)}")
     return tuple(
-        _judge_one(definition, quantity, evidence.found[quantity.name], against.get(quantity.name))
+        QuantityResult.of(definition.kind, quantity, evidence.found[quantity.name])
         for quantity in definition.quantity
-    )
-
-
-def _judge_one(
-    definition: CaseDefinition, quantity: Quantity, found: Found, reference: Reference | None
-) -> QuantityResult:
-    verdict, comparison = judge_quantity(
-        kind=definition.kind,
-        metric=quantity.metric,
-        limit=quantity.limit,
-        found=found,
-        reference=reference if quantity.metric in NEEDS_REFERENCE else None,
-    )
-    return QuantityResult(
-        quantity=quantity,
-        verdict=verdict,
-        found=found,
-        reference=reference,
-        comparison=comparison,
     )
 
 

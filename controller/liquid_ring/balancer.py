@@ -42,7 +42,13 @@ from ringbalance.reduced_model.calibration import calibrate, calibrated_model, c
 from ringbalance.reduced_model.chamber.tilted_ring import check_ring
 from ringbalance.reduced_model.injection.dynamics import gives_forces
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
-from ringbalance.reduced_model.law.flow_law import CALIBRATED, BalancerModel, completed_model, lacking
+from ringbalance.reduced_model.law.flow_law import (
+    CALIBRATED,
+    UNCHECKED,
+    BalancerModel,
+    completed_model,
+    lacking,
+)
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.terms import IN_INJECTIONS, NOT_MODELLED, ModelUsed
 from ringbalance.results.requirements import AT_LEAST
@@ -207,7 +213,7 @@ class LiquidRingBalancer(Balancer):
 
     @cached_property
     def _drawn_runs(self) -> DrawnRuns:
-        remade = self.flow_law is None or self.flow_law == CALIBRATED
+        remade = self.flow_law in (None, CALIBRATED, UNCHECKED)
         spread = Spread.of(self.scene, self.model, remade=remade)
         return DrawnRuns(
             scene=self.scene, model=self.model, spread=spread, limit=self.limit, rotors=self.rotors

@@ -1,75 +1,41 @@
 """What the liquid ring in one chamber does to its disc: volume, wall pressure, moment and force.
 
 Every number comes from finite elements on three meshes and carries the half-width that the grid
-convergence of exactly this number gives it, with what that cannot see: rounding, and liquid that gravity
-moves unmodelled.  With gravity across the shaft each number is the mean over a turn.
+convergence of exactly this number gives it, with the rounding that this cannot see.  With gravity across the
+shaft each number is the mean over a turn.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ringbalance.mesh.chamber import default_cells
+from ringbalance.mesh.chamber import chamber_mesh, default_cells
 from ringbalance.mesh.geometry import chamber_volume, half_angle, surface_radius
 from ringbalance.physics.convergence import GridConvergence, gci
-from ringbalance.physics.pressure.hydrostatics import displaced_by_gravity, hydrostatic_pressure
 from ringbalance.physics.pressure.loads import liquid_integrals
-from ringbalance.physics.pressure.solve import RotatingLiquid
-from ringbalance.physics.pressure.surface import refined_surface, solve_at_rest
+from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid, solve_pressure
+from ringbalance.physics.pressure.surface import refined_surface, solve_with_gravity
 from ringbalance.physics.results import Estimate, Statistics, Status
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc
 
-FORMAL_ORDER = 4.0
+QUANTITIES: Final = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume", "resultant_force")
+_FORMAL_ORDER: Final = 4.0
 """Of integrals on quadratic geometry: twice the order of the elements, and that of an arc's drawing."""
-
-_SHALLOWEST = 1e-10
+_SHALLOWEST: Final = 1e-10
 """Depth over outer radius at which coordinates still resolve the nodes of a film."""
-_AVERAGING = 1e-8
+_AVERAGING: Final = 1e-8
 """Left-over harmonics in the mean over a turn, relative; decides the number of samples."""
-_EPSILON = float(np.finfo(np.float64).eps)
-_CANCELLED = MappingProxyType({2: 20.0, 3: 1000.0})
+_EPSILON: Final = float(np.finfo(np.float64).eps)
+_CANCELLED: Final = MappingProxyType({2: 20.0, 3: 1000.0})
 """Rounding of a film's coordinates, by dimension, over eps R2/depth."""
-QUANTITIES = ("liquid_volume", "wall_pressure", "moment", "moment_per_volume", "resultant_force")
-"""In the order of `_Sample.values`."""
-_WIDTH = len(QUANTITIES)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Turn:
-    """Gravity as a chamber sees it over a turn."""
-
-    gravity: float
-    """m/s^2; zero: left out."""
-    shaft: Shaft
-    samples: int
-    """Even number of angles over a turn, for a horizontal shaft."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Sample:
-    """Means over a turn on one mesh."""
-
-    values: FloatArray
-    """In the order of `QUANTITIES`, SI totals, shape (5,)."""
-    ripple: FloatArray
-    """First harmonic of wall pressure (Pa) and moment (kg m), zero-to-peak, shape (2,)."""
-    surfaces: tuple[FloatArray, ...] = ()
-    """Found surfaces, one per angle, m; empty without gravity."""
-    status: Status
-    unknowns: int = 0
-    residual: float = 0.0
-    """Largest relative residual of the linear systems."""
-    flux_mismatch: float = 0.0
-    """Largest mismatch of flux and force on a found surface, relative."""
-    rounding: float = 0.0
-    """Largest rounding of a found surface's place, in mean depths."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,8 +47,6 @@ class RingQuantities:
 
     fill_ratio: FloatArray
     """x, shape (n,)."""
-    surface_radius: FloatArray
-    """Radius of the concentric free surface that holds the same volume, m, shape (n,)."""
     liquid_volume: Estimate
     """m^3, shape (n,)."""
     wall_pressure: Estimate
@@ -101,10 +65,9 @@ class RingQuantities:
     """Each quantity on every mesh, finest first, shape (meshes, n)."""
     cells: tuple[tuple[int, ...], ...]
     """Cells of the meshes, finest first."""
-    closed: BoolArray
-    """Whether gravity leaves a closed ring, shape (n,); where not, values are those without gravity."""
     solved: BoolArray
-    """Whether there are values at all, shape (n,); where not, zeros stand for them, which are no result."""
+    """Whether there are values, shape (n,): not where gravity leaves no closed ring, or where a solve failed;
+    zeros, no result, stand for them."""
     status: Status
     statistics: Statistics
 
@@ -132,9 +95,7 @@ def ring_quantities(
         dimension: 2 or 3; default 2, or 3 for a vertical shaft with gravity, which 2 cannot describe.
         cells: three meshes, finest first, each with half the cells of the one before; default `default_cells`
             and two coarser ones; they decide the dimension when given.
-    Returns: The totals. Where gravity leaves no closed ring, or its surface is not found, status says so,
-        `closed` is False and the values are those without gravity, their half-widths widened by all that
-        gravity could do to the liquid there.
+    Returns: The totals; status is that of the first fill that is not solved.
     Raises: ValueError: fill ratios outside [0, 1], or above 0 but too small for a mesh; density or speed
         that make no sense; two dimensions for gravity along the shaft; not three
         meshes.
@@ -142,31 +103,27 @@ def ring_quantities(
         doi:10.1115/1.2960953.
     """
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
-    _check(fills, density, angular_velocity, gravity)
-    _check_depth(disc, fills)
+    _check(disc, fills, density, angular_velocity, gravity)
     axial = gravity > 0 and shaft == "vertical"
     meshes = _meshes(disc, cells, dimension or (3 if axial else 2))
     if axial and len(meshes[0]) == 2:
         raise ValueError("gravity along the shaft needs dimension 3")
     liquid = RotatingLiquid(density=density, angular_velocity=angular_velocity)
-    turn = _Turn(gravity=gravity, shaft=shaft, samples=_turn_samples(disc, liquid, gravity))
-    case = _Case(disc=disc, liquid=liquid, fills=fills, meshes=meshes, turn=turn)
-    return _collect(case, [_on_meshes(case, float(x), turn) for x in fills])
+    angles = _angles(disc, liquid, gravity) if gravity and not axial else np.zeros(1)
+    turn = [replace(liquid, gravity=_pull(gravity, shaft, float(angle))) for angle in angles]
+    samples = [_on_meshes(disc, turn, angles, float(x), meshes) for x in fills]
+    return _collected(disc, liquid, fills, meshes, samples)
 
 
-def _check(fills: FloatArray, density: float, omega: float, gravity: float) -> None:
+def _check(disc: Disc, fills: FloatArray, density: float, omega: float, gravity: float) -> None:
     if fills.size == 0 or not np.all((fills >= 0) & (fills <= 1)):
         raise ValueError("fill_ratio must lie within [0, 1], and there must be at least one")
     if not (density > 0 and np.isfinite(density) and np.isfinite(omega) and omega != 0):
         raise ValueError("density must be positive and angular_velocity not zero, both finite")
     if not (gravity >= 0 and np.isfinite(gravity)):
         raise ValueError("gravity must be zero or positive")
-
-
-def _check_depth(disc: Disc, fills: FloatArray) -> None:
     depth = 1 - surface_radius(disc=disc, fill_ratio=fills) / disc.outer_radius
-    thin = fills[(fills > 0) & (depth < _SHALLOWEST)]
-    if thin.size:
+    if (thin := fills[(fills > 0) & (depth < _SHALLOWEST)]).size:
         raise ValueError(
             f"fill_ratio {thin[0]:.3g} leaves a ring shallower than {_SHALLOWEST:g} of the outer radius, "
             "which no mesh resolves; give zero instead"
@@ -183,259 +140,187 @@ def _meshes(
     return meshes
 
 
-def _turn_samples(disc: Disc, liquid: RotatingLiquid, gravity: float) -> int:
-    """Angles of gravity over a turn, an even number, enough for a mean within 1e-8."""
+def _angles(disc: Disc, liquid: RotatingLiquid, gravity: float) -> FloatArray:
+    """Angles of gravity over half a turn, both ends included; the other half is the mirror image.
+
+    Enough for a mean within 1e-8: the trapezoidal rule over a period is exact up to harmonics of the order of
+    the number of samples.
+    """
     tilt = gravity / (liquid.angular_velocity**2 * disc.inner_radius)
-    if tilt == 0:
-        return 2
     harmonics = np.log(_AVERAGING) / np.log(min(tilt, 0.3))
-    return 2 * max(2, int(np.ceil(harmonics / 2)))
+    return np.linspace(0, np.pi, max(2, int(np.ceil(harmonics / 2))) + 1)
 
 
-def _on_meshes(case: _Case, x: float, turn: _Turn) -> tuple[_Sample, ...]:
+def _pull(gravity: float, shaft: Shaft, angle: float) -> tuple[float, ...]:
+    if gravity == 0:
+        return ()
+    if shaft == "vertical":
+        return (0.0, 0.0, -gravity)
+    return (gravity * np.cos(angle), gravity * np.sin(angle))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Sample:
+    """Means over a turn on one mesh; zeros where a solve failed."""
+
+    values: FloatArray
+    """In the order of `QUANTITIES`, SI totals, shape (5,)."""
+    ripple: FloatArray = field(default_factory=lambda: np.zeros(2))
+    """First harmonic of wall pressure (Pa) and moment (kg m), zero-to-peak, shape (2,)."""
+    surfaces: tuple[FloatArray, ...] = ()
+    """Found surfaces, one per angle, m."""
+    status: Status = field(default_factory=Status)
+    statistics: Statistics = field(default_factory=Statistics)
+    rounding: float = 0.0
+    """Largest rounding of a found surface's place, in mean depths."""
+
+
+def _on_meshes(
+    disc: Disc,
+    turn: Sequence[RotatingLiquid],
+    angles: FloatArray,
+    x: float,
+    meshes: tuple[tuple[int, ...], ...],
+) -> tuple[_Sample, ...]:
     """Samples on every mesh, finest first, each starting from the surfaces of the coarser one."""
-    disc, liquid, meshes = case.disc, case.liquid, case.meshes
     if x == 0:
         half = float(half_angle(disc=disc, radius=disc.outer_radius))
-        drop = liquid.density * disc.outer_radius * np.sin(half) / half
-        return (_empty_sample(moment_per_volume=drop),) * len(meshes)
+        drop = turn[0].density * disc.outer_radius * np.sin(half) / half
+        return (_Sample(values=np.array([0.0, 0.0, 0.0, drop, 0.0])),) * len(meshes)
     found: list[_Sample] = []
-    for k, cells in reversed(list(enumerate(meshes))):
-        halves = found and all(n == 2 * m for n, m in zip(cells, meshes[k + 1], strict=True))
-        sample = _turn_mean(
-            disc=disc,
-            liquid=liquid,
-            fill_ratio=x,
-            cells=cells,
-            turn=turn,
-            coarser=found[-1] if halves else None,
-        )
-        found.append(sample)
+    for cells, coarser in zip(meshes[::-1], (None, *meshes[:0:-1]), strict=True):
+        halves = coarser is not None and all(n == 2 * m for n, m in zip(cells, coarser, strict=True))
+        found.append(_turn_mean(disc, turn, angles, x, cells, found[-1].surfaces if halves else ()))
     return tuple(reversed(found))
 
 
-def _collect(case: _Case, samples: Sequence[tuple[_Sample, ...]]) -> RingQuantities:
+def _turn_mean(
+    disc: Disc,
+    turn: Sequence[RotatingLiquid],
+    angles: FloatArray,
+    x: float,
+    cells: tuple[int, ...],
+    starts: Sequence[FloatArray],
+) -> _Sample:
+    """Solve on one mesh at every angle of gravity over half a turn and take the mean over the whole turn.
+
+    Args: `starts`: surfaces on half the cells, one per angle, or none.
+    """
+    solutions = []
+    for k, liquid in enumerate(turn):
+        start = refined_surface(starts[k]) if starts else None
+        solution = _solved(disc, liquid, x, cells, start)
+        if not solution.status.ok:
+            return _Sample(values=np.zeros(len(QUANTITIES)), status=solution.status)
+        solutions.append(solution)
+    rows = np.array(
+        [
+            liquid_integrals(solution=s, density=turn[0].density, axial_width=disc.axial_width).mirrored_alike
+            for s in solutions
+        ]
+    )
+    weights = np.full(angles.size, 1.0 / max(angles.size - 1, 1))
+    if angles.size > 1:
+        weights[[0, -1]] /= 2
+    extra = [s.statistics.extra for s in solutions]
+    return _Sample(
+        values=weights @ rows,
+        ripple=np.abs(2 * (weights * np.cos(angles)) @ rows[:, 1:3]) if angles.size > 1 else np.zeros(2),
+        surfaces=tuple(s.chamber.surface_radius for s in solutions) if turn[0].gravity else (),
+        statistics=Statistics(
+            unknowns=solutions[0].statistics.unknowns,
+            relative_residual=max(s.statistics.relative_residual for s in solutions),
+            extra={"surface_flux_mismatch": max(e.get("surface_flux_mismatch", 0.0) for e in extra)},
+        ),
+        rounding=max(e.get("surface_rounding", 0.0) for e in extra),
+    )
+
+
+def _solved(
+    disc: Disc, liquid: RotatingLiquid, x: float, cells: tuple[int, ...], start: FloatArray | None
+) -> PressureSolution:
+    """Below a free surface that is concentric, or found where there is gravity."""
+    if liquid.gravity:
+        return solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=x, cells=cells, start=start)
+    radius = surface_radius(disc=disc, fill_ratio=x)
+    chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
+    return solve_pressure(chamber=chamber, problem=liquid.problem())
+
+
+def _collected(
+    disc: Disc,
+    liquid: RotatingLiquid,
+    fills: FloatArray,
+    meshes: tuple[tuple[int, ...], ...],
+    samples: Sequence[tuple[_Sample, ...]],
+) -> RingQuantities:
+    values = np.array([[sample.values for sample in levels] for levels in samples])
+    sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in meshes]
     failed = [next((s.status for s in levels if not s.status.ok), Status()) for levels in samples]
-    still = _Turn(gravity=0.0, shaft="horizontal", samples=2)
-    kept = [
-        levels if status.ok else _on_meshes(case, float(x), still)
-        for levels, status, x in zip(samples, failed, case.fills, strict=True)
-    ]
-    missing = [next((s.status for s in levels if not s.status.ok), Status()) for levels in kept]
-    values = np.array([[sample.values for sample in levels] for levels in kept])
-    records = _judge(case, kept, values)
-    closed = np.array([status.ok for status in failed])
-    widths = np.array([[record.uncertainty for record in row] for row in records])
-    widths = case.stated_widths(samples=kept, widths=widths, closed=closed)
-    status = _status(case, failed) if all(s.ok for s in missing) else _status(case, missing, solved=False)
+    records, widths = [], np.zeros((fills.size, len(QUANTITIES)))
+    for k, x in enumerate(fills):
+        natural = _natural_sizes(disc, liquid, float(x))
+        noise = natural * _rounding(disc, meshes[0], float(x), max(s.rounding for s in samples[k]))
+        records.append(
+            [
+                gci(values=v, sizes=sizes, formal_order=_FORMAL_ORDER, round_off=float(n))
+                for v, n in zip(values[k].T, noise, strict=True)
+            ]
+        )
+        widths[k] = [record.uncertainty for record in records[k]] if failed[k].ok else natural
+    widths[fills == 0] = 0.0
+    status = _status(fills, failed)
     estimates = {
         name: Estimate(value=values[:, 0, k].copy(), uncertainty=widths[:, k].copy(), status=status)
         for k, name in enumerate(QUANTITIES)
     }
+    finest, ripple = [levels[0].statistics for levels in samples], np.array([s[0].ripple for s in samples])
+    mismatch = max(each.extra.get("surface_flux_mismatch", 0.0) for each in finest)
     return RingQuantities(
-        fill_ratio=case.fills,
-        surface_radius=surface_radius(disc=case.disc, fill_ratio=case.fills),
+        fill_ratio=fills,
         **estimates,
-        ripple=_ripple(kept),
+        ripple={"wall_pressure": ripple[:, 0], "moment": ripple[:, 1]},
         convergence={name: tuple(row[k] for row in records) for k, name in enumerate(QUANTITIES)},
         mesh_values={name: values[:, :, k].T.copy() for k, name in enumerate(QUANTITIES)},
-        cells=case.meshes,
-        closed=closed,
-        solved=np.array([status.ok for status in missing]),
+        cells=meshes,
+        solved=np.array([each.ok for each in failed]),
         status=status,
-        statistics=_statistics(kept),
+        statistics=Statistics(
+            unknowns=max(each.unknowns for each in finest),
+            relative_residual=max(s.statistics.relative_residual for levels in samples for s in levels),
+            extra={"surface_flux_mismatch": mismatch},
+        ),
     )
 
 
-def _ripple(samples: Sequence[tuple[_Sample, ...]]) -> dict[str, FloatArray]:
-    ripple = np.array([levels[0].ripple for levels in samples])
-    return {"wall_pressure": ripple[:, 0], "moment": ripple[:, 1]}
-
-
-def _statistics(samples: Sequence[tuple[_Sample, ...]]) -> Statistics:
-    finest = [levels[0] for levels in samples]
-    return Statistics(
-        unknowns=max(sample.unknowns for sample in finest),
-        relative_residual=max(sample.residual for levels in samples for sample in levels),
-        extra={"surface_flux_mismatch": max(sample.flux_mismatch for sample in finest)},
-    )
-
-
-def _judge(
-    case: _Case, samples: Sequence[tuple[_Sample, ...]], values: FloatArray
-) -> list[list[GridConvergence]]:
-    sizes = [float(np.prod(cells)) ** (-1 / len(cells)) for cells in case.meshes]
-    rows = []
-    for x, levels, found in zip(case.fills, samples, values, strict=True):
-        noise = case.rounding_bound(fill_ratio=float(x), samples=levels)
-        row = zip(found.T, noise, strict=True)
-        rows.append(
-            [gci(values=v, sizes=sizes, formal_order=FORMAL_ORDER, round_off=float(n)) for v, n in row]
-        )
-    return rows
-
-
-def _status(case: _Case, failed: Sequence[Status], *, solved: bool = True) -> Status:
-    for x, status in zip(case.fills, failed, strict=True):
+def _status(fills: FloatArray, failed: Sequence[Status]) -> Status:
+    for x, status in zip(fills, failed, strict=True):
         if not status.ok:
-            said = "; values there are without gravity" if case.turn.gravity and solved else ""
-            return Status(code=status.code, text=f"at a fill ratio of {x:.4g}: {status.text}{said}")
+            return Status(code=status.code, text=f"at a fill ratio of {x:.4g}: {status.text}")
     return Status()
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Case:
-    """What ring quantities are asked for."""
+def _rounding(disc: Disc, cells: tuple[int, ...], x: float, moved: float) -> float:
+    """Bound of the rounding of every total over its natural size; zero for an empty chamber, which is exact.
 
-    disc: Disc
-    liquid: RotatingLiquid
-    """Without gravity, which `turn` holds."""
-    fills: FloatArray
-    """Fill ratios, shape (n,)."""
-    meshes: tuple[tuple[int, ...], ...]
-    """Cells, finest first."""
-    turn: _Turn
-
-    def rounding_bound(self, *, fill_ratio: float, samples: Sequence[_Sample]) -> FloatArray:
-        """Bound of the rounding in every column of `_Sample.values` on the finest mesh.
-
-        eps [c R2/depth + 0.2 max(nodes along the depth, depth over the nodes' distance along the arc)^2],
-        plus the rounding of a found surface, times the natural size of the column.
-        Returns: Bound in the unit of each column, shape (5,); zero for an empty chamber, which is exact.
-        Source: coordinates of a film cancel (c = 20, in three dimensions 1000: a hexahedron's polynomials
-            have large coefficients), and narrow cells make the matrix stiff; the factors are five to ten
-            times what was seen against closed forms between 1 and 180 degrees and depths down to 10 nm.
-        """
-        if fill_ratio == 0:
-            return np.zeros(_WIDTH)
-        disc, cells = self.disc, self.meshes[0]
-        a = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
-        depth, arc = disc.outer_radius - a, 2 * a * float(half_angle(disc=disc, radius=a))
-        stiffness = max(2 * cells[0], 2 * cells[1] * depth / arc) ** 2
-        moved = max(sample.rounding for sample in samples)
-        cancelled = _CANCELLED[len(cells)] * disc.outer_radius / depth
-        relative = _EPSILON * (cancelled + 0.2 * stiffness) + moved
-        return relative * _natural_size(case=self, fill_ratio=fill_ratio)
-
-    def stated_widths(
-        self, *, samples: Sequence[tuple[_Sample, ...]], widths: FloatArray, closed: BoolArray
-    ) -> FloatArray:
-        """Half-widths of grid convergence, corrected where it does not cover the whole.
-
-        Args: `samples`: that the values come from, by fill ratio and mesh. `widths`: of grid convergence,
-            shape (n, 5). `closed`: whether gravity leaves a closed ring, shape (n,).
-        Returns: Half-widths, shape (n, 5): zero for an empty chamber but for where its first drop goes; wider
-            by all that gravity could do where it breaks the ring; the natural size where a solve failed.
-        """
-        stated = widths.copy()
-        for k, x in enumerate(self.fills):
-            displaced = _displaced(self, float(x))
-            if x == 0:
-                first_drop = QUANTITIES.index("moment_per_volume")
-                stated[k] = 0.0
-                stated[k, first_drop] = displaced[first_drop]
-            elif not all(sample.status.ok for sample in samples[k]):
-                stated[k] = _natural_size(case=self, fill_ratio=float(x))
-            elif not closed[k]:
-                stated[k] += displaced
-        return stated
-
-
-def _natural_size(*, case: _Case, fill_ratio: float) -> FloatArray:
-    """Size that every column of `_Sample.values` would have without symmetry, shape (5,)."""
-    disc, density = case.disc, case.liquid.density
-    a, outer = float(surface_radius(disc=disc, fill_ratio=fill_ratio)), disc.outer_radius
-    volume = fill_ratio * chamber_volume(disc=disc)
-    pressure = hydrostatic_pressure(
-        density=density, angular_velocity=case.liquid.angular_velocity, inner=a, outer=outer
-    )
-    moment = density * volume * outer
-    return _columns(disc, volume=volume, pressure=pressure, moment=moment, moment_per_volume=density * outer)
-
-
-def _displaced(case: _Case, x: float) -> FloatArray:
-    if case.turn.gravity == 0:
-        return np.zeros(_WIDTH)
-    pressure, moment, moment_per_volume = displaced_by_gravity(
-        disc=case.disc, density=case.liquid.density, gravity=case.turn.gravity, fill_ratio=np.array([x])
-    )[:, 0].tolist()
-    return _columns(
-        case.disc, volume=0.0, pressure=pressure, moment=moment, moment_per_volume=moment_per_volume
-    )
-
-
-def _columns(
-    disc: Disc, *, volume: float, pressure: float, moment: float, moment_per_volume: float
-) -> FloatArray:
-    """These in their columns, and as force the pressure on the largest wall."""
-    force = pressure * disc.central_angle * disc.outer_radius * (disc.axial_width + disc.outer_radius)
-    return np.array([volume, pressure, moment, moment_per_volume, force])
-
-
-def _turn_mean(
-    *,
-    disc: Disc,
-    liquid: RotatingLiquid,
-    fill_ratio: float,
-    cells: tuple[int, ...],
-    turn: _Turn,
-    coarser: _Sample | None = None,
-) -> _Sample:
-    """Solve on one mesh at every angle of gravity over half a turn and take the mean over the whole turn.
-
-    The other half of the turn is the mirror image of the first.
-    Args: `liquid`: without gravity. `coarser`: sample on half the cells, whose surfaces are a good start.
-    Source: trapezoidal rule over a period, exact up to harmonics of the order of the number of samples.
+    eps [c R2/depth + 0.2 max(nodes along the depth, depth over the nodes' distance along the arc)^2], plus
+    the rounding of a found surface's place, in mean depths.
+    Source: coordinates of a film cancel (c = 20, in three dimensions 1000: a hexahedron's polynomials have
+        large coefficients), and narrow cells make the matrix stiff; the factors are five to ten times what
+        was seen against closed forms between 1 and 180 degrees and depths down to 10 nm.
     """
-    angles, weights = _angles(turn)
-    solutions = []
-    for k, angle in enumerate(angles):
-        start = refined_surface(coarser.surfaces[k]) if coarser and coarser.surfaces else None
-        frozen = replace(liquid, gravity=_gravity(turn, float(angle)))
-        solution = solve_at_rest(disc=disc, liquid=frozen, fill_ratio=fill_ratio, cells=cells, start=start)
-        if not solution.status.ok:
-            return _failed(solution.status)
-        solutions.append(solution)
-    totals = (
-        liquid_integrals(solution=s, density=liquid.density, axial_width=disc.axial_width) for s in solutions
-    )
-    rows = np.array([total.mirrored_alike for total in totals])
-    ripple = 2 * (weights * np.cos(angles)) @ rows[:, 1:3] if len(angles) > 1 else np.zeros(2)
-    return _Sample(
-        values=weights @ rows,
-        ripple=np.abs(ripple),
-        surfaces=tuple(s.chamber.surface_radius for s in solutions) if turn.gravity else (),
-        status=Status(),
-        unknowns=solutions[0].statistics.unknowns,
-        residual=max(s.statistics.relative_residual for s in solutions),
-        flux_mismatch=max(s.statistics.extra.get("surface_flux_mismatch", 0.0) for s in solutions),
-        rounding=max(s.statistics.extra.get("surface_rounding", 0.0) for s in solutions),
-    )
+    if x == 0:
+        return 0.0
+    a = float(surface_radius(disc=disc, fill_ratio=x))
+    depth, arc = disc.outer_radius - a, 2 * a * float(half_angle(disc=disc, radius=a))
+    stiffness = max(2 * cells[0], 2 * cells[1] * depth / arc) ** 2
+    return _EPSILON * (_CANCELLED[len(cells)] * disc.outer_radius / depth + 0.2 * stiffness) + moved
 
 
-def _empty_sample(*, moment_per_volume: float) -> _Sample:
-    """A chamber without liquid: all zero but the moment that the first drop would bring, kg/m^2."""
-    values = np.zeros(_WIDTH)
-    values[QUANTITIES.index("moment_per_volume")] = moment_per_volume
-    return replace(_failed(Status()), values=values)
-
-
-def _angles(turn: _Turn) -> tuple[FloatArray, FloatArray]:
-    if turn.gravity == 0 or turn.shaft == "vertical":
-        return np.zeros(1), np.ones(1)
-    half = turn.samples // 2
-    weights = np.full(half + 1, 2.0 / turn.samples)
-    weights[[0, -1]] /= 2
-    return np.linspace(0, np.pi, half + 1), weights
-
-
-def _gravity(turn: _Turn, angle: float) -> tuple[float, ...]:
-    if turn.gravity == 0:
-        return ()
-    if turn.shaft == "vertical":
-        return (0.0, 0.0, -turn.gravity)
-    return (turn.gravity * np.cos(angle), turn.gravity * np.sin(angle))
-
-
-def _failed(status: Status) -> _Sample:
-    return _Sample(values=np.zeros(_WIDTH), ripple=np.zeros(2), status=status)
+def _natural_sizes(disc: Disc, liquid: RotatingLiquid, x: float) -> FloatArray:
+    """Sizes that the totals would have without symmetry; the force is the pressure on the largest wall."""
+    outer, volume = disc.outer_radius, x * chamber_volume(disc=disc)
+    a = float(surface_radius(disc=disc, fill_ratio=x))
+    pressure = liquid.density * liquid.angular_velocity**2 * (outer - a) * (outer + a) / 2
+    force = pressure * disc.central_angle * outer * (disc.axial_width + outer)
+    return np.array([volume, pressure, liquid.density * volume * outer, liquid.density * outer, force])

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ringbalance.mesh.chamber import FREE_SURFACE, ChamberMesh, chamber_mesh
-from ringbalance.mesh.geometry import half_angle, liquid_area, surface_radius
+from ringbalance.mesh.geometry import liquid_area, surface_radius
 from ringbalance.physics.pressure.solve import (
     PressureSolution,
     RotatingLiquid,
@@ -46,32 +46,9 @@ class _FoundSurface:
     chamber: ChamberMesh
     basis: Any
     status: Status
-    steps: int
-    last_move: float
-    """Largest move of a node in the last step, in mean depths."""
-    rounding: float
-    """Of the surface's place, in mean depths; zero when the search ended on its tolerance."""
-    volume_error: float
-    """Relative."""
-
-
-def solve_at_rest(
-    *,
-    disc: Disc,
-    liquid: RotatingLiquid,
-    fill_ratio: float,
-    cells: tuple[int, ...],
-    start: FloatArray | None = None,
-) -> PressureSolution:
-    """Pressure of the liquid below its free surface: concentric, or found where there is gravity.
-
-    Args: as `solve_with_gravity`.
-    """
-    if liquid.gravity:
-        return solve_with_gravity(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=cells, start=start)
-    radius = surface_radius(disc=disc, fill_ratio=fill_ratio)
-    chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
-    return solve_pressure(chamber=chamber, problem=liquid.problem())
+    statistics: Statistics
+    """Steps as iterations; of the last one the largest move of a node ("surface_last_move") and what of it is
+    rounding ("surface_rounding"), both in mean depths; "volume_error", relative."""
 
 
 def solve_with_gravity(
@@ -99,29 +76,19 @@ def solve_with_gravity(
     """
     found = find_surface(disc=disc, liquid=liquid, fill_ratio=fill_ratio, cells=cells, start=start)
     if not found.status.ok:
-        return _unsolved(found)
+        return PressureSolution(
+            chamber=found.chamber,
+            basis=found.basis,
+            pressure=np.zeros(found.chamber.grid.size),
+            surface_gradient=np.zeros(found.chamber.grid[0].shape),
+            status=found.status,
+            statistics=found.statistics,
+        )
     solution = solve_pressure(chamber=found.chamber, problem=liquid.problem(), basis=found.basis)
-    extra = {
-        **solution.statistics.extra,
-        "surface_flux_mismatch": surface_flux_mismatch(solution=solution, liquid=liquid),
-        "surface_last_move": found.last_move,
-        "surface_rounding": found.rounding,
-        "volume_error": found.volume_error,
-    }
-    statistics = replace(solution.statistics, iterations=found.steps, extra=extra)
-    return replace(solution, statistics=statistics)
-
-
-def _unsolved(found: _FoundSurface) -> PressureSolution:
-    chamber = found.chamber
-    return PressureSolution(
-        chamber=chamber,
-        basis=found.basis,
-        pressure=np.zeros(chamber.grid.size),
-        surface_gradient=np.zeros(chamber.grid[0].shape),
-        status=found.status,
-        statistics=Statistics(unknowns=0, iterations=found.steps),
-    )
+    mismatch = {"surface_flux_mismatch": surface_flux_mismatch(solution=solution, liquid=liquid)}
+    extra = {**solution.statistics.extra, **found.statistics.extra, **mismatch}
+    steps = found.statistics.iterations
+    return replace(solution, statistics=replace(solution.statistics, iterations=steps, extra=extra))
 
 
 def find_surface(
@@ -136,56 +103,36 @@ def find_surface(
 
     Each step solves laplace(p) = f with n.grad p given on the whole boundary, then moves every surface node
     by (c - p) / (dp/dr), with the level c that keeps the volume.
-    Args: `liquid`: with gravity in the chamber's axes. `fill_ratio`: x, above 0 and at most 1. `cells`: along
-        the radius, the angle and, for a three-dimensional mesh, the axis. `start`: radii to start from, m, at
-        the surface nodes; default concentric.
+    Args: as `solve_with_gravity`.
     Raises: ValueError: a fill ratio outside (0, 1].
     Source: Newton's method on the position of an isobar; the slope is that of the hydrostatic force.
     """
     if not 0 < fill_ratio <= 1:
         raise ValueError("fill_ratio must lie within (0, 1] to search a surface")
     concentric = float(surface_radius(disc=disc, fill_ratio=fill_ratio))
-    no_ring = _no_ring(disc, liquid, concentric)
-    if no_ring is None:
-        return _search(disc, liquid, fill_ratio, cells, concentric if start is None else start)
-    chamber = chamber_mesh(disc=disc, surface_radius=concentric, cells=cells)
-    basis = quadratic_basis(chamber.mesh)
-    return _FoundSurface(
-        chamber=chamber, basis=basis, status=no_ring, steps=0, last_move=0.0, rounding=0.0, volume_error=0.0
-    )
-
-
-def _search(
-    disc: Disc,
-    liquid: RotatingLiquid,
-    fill_ratio: float,
-    cells: tuple[int, ...],
-    start: FloatArray | float,
-) -> _FoundSurface:
-    target = _target(disc, fill_ratio, len(cells))
-    first = chamber = chamber_mesh(disc=disc, surface_radius=start, cells=cells)
+    status, radius = _no_ring(liquid, concentric), concentric if start is None else start
+    first = chamber = chamber_mesh(disc=disc, surface_radius=radius if status.ok else concentric, cells=cells)
     unmoved = basis = quadratic_basis(chamber.mesh)
     depth = disc.outer_radius - float(np.mean(first.surface_radius))
-    move, before, steps, status = np.inf, np.inf, 0, Status()
+    target = _target(disc, fill_ratio, len(cells))
+    move, before, steps = np.inf, np.inf, 0
     while steps < _MAX_STEPS and status.ok and not _settled(move, before):
         wanted = _wanted_move(chamber, basis, liquid, target)
         radius = chamber.surface_radius + wanted * _damping(disc, chamber.surface_radius, wanted)
         chamber = chamber_mesh(disc=disc, surface_radius=radius, cells=cells)
         basis = quadratic_basis(chamber.mesh)
         move, before, steps = float(np.abs(wanted).max()) / depth, move, steps + 1
-        status = _near_walls(disc, radius, depth)
+        status = _near_walls(disc, chamber.surface_radius, depth)
     if status.ok:
         status = _end_of_search(disc, chamber.surface_radius, move, _settled(move, before))
     chamber, basis = _hold_volume(disc, chamber, basis, target) if status.ok else (first, unmoved)
-    return _FoundSurface(
-        chamber=chamber,
-        basis=basis,
-        status=status,
-        steps=steps,
-        last_move=move,
-        rounding=move if move > _STEP_TOLERANCE else 0.0,
-        volume_error=float(basis.dx.sum()) / target - 1 if status.ok else 0.0,
-    )
+    extra = {
+        "surface_last_move": move,
+        "surface_rounding": move if move > _STEP_TOLERANCE else 0.0,
+        "volume_error": float(basis.dx.sum()) / target - 1,
+    }
+    statistics = Statistics(iterations=steps, extra=extra if status.ok else {})
+    return _FoundSurface(chamber=chamber, basis=basis, status=status, statistics=statistics)
 
 
 def _settled(move: float, before: float) -> bool:
@@ -217,27 +164,17 @@ def _target(disc: Disc, fill_ratio: float, dimension: int) -> float:
     return area if dimension == 2 else area * disc.axial_width / disc.outer_radius
 
 
-def _no_ring(disc: Disc, liquid: RotatingLiquid, radius: float) -> Status | None:
+def _no_ring(liquid: RotatingLiquid, radius: float) -> Status:
     """Why there is no ring, where that is known without a search."""
     across = float(np.linalg.norm(liquid.gravity[:2]))
     lowest = float(np.sqrt(across / radius))
-    if abs(liquid.angular_velocity) > lowest:
-        return _DRY if _far_too_thin(disc, liquid, radius) else None
-    return Status(
-        code=StatusCode.NO_RING,
-        text=f"gravity across the shaft exceeds the centrifugal force at {1e3 * radius:.4g} mm: "
-        f"no ring forms; turn faster than {lowest:.4g} rad/s ({lowest * 30 / np.pi:.4g} rpm)",
-    )
-
-
-def _far_too_thin(disc: Disc, liquid: RotatingLiquid, radius: float) -> bool:
-    """Whether gravity would tilt the surface by a hundred times the depth over the outer wall."""
-    half = float(half_angle(disc=disc, radius=disc.outer_radius))
-    angle = np.linspace(-half, half, 33)
-    pull = np.pad(np.asarray(liquid.gravity, dtype=np.float64), (0, 3 - len(liquid.gravity)))
-    across = disc.outer_radius * (pull[0] * np.cos(angle) + pull[1] * np.sin(angle))
-    fall = float(np.ptp(across)) + abs(float(pull[2])) * disc.axial_width
-    return fall > 100 * liquid.angular_velocity**2 * radius * (disc.outer_radius - radius)
+    if abs(liquid.angular_velocity) <= lowest:
+        return Status(
+            code=StatusCode.NO_RING,
+            text=f"gravity across the shaft exceeds the centrifugal force at {1e3 * radius:.4g} mm: "
+            f"no ring forms; turn faster than {lowest:.4g} rad/s ({lowest * 30 / np.pi:.4g} rpm)",
+        )
+    return Status()
 
 
 def _wanted_move(chamber: ChamberMesh, basis: Any, liquid: RotatingLiquid, target: float) -> FloatArray:

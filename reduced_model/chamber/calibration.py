@@ -110,8 +110,8 @@ class ChamberCalibration:
     """Nodes, equally spaced from zero to max_fill_ratio, and behind them those reported that are no nodes."""
     ring: RingValues
     """Closed forms at `fill_ratio`."""
-    check: ElementCheck
-    """Finite elements at a few of them."""
+    elements: ElementCheck | None
+    """Finite elements at a few of them; None: left out."""
     reported_fill_ratio: FloatArray
     """0, 0.05, ... max_fill_ratio."""
     reported: tuple[int, ...]
@@ -134,6 +134,13 @@ class ChamberCalibration:
     """Of the solves or, where these are sound, of the ring's waves over the range of fills."""
     statistics: Statistics
 
+    @property
+    def check(self) -> ElementCheck:
+        """`elements`. Raises: ValueError: they were left out."""
+        if self.elements is None:
+            raise ValueError("this chamber was not checked by finite elements")
+        return self.elements
+
 
 def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
     """Fill ratios of the tables and of the report.
@@ -149,11 +156,12 @@ def fill_nodes(*, largest: float) -> tuple[FloatArray, FloatArray]:
     return nodes, reported
 
 
-def calibrate_chamber(scene: Scene) -> ChamberCalibration:
+def calibrate_chamber(scene: Scene, *, checked: bool = True) -> ChamberCalibration:
     """Evaluate the closed forms over the fill range and check them by finite elements at a few fills.
 
     The values hold gravity's mean over a turn; finite elements hold it where it exceeds the scene's tolerance
     at some fill, for it takes them ten times as long. A ring must exist.
+    Args: `checked`: whether finite elements check them, which takes most of the time.
     Raises: SceneError: as `scene_ring`.
     Source: Eqs. 2 to 12 of the liquid-ring paper with exact plates; moments and lambda times the scene's
         measured factor.
@@ -163,20 +171,26 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     ring = RingValues.of(scene, fill_ratio=fills, gravity=scene.environment.gravity > 0)
     held = gravity_shares(scene).mean > scene.tolerance
     compared = ring if held else RingValues.of(scene, fill_ratio=fills, gravity=False)
-    check = ElementCheck.of(scene, values=compared, gravity=held)
+    check = ElementCheck.of(scene, values=compared, gravity=held) if checked else None
     unmodelled = unmodelled_fractions(scene, fills)
     effects = _input_effects(scene, fills)
     ring = _as_measured(scene, ring)
     waves = chamber_status(scene)
+
+    def excess_of(quantity: str) -> float:
+        return check.excess_of(quantity) if check else 0.0
+
+    def status_of(quantity: str) -> Status:
+        return check.status_of(quantity) if check else Status()
 
     def curve(quantity: str, share: str) -> Curve:
         value: Estimate = getattr(ring, quantity)
         return _curve(
             scene,
             nodes,
-            replace(value, status=_first(ring.status, check.status_of(quantity), waves)),
+            replace(value, status=_first(ring.status, status_of(quantity), waves)),
             quantity,
-            excess=check.excess_of(quantity),
+            excess=excess_of(quantity),
             unmodelled=unmodelled[share],
             inputs=[getattr(each, quantity) for each in effects.values()],
         )
@@ -184,10 +198,8 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
     central, numerical = _central(
         scene,
         nodes,
-        replace(
-            ring.moment_per_volume, status=_first(ring.status, check.status_of("moment_per_volume"), waves)
-        ),
-        check.excess_of("moment_per_volume"),
+        replace(ring.moment_per_volume, status=_first(ring.status, status_of("moment_per_volume"), waves)),
+        excess_of("moment_per_volume"),
         unmodelled["moments"],
         ring.moment.value,
     )
@@ -195,7 +207,7 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         volume=chamber_volume(disc=scene.disc),
         fill_ratio=fills,
         ring=ring,
-        check=check,
+        elements=check,
         reported_fill_ratio=reported,
         reported=tuple(int(np.argmin(np.abs(fills - x))) for x in reported),
         wall_pressure=curve("wall_pressure", "pressures"),
@@ -205,8 +217,8 @@ def calibrate_chamber(scene: Scene) -> ChamberCalibration:
         moment_per_mass_numerical=numerical,
         moment_per_mass_inputs=math.hypot(*(e.moment_per_mass for e in effects.values())),
         input_effects=effects,
-        status=_first(ring.status, check.status, waves),
-        statistics=check.elements.statistics,
+        status=_first(ring.status, check.status if check else Status(), waves),
+        statistics=check.elements.statistics if check else Statistics(),
     )
 
 

@@ -124,7 +124,7 @@ def _compared(
         difference[name] = closed_form.value - solved.value
         allowed[name] = closed_form.uncertainty + solved.uncertainty
         beyond = (np.abs(difference[name]) - allowed[name]) / np.abs(closed_form.value)
-        excesses[name] = max(0.0, float(np.max(beyond)))
+        excesses[name] = max(0.0, float(np.max(beyond))) if elements.status.ok else 0.0
     return ElementCheck(
         elements=elements,
         gravity=gravity,
@@ -176,7 +176,7 @@ def scene_ring(
     gravity: bool,
     cells: Sequence[tuple[int, ...]] | None = None,
 ) -> RingQuantities:
-    """Totals of one chamber's liquid, every one of them computed.
+    """Totals of one chamber's liquid, without gravity every one of them computed.
 
     Args: `gravity`: whether gravity is modelled. `cells`: meshes, finest first; default as in
         `ring_quantities`.
@@ -192,7 +192,7 @@ def scene_ring(
         shaft=scene.environment.shaft,
         cells=cells,
     )
-    if np.all(ring.solved):
+    if gravity or np.all(ring.solved):
         return ring
     fault = scene_fault(
         scene,

@@ -19,7 +19,6 @@ from ringbalance.mesh.geometry import (
     surface_radius,
     wall_square,
 )
-from ringbalance.physics.pressure.hydrostatics import displaced_by_gravity
 from ringbalance.physics.results import Estimate, Status, StatusCode
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.chamber.tilted_ring import TiltedRing, turn_samples
@@ -159,13 +158,24 @@ def _under_gravity(
     closed[wet] &= ring.closed
     tilt = gravity / (scene.rotor.speed**2 * scene.disc.inner_radius)
     quadrature = (_QUADRATURE + min(tilt, 1.0) ** turn_samples(scene)) * np.abs(plain)
-    displaced = displaced_by_gravity(
-        disc=scene.disc, density=scene.liquid.density, gravity=gravity, fill_ratio=fills
-    )
-    displaced = np.append(displaced, displaced[:1], axis=0)
-    displaced[np.ix_(np.array([0, 1, 3]), ~wet)] = 0.0
+    displaced = _displaced_by_gravity(scene, fills)
     certain = closed & wet
     return np.where(closed, found, plain), closed, np.where(certain, quadrature, displaced)
+
+
+def _displaced_by_gravity(scene: Scene, fills: FloatArray) -> FloatArray:
+    """Bound of what gravity could do to a chamber's liquid: take it from the middle to a corner, or back.
+
+    Returns: Of the rows of `_under_gravity`, shape (4, n); of an empty chamber of dU/dV' alone.
+    """
+    disc, density = scene.disc, scene.liquid.density
+    a = surface_radius(disc=disc, fill_ratio=fills)
+    # An imported chamber may have corners beyond the half-angle that is as large as its surface.
+    corner = half_angle(disc=disc, radius=a) if disc.geometry is None else disc.central_angle / 2
+    reach = disc.outer_radius - a * np.cos(corner)
+    pressure = np.where(fills > 0, 2 * density * scene.environment.gravity * disc.outer_radius, 0.0)
+    moment = density * fills * chamber_volume(disc=disc) * reach
+    return np.array([pressure, moment, density * reach, pressure])
 
 
 def _status(scene: Scene, fills: FloatArray, closed: BoolArray) -> Status:

@@ -3,6 +3,6 @@
 `dynamics` is what moves it (a law's column, gas line, valve, lift to the crest), as a record for compiled
 code; `pair` a pair's state, the way in from Python, and one injection by what it shall move.
 Compiled: `column` forces, conditions and gas, `lift` the way up to the crest, `step` one step in time,
-`gas_at_rest` a longer one while the liquid rests, `events` what ends it, `march` all of it through what the
+or a longer one while the liquid rests, `events` what ends it, `march` all of it through what the
 valves do.
 """

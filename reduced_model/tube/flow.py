@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
 from ringbalance.physics.gas import pressure_factor, vented_pressure
-from ringbalance.physics.pressure.hydrostatics import Radius, hydrostatic_pressure
 from ringbalance.physics.tube.loss import corrected_state
 from ringbalance.reduced_model.chamber.values import chamber_pressure
 from ringbalance.reduced_model.tube.heads import crest_head
@@ -28,6 +28,7 @@ from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR
 from ringbalance.scene.models import Scene
 from ringbalance.scene.uncertain import NORMAL_95, fitted_causes
 
+Radius = TypeVar("Radius", float, FloatArray)
 _LEAST, _MOST = np.log(1e-9), np.log(1e6)
 """ln u between which velocities are looked for, u in m/s."""
 _NODES: Final = np.linspace(-8.0, 0.2, 22)
@@ -67,17 +68,19 @@ def tube_path(scene: Scene) -> TubePath:
 
 
 def column_pressure(*, scene: Scene, radius: Radius) -> Radius:
-    """Pressure of a liquid column from a radius to the outer radius R2.
+    """Pressure of a liquid column from a radius r to the outer radius, rho omega^2 (R2^2 - r^2)/2, Pa.
 
-    Returns: Pa, the shape of `radius`.
     Source: Eq. 11 of the liquid-ring paper, integrated.
     """
-    return hydrostatic_pressure(
-        density=scene.liquid.density,
-        angular_velocity=scene.rotor.speed,
-        inner=radius,
-        outer=scene.disc.outer_radius,
-    )
+    outer = scene.disc.outer_radius
+    # The factors keep full relative accuracy for a film of a micrometre, where R2^2 - r^2 cancels.
+    return scene.liquid.density * scene.rotor.speed**2 * ((outer - radius) * (outer + radius)) / 2
+
+
+def column_radius(*, scene: Scene, pressure: float) -> float:
+    """Inner radius of the column that a pressure at the outer radius supports, m; zero beyond the axis."""
+    pull = scene.liquid.density * scene.rotor.speed**2 / 2
+    return math.sqrt(max(scene.disc.outer_radius**2 - pressure / pull, 0.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -19,7 +19,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final, ParamSpec, TypeVar, cast
@@ -30,6 +30,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import overload, register_jitable
 
 from ringbalance.scene.platform.both_ways import both_ways, called_both_ways, chosen
+from ringbalance.scene.platform.display import announced
 from ringbalance.scene.platform.kept_code import KeptCode
 
 P = ParamSpec("P")
@@ -119,6 +120,8 @@ class _Called(_Dispatcher):  # type: ignore[misc]
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
         self._compiler._customize_flags = _Alike
+        # Called only where no code is kept.
+        self._compiler.compile = partial(_compile_announced, self._compiler.compile)
 
     def compile(self, sig: Any) -> Any:
         """As numba's, but for code that another process is making now, which is waited for."""
@@ -137,6 +140,11 @@ class _Called(_Dispatcher):  # type: ignore[misc]
     def get_overload(self, sig: Any) -> Any:
         """As numba's, of the inner one."""
         return self._inner.get_overload(sig)
+
+
+def _compile_announced(compile_it: Callable[..., Any], *given: Any) -> Any:
+    with announced("compiling, once on this machine ..."):
+        return compile_it(*given)
 
 
 class _Inner(_Dispatcher):  # type: ignore[misc]

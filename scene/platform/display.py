@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 LOG: Final = logging.getLogger("ringbalance")
 """Progress and messages as information, errors as errors; nothing is written unless a handler is added."""
@@ -32,6 +32,42 @@ _DISPLAY: Final[ContextVar[Display]] = ContextVar("display")
 def display() -> Display:
     """What holds for the command line that is running; all is shown outside one."""
     return _DISPLAY.get(Display())
+
+
+class Progress(Protocol):
+    """What a command does at present, as it is shown."""
+
+    text: str
+
+    def show(self, text: str) -> None:
+        """Replace the text."""
+
+
+_PROGRESS: Final[ContextVar[Progress]] = ContextVar("progress")
+
+
+@contextmanager
+def shown_by(progress: Progress) -> Iterator[None]:
+    """Let what a block announces from its depths be shown."""
+    token = _PROGRESS.set(progress)
+    try:
+        yield
+    finally:
+        _PROGRESS.reset(token)
+
+
+@contextmanager
+def announced(text: str) -> Iterator[None]:
+    """Show a text while a block runs, and then what was shown before; nothing outside a command."""
+    progress = _PROGRESS.get(None)
+    before = progress.text if progress else ""
+    if progress:
+        progress.show(text)
+    try:
+        yield
+    finally:
+        if progress:
+            progress.show(before)
 
 
 @contextmanager

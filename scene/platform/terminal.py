@@ -21,7 +21,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn
 from rich.text import Text
 
-from ringbalance.scene.platform.display import LOG, display
+from ringbalance.scene.platform.display import LOG, display, shown_by
 
 FIRST_LINE: Final = 10.0
 """Seconds without a terminal before the first line."""
@@ -121,7 +121,8 @@ def activity(command: str, text: str) -> Iterator[Activity]:
         if not (quiet or console.is_terminal):
             lines.start()
         try:
-            yield shown
+            with shown_by(shown):
+                yield shown
         finally:
             ended.set()
 

@@ -1,4 +1,4 @@
-"""Indices against Ishigami's function, whose shares of variance are known."""
+"""Indices against functions whose shares of variance are known, and against SALib where it is installed."""
 
 from __future__ import annotations
 
@@ -8,22 +8,46 @@ import numpy as np
 import pytest
 
 import ringbalance as rb
-from ringbalance.design.sensitivity import first_order
+from ringbalance.design.sensitivity import first_order, total_order
 from ringbalance.design.sobol import sobol
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
 A, B = 7.0, 0.1
 
 
-def test_indices_of_ishigami_lie_in_their_intervals() -> None:
-    """sin x1 + a sin^2 x2 + b x3^4 sin x1 over (-pi, pi): Ishigami and Homma (1990)."""
-    x = math.pi * (2 * sobol(3, 4096) - 1)
+def ishigami(x: FloatArray) -> FloatArray:
+    """Of x over (-pi, pi): Ishigami and Homma (1990)."""
     y = np.sin(x[:, 0]) + A * np.sin(x[:, 1]) ** 2 + B * x[:, 2] ** 4 * np.sin(x[:, 0])
-    whole = A**2 / 8 + B * math.pi**4 / 5 + B**2 * math.pi**8 / 18 + 0.5
-    exact = np.array([(1 + B * math.pi**4 / 5) ** 2 / 2, A**2 / 8, 0.0]) / whole
-    shares, widths = first_order(x, y)
-    assert np.all(np.abs(shares - exact) < widths)
+    return np.asarray(y)
+
+
+def test_indices_of_ishigami_lie_in_their_intervals() -> None:
+    x = math.pi * (2 * sobol(3, 4096) - 1)
+    alone = np.array([(1 + B * math.pi**4 / 5) ** 2 / 2, A**2 / 8, 0.0])
+    together = B**2 * math.pi**8 * (1 / 18 - 1 / 50)
+    whole = np.sum(alone) + together
+    shares, widths = first_order(x, ishigami(x))
+    assert np.all(np.abs(shares - alone / whole) < widths)
     assert np.all(widths < 0.06)
+    for rows, narrow in ((256, 0.25), (1024, 0.003)):
+        shares, widths = total_order(x[:rows], ishigami(x[:rows]))
+        exact = (alone + together * np.array([1, 0, 1])) / whole
+        assert np.all(np.abs(shares - exact) < widths)
+        assert np.all(widths < narrow)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_total_indices_are_those_of_salib() -> None:
+    """From a design of its own, made for them."""
+    sample = pytest.importorskip("SALib.sample.sobol").sample
+    analyze = pytest.importorskip("SALib.analyze.sobol").analyze
+    problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[-math.pi, math.pi]] * 3}
+    theirs = sample(problem, 1024, calc_second_order=False, seed=1)
+    found = analyze(problem, ishigami(theirs), calc_second_order=False, seed=1)
+    x = math.pi * (2 * sobol(3, 1024) - 1)
+    shares, widths = total_order(x, ishigami(x))
+    assert np.all(np.abs(shares - found["ST"]) < widths + found["ST_conf"])
 
 
 def test_intervals_hold_what_they_promise() -> None:
@@ -36,17 +60,38 @@ def test_intervals_hold_what_they_promise() -> None:
     assert np.all(held >= 85)
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_total_intervals_hold_what_they_promise(noise: float) -> None:
+    """Of 40 Latin samples of a sum with a product in it, and a noise that may belong to either input."""
+    random, held = np.random.default_rng(5), np.zeros(2)
+    both = 4 / 144
+    whole = 1 / 12 + 1 / 48 + both + noise**2
+    exact = (np.array([1 / 12, 1 / 48]) + both + noise**2 / 2) / whole
+    for _ in range(40):
+        x = np.stack([(random.permutation(256) + random.random(256)) / 256 for _ in range(2)], axis=1)
+        y = x[:, 0] + x[:, 1] / 2 + 2 * (x[:, 0] - 0.5) * (x[:, 1] - 0.5)
+        shares, widths = total_order(x, y + noise * random.standard_normal(256))
+        held += np.abs(shares - exact) < widths
+    assert np.all(held >= 37)
+    assert np.all(widths < 0.12)
+
+
 def test_nothing_is_said_of_few_rows_or_of_a_constant() -> None:
     x = np.random.default_rng(0).random((63, 2))
-    assert np.isnan(first_order(x, x[:, 0])[0]).all()
-    assert np.isnan(first_order(np.tile(x, (2, 1)), np.ones(126))[0]).all()
+    for indices in (first_order, total_order):
+        assert np.isnan(indices(x, x[:, 0])[0]).all()
+        assert np.isnan(indices(np.tile(x, (2, 1)), np.ones(126))[0]).all()
 
 
 def test_a_sample_tells_what_moves_its_results(paper_scene: Scene) -> None:
     vary = {"tube.bore": "0.7mm:2mm", "gas.pressure": "0.6MPa:1MPa"}
-    found = rb.sweep(paper_scene, vary, sample="sobol:128", intervals=False).sensitivity()
+    table = rb.sweep(paper_scene, vary, sample="sobol:128", intervals=False)
+    found, total = table.sensitivity(), table.sensitivity(total=True)
     assert "lambda" not in found
     share, width = found["drag_coefficient"]["tube.bore"]
     assert share - width > found["drag_coefficient"]["gas.pressure"][0]
+    for path, (whole, half) in total["drag_coefficient"].items():
+        share, width = found["drag_coefficient"][path]
+        assert whole + half > share - width
     with pytest.raises(KeyError):
         rb.sweep(paper_scene, {"tube.bore": "0.7mm:2mm:3"}).sensitivity()["velocity"]

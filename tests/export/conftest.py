@@ -7,6 +7,7 @@ from typing import cast
 import pytest
 
 import ringbalance as rb
+from ringbalance.export.blocks import Block, controller_block, disc_block, law_block
 from ringbalance.export.compact import CompactLaw, compact_law
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.scene.models import Scene
@@ -30,3 +31,15 @@ def laws(request: pytest.FixtureRequest) -> Both:
 def six() -> Both:
     """Of the scene that has all regimes."""
     return both_laws("six_chamber")
+
+
+@pytest.fixture(scope="session")
+def blocks(six: Both) -> dict[str, Block]:
+    """All blocks of that scene."""
+    scene = cast(Scene, rb.load_scene(rb.bundled_scene("six_chamber")))
+    law, compact = six
+    return {
+        "law": law_block(compact),
+        "disc": disc_block(scene, law, compact),
+        "controller": controller_block(scene),
+    }

@@ -36,7 +36,7 @@ static int misuse(const char *guid)
     const double bad = NAN, other = 0.123;
     double value = 0.0;
     int code[2], on = 1;
-    char bytes[256];
+    char bytes[512];
     size_t size = 0;
     void *kept = NULL, *again = NULL, *a, *b;
     CHECK(fmi2Instantiate("x", 1, "another law", NULL, NULL, 0, 0) == NULL)

@@ -39,7 +39,7 @@ static int misuse(const char *guid)
     int32_t code[2];
     bool on = true, event, ended, early;
     double last;
-    uint8_t bytes[256];
+    uint8_t bytes[512];
     size_t size = 0;
     void *kept = NULL, *again = NULL, *a, *b;
     CHECK(fmi3InstantiateCoSimulation("x", "another law", NULL, 0, 0, 0, 0, NULL, 0, NULL, NULL, NULL) == NULL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
@@ -11,8 +12,10 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
+from imported_unit import ImportedUnit
 from law_queries import answers, queries
 
+from ringbalance.export.blocks import Block, law_block
 from ringbalance.export.compact import CompactLaw
 from ringbalance.export.fmu import fmu_bytes, guid_of
 from ringbalance.export.libraries import Version
@@ -35,13 +38,13 @@ def version(request: pytest.FixtureRequest) -> Version:
 
 @pytest.fixture(scope="module")
 def unit(six: Both, version: Version) -> ZipFile:
-    content, _ = fmu_bytes(six[1], "disc", version)
+    content, _ = fmu_bytes(law_block(six[1]), "disc", version)
     assert len(content) <= MOST
     return ZipFile(BytesIO(content))
 
 
 def test_two_exports_of_a_law_are_equal(six: Both, version: Version) -> None:
-    assert fmu_bytes(six[1], "disc", version) == fmu_bytes(six[1], "disc", version)
+    assert fmu_bytes(law_block(six[1]), "disc", version) == fmu_bytes(law_block(six[1]), "disc", version)
 
 
 def test_every_variable_has_what_a_host_shows(unit: ZipFile, six: Both, version: Version) -> None:
@@ -63,7 +66,7 @@ def test_every_variable_has_what_a_host_shows(unit: ZipFile, six: Both, version:
     else:
         told = {each.get("valueReference", "") for each in model.iter("Output")}
     assert told == outputs
-    assert guid_of(six[1]) in (model.get("guid"), model.get("instantiationToken"))
+    assert guid_of(law_block(six[1])) in (model.get("guid"), model.get("instantiationToken"))
     described = model if version == "fmi2" else ET.fromstring(unit.read("sources/buildDescription.xml"))
     sources = [each.get("name") for tag in ("File", "SourceFile") for each in described.iter(tag)]
     assert [f"sources/{name}" in unit.namelist() for name in sources] == [True, True]
@@ -89,25 +92,36 @@ def test_an_importer_in_c_has_the_bits_of_python(
 
 def ran(host: Path, law: CompactLaw, asked: FloatArray) -> FloatArray:
     lines = "".join(f"{x!r},{y!r},{p!r},{int(on)}\n" for x, y, p, on in asked.T.tolist())
-    done = subprocess.run([host, guid_of(law)], input=lines, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [host, guid_of(law_block(law))], input=lines, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout[-500:] + done.stderr[-2000:]
     return np.array([[float(cell) for cell in line.split(",")] for line in done.stdout.splitlines()])
 
 
 @needs_compiler
-def test_the_reference_results_are_what_the_unit_answers(
-    tmp_path: Path, unit: ZipFile, six: Both, version: Version
+@pytest.mark.parametrize("kind", ["law", "disc", "controller"])
+def test_an_importer_in_python_has_the_reference_results(
+    tmp_path: Path, blocks: dict[str, Block], version: Version, kind: str
 ) -> None:
+    """By `ctypes`, from what the unit itself says of its variables."""
+    content, runs = fmu_bytes(blocks[kind], "disc", version)
+    assert runs
+    assert len(content) <= MOST
+    unit = ZipFile(BytesIO(content))
     unit.extractall(tmp_path)
-    sources = [str(path) for path in sorted((tmp_path / "sources").glob("*.c"))]
-    subprocess.run(
-        ["gcc", "-std=c99", *sources, str(HERE / f"{version}_host.c"), "-o", "host", "-lm"],
-        cwd=tmp_path,
-        check=True,
-    )
-    table = np.loadtxt(unit.open("documentation/reference.csv"), delimiter=",", skiprows=1)
-    assert np.array_equal(ran(tmp_path / "host", six[1], table[:, :4].T), table[:, 4:])
-    assert len(set(table[:, 6])) >= 3
+    folder = tmp_path / "extra" / "org.fmi-standard.fmi-ls-ref"
+    manifest = ET.parse(folder / "fmi-ls-manifest.xml").getroot()
+    inputs, right = (_table(folder / each.get("source", "")) for each in manifest)
+    with ImportedUnit(tmp_path, version) as imported:
+        for row, told in zip(inputs, right, strict=True):
+            assert {"time": told["time"], **imported.step(row, 0.01)} == told
+    assert len({tuple(told.values())[1:] for told in right}) > 3
+
+
+def _table(file: Path) -> list[dict[str, float]]:
+    with file.open() as lines:
+        return [{name: float(cell) for name, cell in row.items()} for row in csv.DictReader(lines)]
 
 
 @needs_compiler
@@ -115,7 +129,7 @@ def test_fmpy_finds_no_fault_and_simulates_it(tmp_path: Path, six: Both, version
     fmpy = pytest.importorskip("fmpy")
     validation = pytest.importorskip("fmpy.validation")
     file = tmp_path / "disc.fmu"
-    file.write_bytes(fmu_bytes(six[1], "disc", version)[0])
+    file.write_bytes(fmu_bytes(law_block(six[1]), "disc", version)[0])
     assert validation.validate_fmu(str(file)) == []
     start = {"fill_ratio": 0.3, "opposite_fill_ratio": 0.2, "gas_pressure": 4e5, "primed": True}
     rows = fmpy.simulate_fmu(str(file), start_values=start, stop_time=0.1)
@@ -126,7 +140,7 @@ def test_fmpy_finds_no_fault_and_simulates_it(tmp_path: Path, six: Both, version
 def test_with_a_cross_compiler_it_has_libraries_for_all_systems(six: Both, version: Version) -> None:
     """Where `ziglang` is installed: each begins as its system's libraries do."""
     pytest.importorskip("ziglang")
-    unit = ZipFile(BytesIO(fmu_bytes(six[1], "disc", version, all_systems=True)[0]))
+    unit = ZipFile(BytesIO(fmu_bytes(law_block(six[1]), "disc", version, all_systems=True)[0]))
     heads = {name: unit.read(name)[:4] for name in unit.namelist() if name.startswith("binaries/")}
     begins = {".so": b"\x7fELF", ".dll": b"MZ", ".dylib": b"\xcf\xfa\xed\xfe"}
     assert len(heads) == (3 if version == "fmi2" else 6)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from law_queries import answers, queries
 
+from ringbalance.export.blocks import law_block
 from ringbalance.export.compact import CompactLaw
 from ringbalance.export.grid import COLUMNS, csv_files
 from ringbalance.export.hosts import c_files, identifier, python_files
@@ -47,7 +48,7 @@ int main(void)
 
 def compiled_answers(folder: Path, law: CompactLaw, asked: FloatArray, *flags: str) -> FloatArray:
     """What a C program answers, shape (queries, 7)."""
-    for name, text in (c_files(law, "disc") | {"main.c": HARNESS}).items():
+    for name, text in (c_files(law_block(law), "disc") | {"main.c": HARNESS}).items():
         (folder / name).write_text(text)
     command = ["gcc", *WARNINGS, *flags, "disc.c", "main.c", "-o", "ask", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
@@ -77,7 +78,7 @@ def test_c_has_the_bits_of_python_and_no_warning(tmp_path: Path, six: Both, flag
 def test_a_module_of_its_own_has_the_same_bits(six: Both) -> None:
     law, compact = six
     module: dict[str, object] = {}
-    exec(python_files(compact, "disc")["disc.py"], module)
+    exec(python_files(law_block(compact), "disc")["disc.py"], module)
     flow = module["flow"]
     assert callable(flow)
     asked = queries(law, 500)

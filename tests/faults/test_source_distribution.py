@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -39,13 +40,19 @@ def files() -> list[Path]:
 
 @pytest.fixture(scope="module")
 def archives(files: list[Path], tmp_path_factory: pytest.TempPathFactory) -> list[list[Path]]:
-    """Distributions of two copies of the checkout, which no earlier build has touched."""
+    """Distributions of two copies of the checkout, which no earlier build has touched.
+
+    The first has no links; in the second they are small files, as git writes them on Windows.
+    """
     made = []
     for name in ("first", "second"):
         folder = tmp_path_factory.mktemp(name)
         for path in files:
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / path, folder / path)
+        if name == "second":
+            for link in (path for path in (ROOT / "ringbalance").iterdir() if path.is_symlink()):
+                (folder / "ringbalance" / link.name).write_text(str(link.readlink()))
         made.append(build(folder, target=tmp_path_factory.mktemp("built"), epoch=1_700_000_000))
     return made
 
@@ -68,6 +75,23 @@ def test_it_holds_what_git_holds(files: list[Path], unpacked: Path) -> None:
     held = {path.relative_to(unpacked) for path in unpacked.rglob("*") if path.is_file()}
     own = {path for path in held if path.parts[0] in ADDED or path.parts[0].endswith(".egg-info")}
     assert sorted(held - own) == files
+
+
+def test_a_wheel_from_a_clone_without_links_runs(archives: list[list[Path]], tmp_path: Path) -> None:
+    with zipfile.ZipFile(archives[1][1]) as wheel:
+        wheel.extractall(tmp_path)
+    code = f"""
+import sys
+sys.path.insert(0, {str(tmp_path)!r})
+import ringbalance
+from ringbalance.cli import main
+assert ringbalance.__file__.startswith({str(tmp_path)!r}), ringbalance.__file__
+sys.exit(main(["calibrate", str(ringbalance.bundled_scene("six_chamber")), "--brief", "--quiet"]))
+"""
+    command = [sys.executable, "-P", "-c", code]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "lambda per transferred mass" in result.stdout
 
 
 def test_its_tests_run(unpacked: Path) -> None:

@@ -148,7 +148,7 @@ def test_enough_angles_are_taken_for_the_mean(disc: Disc, monkeypatch: pytest.Mo
         "cells": [(4, 12), (2, 6), (1, 3)],
     }
     chosen = ring_quantities(**arguments)
-    monkeypatch.setattr(ring_module, "_turn_samples", lambda *_: 24)
+    monkeypatch.setattr(ring_module, "_angles", lambda *_: np.linspace(0, np.pi, 13))
     many = ring_quantities(**arguments)
     for name in ("wall_pressure", "moment", "moment_per_volume"):
         value = getattr(many, name).value
@@ -179,15 +179,13 @@ def test_a_vertical_shaft_gets_three_dimensions(disc: Disc) -> None:
         )
 
 
-def test_a_broken_ring_is_said_and_its_values_are_wide(disc: Disc) -> None:
+def test_a_broken_ring_is_said_and_has_no_values(disc: Disc) -> None:
     ring = ring_quantities(
         disc=disc, density=RHO, angular_velocity=40.0, fill_ratio=[0.0, 0.02, 0.5], gravity=G
     )
     assert ring.status.code is StatusCode.NO_RING
     assert "0.02" in ring.status.text
-    np.testing.assert_array_equal(ring.closed, [True, False, True])
-    exact = without_gravity(disc, 0.02, 40.0)
-    assert ring.moment.value[1] == pytest.approx(exact["moment"], rel=1e-6)
-    assert ring.moment.uncertainty[1] > 0.1 * exact["moment"]
-    assert ring.moment_per_volume.uncertainty[0] > 0
-    assert np.all(np.isfinite(ring.wall_pressure.value))
+    np.testing.assert_array_equal(ring.solved, [True, False, True])
+    assert ring.moment.value[1] == 0.0
+    assert ring.moment.uncertainty[1] >= without_gravity(disc, 0.02, 40.0)["moment"]
+    assert np.all(ring.wall_pressure.uncertainty[2] < 1e-5 * ring.wall_pressure.value[2])

@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 from ringbalance.physics.gas import pressure_factor
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import chamber_and_law
-from ringbalance.reduced_model.calibration_record import Calibration
+from ringbalance.reduced_model.calibration_record import Calibration, priming_pressure
 from ringbalance.reduced_model.estimates import range_flow
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, nominal_law
 from ringbalance.reduced_model.law.flow_law import Regime
-from ringbalance.reduced_model.operating_point import priming_pressure
 from ringbalance.reduced_model.pressure_profile import HumpProfile
 from ringbalance.reduced_model.tube.flow import column_pressure
 from ringbalance.reduced_model.tube.heads import TubeHeads

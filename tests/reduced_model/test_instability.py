@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.reduced_model.instability import AsynchronousInstability
+from ringbalance.reduced_model.chamber.contributions import AsynchronousInstability
 from ringbalance.scene.models import Scene
 
 

@@ -6,7 +6,6 @@ import dataclasses
 
 import pytest
 
-from ringbalance.reduced_model.estimates import first_gas_time
 from ringbalance.reduced_model.terms import LEFT_OUT, NOT_MODELLED, TERMS, ModelUsed, models_used
 from ringbalance.scene.models import Scene
 
@@ -52,14 +51,6 @@ def test_valve_and_filling_are_unknown_until_the_scene_asks(table_1_scene: Scene
     assert asked["valve lag"].estimated_contribution == 1.0
     assert asked["valve lag"].model == "pure delay, in injections"
     assert asked["gas filling"].estimated_contribution is not None
-
-
-def test_first_gas_time_follows_the_controller(table_1_scene: Scene) -> None:
-    assert first_gas_time(table_1_scene) == pytest.approx(0.8)
-    short = dataclasses.replace(table_1_scene.controller, maximum_gas_time=0.3)
-    assert first_gas_time(dataclasses.replace(table_1_scene, controller=short)) == 0.3
-    trial = dataclasses.replace(table_1_scene.controller, kind="trial")
-    assert first_gas_time(dataclasses.replace(table_1_scene, controller=trial)) == 0.1
 
 
 def test_prescribed_k_and_blocked_tubes_have_no_rotation_fraction(table_1_scene: Scene) -> None:

@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.reduced_model import paper
 from ringbalance.scene.models import Scene
 
@@ -18,9 +17,11 @@ def test_eq_12_equals_the_integrated_element_without_plates(table_1_scene: Scene
     bare = dataclasses.replace(table_1_scene.disc, plate_thickness=0.0)
     volume = np.linspace(0, 0.5, 7) * paper.chamber_volume_paper(disc=bare)
     radius = paper.surface_radius_paper(disc=bare, liquid_volume=volume)
-    common = {"density": 1000.0, "angular_velocity": 1047.2}
-    by_volume = paper.wall_pressure_paper(disc=bare, liquid_volume=volume, **common)
-    by_radius = hydrostatic_pressure(inner=radius, outer=bare.outer_radius, **common)
+    density, omega = 1000.0, 1047.2
+    by_volume = paper.wall_pressure_paper(
+        disc=bare, density=density, angular_velocity=omega, liquid_volume=volume
+    )
+    by_radius = density * omega**2 * (bare.outer_radius**2 - radius**2) / 2
     np.testing.assert_allclose(by_volume, by_radius, rtol=1e-12, atol=1e-6)
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringbalance.physics.pressure.hydrostatics import column_radius, hydrostatic_pressure
 from ringbalance.reduced_model.injection.dynamics import PLANT
+from ringbalance.reduced_model.tube.flow import column_pressure, column_radius
 from ringbalance.reduced_model.tube.regime import (
     ColumnFlow,
     TubeEnds,
@@ -28,6 +28,7 @@ from ringbalance.reduced_model.tube.regime import (
     priming_pressure,
     stall_pressure,
 )
+from ringbalance.scene.models import Scene
 from ringbalance.scene.platform.compiled import compiled
 
 ENDS = TubeEnds(upstream_gas=5.0, downstream_gas=1.0, upstream_hydrostatic=7.0, downstream_hydrostatic=3.0)
@@ -153,13 +154,14 @@ def test_a_path_without_crest_is_always_primed() -> None:
     assert flow_of(LEVEL, ENDS, primed=False).primed
 
 
-def test_hydrostatic_pressure_of_a_film_and_its_inverse() -> None:
-    film = 1e-9
-    pressure = hydrostatic_pressure(density=1e3, angular_velocity=500.0, inner=0.1 - film, outer=0.1)
-    depth = 0.1 - (0.1 - film)
-    assert pressure == pytest.approx(1e3 * 500.0**2 * depth * (0.1 - depth / 2), rel=1e-14)
-    whole = hydrostatic_pressure(density=1e3, angular_velocity=500.0, inner=0.06, outer=0.1)
-    assert whole == pytest.approx(1e3 * 500.0**2 * (0.01 - 0.0036) / 2, rel=1e-14)
-    radius = column_radius(density=1e3, angular_velocity=500.0, pressure=whole, outer=0.1)
-    assert radius == pytest.approx(0.06, rel=1e-14)
-    assert column_radius(density=1e3, angular_velocity=500.0, pressure=10 * whole, outer=0.1) == 0.0
+def test_hydrostatic_pressure_of_a_film_and_its_inverse(table_1_scene: Scene) -> None:
+    outer = table_1_scene.disc.outer_radius
+    pull = table_1_scene.liquid.density * table_1_scene.rotor.speed**2
+    film = outer - 1e-9
+    depth = outer - film
+    pressure = column_pressure(scene=table_1_scene, radius=film)
+    assert pressure == pytest.approx(pull * depth * (outer - depth / 2), rel=1e-14)
+    whole = column_pressure(scene=table_1_scene, radius=0.03)
+    assert whole == pytest.approx(pull * (outer**2 - 0.03**2) / 2, rel=1e-14)
+    assert column_radius(scene=table_1_scene, pressure=whole) == pytest.approx(0.03, rel=1e-14)
+    assert column_radius(scene=table_1_scene, pressure=10 * whole) == 0.0

@@ -8,6 +8,7 @@ import time
 import pytest
 
 from ringbalance.scene.platform import terminal
+from ringbalance.scene.platform.display import announced, displayed
 from ringbalance.scene.platform.terminal import activity
 
 
@@ -53,3 +54,19 @@ def test_without_standard_error_the_run_goes_on(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(sys, "stderr", None)
     with activity("calibrate", "finite elements"):
         time.sleep(0.15)
+
+
+def test_what_the_depths_announce_is_shown_while_it_lasts() -> None:
+    with announced("nobody shows this"):
+        pass
+    with activity("simulate", "closed loop ...") as shown:
+        with announced("compiling, once on this machine ..."):
+            assert shown.text == "compiling, once on this machine ..."
+        assert shown.text == "closed loop ..."
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_quiet_run_shows_no_progress(capsys: pytest.CaptureFixture[str]) -> None:
+    with displayed(brief=False, quiet=True, log=None), activity("calibrate", "finite elements"):
+        time.sleep(0.2)
+    assert capsys.readouterr() == ("", "")

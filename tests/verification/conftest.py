@@ -9,7 +9,7 @@ import pytest
 
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference
+from ringbalance.verification.evidence import Evidence, Found, Level
 
 CLAIM = """
 id = "made_up"
@@ -75,8 +75,7 @@ class MadeUpCode:
     def compute(self, scene: Scene, level: Level, defect: str | None = None) -> Evidence:  # noqa: ARG002
         thicker = scene.disc.plate_thickness == 0.004
         found = Found(value=20.0) if thicker else self.defect(self.found, defect, scene)
-        against = {"answer": Reference(value=10.0)}
-        return Evidence(found={"answer": found}, reference=against, numbers={"doubt": 0.0123})
+        return Evidence(found={"answer": found.against(10.0)}, numbers={"doubt": 0.0123})
 
 
 @pytest.fixture

@@ -153,7 +153,6 @@ def test_ten_times_the_range_of_what_was_assumed_only_weakens_a_verdict(
             metric=quantity.quantity.metric,
             limit=quantity.quantity.limit,
             found=found.moved(9 * low, 9 * high),
-            reference=quantity.reference,
         )
         judged.append(verdict)
     verdict = combine(kind="claim", verdicts=judged, roles=roles)

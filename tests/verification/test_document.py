@@ -17,7 +17,6 @@ from ringbalance.verification.evidence import (
     Found,
     Level,
     NotRunError,
-    Reference,
     Series,
 )
 from ringbalance.verification.result import definition_document, merge_saved
@@ -68,8 +67,7 @@ def test_gaps_in_a_curve_become_null(claim: CaseDefinition, paper_scene: Scene) 
             curve = Curve(name="c", unit="m", values=np.array([1.0, np.nan]), uncertainty=np.zeros(2))
             axis = Axis(name="x", unit="s", values=np.array([0.0, 1.0]))
             return Evidence(
-                found={"answer": Found(value=10.0)},
-                reference={"answer": Reference(value=10.0)},
+                found={"answer": Found(value=10.0).against(10.0)},
                 numbers={"doubt": 1.0},
                 series=(Series(name="s", x=axis, y=(curve,)),),
             )

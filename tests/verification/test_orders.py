@@ -6,20 +6,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringbalance.verification.finite_elements import OrderStudy
+from ringbalance.verification.evidence import Convergence
 
 
 @given(st.floats(0.5, 5), st.floats(1e-6, 1), st.floats(1.2, 3))
 def test_a_power_is_recovered(order: float, scale: float, ratio: float) -> None:
     size = [ratio**-k for k in range(4)]
-    study = OrderStudy.of(size=size, error=[scale * h**order for h in size])
-    assert study.order == pytest.approx([order] * 3)
+    study = Convergence.of_errors("error", 1.0, size=size, error=[scale * h**order for h in size])
+    assert study.observed_order == pytest.approx([order] * 3)
     assert study.finest_error == pytest.approx(scale * size[-1] ** order)
 
 
 def test_the_lowest_of_the_two_finest_pairs_counts() -> None:
-    study = OrderStudy.of(size=[8, 4, 2, 1], error=[1.0, 0.5, 0.125, 0.0625])
-    assert study.order == pytest.approx([1, 2, 1])
+    study = Convergence.of_errors("error", 1.0, size=[8, 4, 2, 1], error=[1.0, 0.5, 0.125, 0.0625])
+    assert study.observed_order == pytest.approx([1, 2, 1])
     assert study.settled_order == pytest.approx(1)
 
 
@@ -37,4 +37,4 @@ def test_the_lowest_of_the_two_finest_pairs_counts() -> None:
 )
 def test_sequences_that_show_no_order_are_refused(size: list[float], error: list[float]) -> None:
     with pytest.raises(ValueError, match=r"levels|sizes|errors"):
-        OrderStudy.of(size=size, error=error)
+        Convergence.of_errors("error", 1.0, size=size, error=error)

@@ -16,7 +16,7 @@ from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import runner
 from ringbalance.verification.assumptions import overridden
 from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Reference, Verdict
+from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Verdict
 from ringbalance.verification.runner import run_case, run_cases, run_definition
 
 QUICK = ("gci_celik2008", "claim_02_ring_radius", "claim_12_correction_mass")
@@ -112,8 +112,7 @@ def test_a_solve_that_did_not_succeed_cannot_confirm(claim: CaseDefinition, pape
             status = Status(code=StatusCode.NOT_CONVERGED, text="refine the mesh")
             value = 20.0 if defect else 10.0
             return Evidence(
-                found={"answer": Found(value=value)},
-                reference={"answer": Reference(value=10.0)},
+                found={"answer": Found(value=value).against(10.0)},
                 numbers={"doubt": 0.0},
                 status=status,
             )

@@ -17,7 +17,8 @@ from ringbalance.verification.evidence import (
 
 
 def verdict(kind: Kind, metric: Metric, limit: float, found: Found, reference: Reference | None) -> Verdict:
-    return judge_quantity(kind=kind, metric=metric, limit=limit, found=found, reference=reference)[0]
+    found = found if reference is None else found.against(reference)
+    return judge_quantity(kind=kind, metric=metric, limit=limit, found=found)[0]
 
 
 TEN = Reference(value=10.0, uncertainty=0.1)

@@ -16,7 +16,6 @@ import numpy as np
 from ringbalance.controller.simulation import Simulation
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
     Evidence,
@@ -26,7 +25,7 @@ from ringbalance.verification.evidence import (
     Table,
     as_found,
     from_range,
-    from_rounding,
+    printed,
 )
 from ringbalance.verification.loops import (
     AMPLITUDES,
@@ -40,14 +39,16 @@ from ringbalance.verification.loops import (
     over_period,
     overshooting,
     run_loop,
+    runs_table,
     runs_with,
     settled_after,
     settling,
     slowest_within,
+    worst,
 )
 from ringbalance.verification.papers import fig_7_readings
 
-_ABOUT: Final = Reference(value=40.0, uncertainty=from_rounding(10.0))
+_ABOUT: Final = printed(40.0, last_digit=10.0)
 """The paper's settling time of the trial algorithm, s."""
 _STEPS: Final = {
     "light": ((0.02, 0.05), (0.1, 0.2), (0.003, 0.005), (0.25, 1.0)),
@@ -86,44 +87,31 @@ def trial_algorithm(scene: Scene, level: Level, defect: str | None = None) -> Ev
     own = slowest_within(scene, [run_loop(loop_scene(scene, kind="trial", phase=phase)) for phase in PHASES])
     names = [f"phase {math.degrees(phase):.0f} degrees" for phase in PHASES]
     shown = dict(zip(names, sets[len(sets) // 2], strict=True))
-    table = Table(
-        name="sets of steps, and the slowest of the four phases",
-        columns={
-            **{name: [one[i] for one in steps] for i, name in enumerate(_STEP_NAMES)},
-            "settled after": [settled_after(runs) for runs in sets],
-            "misadjustments": [float(max(run.misadjustments for run in runs)) for runs in sets],
-        },
-        units=dict.fromkeys((*_STEP_NAMES, "settled after"), "s"),
+    table = runs_table(
+        "sets of steps, and the slowest of the four phases",
+        dict(zip(_STEP_NAMES, zip(*steps, strict=True), strict=True)),
+        sets,
+        units=dict.fromkeys(_STEP_NAMES, "s"),
     )
     return Evidence(
-        found={
-            "settling_time": Found(value=own).moved(fastest - own, latest - own),
-            **as_found(
-                phases_settled=max(sum(run.settled for run in runs) for runs in sets),
-                misadjustments=min(counts),
-            ),
-        },
-        reference={"settling_time": _ABOUT},
+        found=as_found(
+            settling_time=Found(value=own, reference=_ABOUT).moved(fastest - own, latest - own),
+            phases_settled=max(sum(run.settled for run in runs) for runs in sets),
+            misadjustments=min(counts),
+        ),
         numbers={
-            "settings": float(len(sets)),
-            "settling_sets": float(settled.size),
-            "other_sets": float(len(sets) - settled.size),
+            "settings": len(sets),
+            "settling_sets": settled.size,
+            "other_sets": len(sets) - settled.size,
             "time_limit": scene.run.time_limit,
             "fastest": fastest,
             "slowest": latest,
-            "fewest": float(min(counts)),
-            "most": float(max(counts)),
+            "fewest": min(counts),
+            "most": max(counts),
         },
         series=(amplitude_series("amplitude under the trial algorithm", shown),),
         tables=(table,),
     )
-
-
-def five_seconds_ends(scene: Scene) -> Evidence:
-    """The middle period alone."""
-    runs = runs_with(scene, amplitudes=AMPLITUDES, periods=PERIODS[1:2])
-    rises = max(run.misadjustments for run in runs)
-    return Evidence(found=as_found(settling_time=slowest_within(scene, runs), misadjustments=rises))
 
 
 def five_seconds(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -131,7 +119,7 @@ def five_seconds(scene: Scene, level: Level, defect: str | None = None) -> Evide
     given = mistaken_lag(scene) if defect == "lag_angle_wrong" else scene
     runs = {period: runs_with(given, amplitudes=AMPLITUDES, periods=(period,)) for period in PERIODS}
     slowest = [slowest_within(scene, group) for group in runs.values()]
-    rises = [max(run.misadjustments for run in group) for group in runs.values()]
+    rises = list(map(worst, runs.values()))
     _, bare = fig_7_readings()
     # No longer than it takes to see whether the bound is met.
     brief = dataclasses.replace(bare, run=dataclasses.replace(bare.run, time_limit=2 * _BOUND))
@@ -139,21 +127,13 @@ def five_seconds(scene: Scene, level: Level, defect: str | None = None) -> Evide
         run_loop(loop_scene(brief, kind="target_vector", amplitude=amplitude, period=0.5), "calibrated")
         for amplitude in (AMPLITUDES[0], AMPLITUDES[-1])
     ]
-    rows = [
-        (period, amplitude, run)
-        for period, group in runs.items()
-        for amplitude, run in zip(AMPLITUDES, group, strict=True)
-    ]
-    table = Table(
-        name="target-vector algorithm with the paper's parameters and law",
-        columns={
-            "period": [period for period, _, _ in rows],
-            "amplitude": [amplitude for _, amplitude, _ in rows],
-            "settled after": [settled_after([run]) for _, _, run in rows],
-            "misadjustments": [float(run.misadjustments) for _, _, run in rows],
-            "overshoots": [float(run.overshoots) for _, _, run in rows],
-        },
-        units={"period": "s", "amplitude": "m", "settled after": "s"},
+    periods, amplitudes = zip(*itertools.product(PERIODS, AMPLITUDES), strict=True)
+    table = runs_table(
+        "target-vector algorithm with the paper's parameters and law",
+        {"period": periods, "amplitude": amplitudes},
+        [[run] for group in runs.values() for run in group],
+        shown=("settled after", "misadjustments", "overshoots"),
+        units={"period": "s", "amplitude": "m"},
     )
     shown = {f"{a * 1e6:.0f} um": run for a, run in zip(AMPLITUDES, runs[0.5], strict=True)}
     return Evidence(
@@ -162,19 +142,14 @@ def five_seconds(scene: Scene, level: Level, defect: str | None = None) -> Evide
             "fastest": slowest[0],
             "middle": slowest[1],
             "slowest": slowest[2],
-            "rises_slow": float(rises[2]),
+            "rises_slow": rises[2],
             "bore": bare.tube.bore,
-            "calibrated_settled": float(sum(settling(run) <= _BOUND for run in calibrated)),
-            "calibrated_overshoots": float(sum(run.overshoots for run in calibrated)),
+            "calibrated_settled": sum(settling(run) <= _BOUND for run in calibrated),
+            "calibrated_overshoots": sum(run.overshoots for run in calibrated),
         },
         series=(amplitude_series("amplitude over time, a period of 0.5 s", shown),),
         tables=(table,),
     )
-
-
-def faster_ends(scene: Scene) -> Evidence:
-    """The middle period alone."""
-    return Evidence(found=as_found(**_compared(scene, *_at_all_phases(scene, scene, PERIODS[1]))))
 
 
 def faster(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -182,21 +157,17 @@ def faster(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     aimed = mistaken_lag(scene) if defect == "lag_angle_wrong" else scene
     runs = {period: _at_all_phases(aimed, scene, period) for period in PERIODS}
     judged = [_compared(scene, *pair) for pair in runs.values()]
-    rows = [
-        (period, phase, target, trial)
-        for period, both in runs.items()
-        for phase, target, trial in zip(PHASES, *both, strict=True)
-    ]
-    targets, trials = [target for _, _, target, _ in rows], [trial for _, _, _, trial in rows]
+    periods, phases = zip(*itertools.product(PERIODS, PHASES), strict=True)
+    targets, trials = ([[run] for both in runs.values() for run in both[i]] for i in (0, 1))
     table = Table(
         name="settling times of both algorithms",
         columns={
-            "period": [row[0] for row in rows],
-            "phase": [row[1] for row in rows],
-            "target vector": [settled_after([run]) for run in targets],
-            "trial": [settled_after([run]) for run in trials],
-            "misadjustments, target vector": [float(run.misadjustments) for run in targets],
-            "misadjustments, trial": [float(run.misadjustments) for run in trials],
+            "period": periods,
+            "phase": phases,
+            "target vector": list(map(settled_after, targets)),
+            "trial": list(map(settled_after, trials)),
+            "misadjustments, target vector": list(map(worst, targets)),
+            "misadjustments, trial": list(map(worst, trials)),
         },
         units={"period": "s", "phase": "rad", "target vector": "s", "trial": "s"},
     )
@@ -204,8 +175,8 @@ def faster(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found={name: over_period([one[name] for one in judged]) for name in judged[0]},
         numbers={
-            "periods": float(len(PERIODS)),
-            "trial_misadjustments": float(min(run.misadjustments for run in trials)),
+            "periods": len(PERIODS),
+            "trial_misadjustments": min(map(worst, trials)),
         },
         series=(amplitude_series("amplitude, 90 degrees, a period of 0.5 s", first_phase),),
         tables=(table,),
@@ -225,7 +196,7 @@ def _compared(scene: Scene, target: list[Simulation], trial: list[Simulation]) -
             for slow, fast in zip(trial, target, strict=True)
         ),
         "largest_rise": max(map(_largest_rise, target)),
-        "misadjustments": float(sum(run.misadjustments for run in target)),
+        "misadjustments": sum(run.misadjustments for run in target),
     }
 
 
@@ -237,7 +208,8 @@ def _largest_rise(run: Simulation) -> float:
 
 _SEARCHED: Final = tuple((np.arange(2, 41) * 0.01e6).tolist())
 _ONSET: Final = (0.12e6, 0.16e6)
-"""The last printed Kp without and the first one with an overshoot, s/m."""
+_PRINTED_ONSET: Final = Reference(value=sum(_ONSET) / 2, uncertainty=from_range(_ONSET))
+"""Between the last printed Kp without and the first one with an overshoot, s/m."""
 _RAISED: Final = GAINS[:3]
 _INTEGRAL: Final = 48.0
 """The paper's 0.8 min, s."""
@@ -263,22 +235,18 @@ def proportional_gain(scene: Scene, level: Level, defect: str | None = None) -> 
         (gain for gain in _SEARCHED if _run(scene, gain, scene.controller.integral_time).overshoots > 0),
         _SEARCHED[-1],
     )
-    table = Table(
-        name="target-vector algorithm, proportional part alone, 10 micrometres at 90 degrees",
-        columns={
-            "Kp": list(runs),
-            "overshoots": [float(run.overshoots) for run in runs.values()],
-            "misadjustments": [float(run.misadjustments) for run in runs.values()],
-            "settled after": [settled_after([run]) for run in runs.values()],
-        },
-        units={"Kp": "s/m", "settled after": "s"},
+    table = runs_table(
+        "target-vector algorithm, proportional part alone, 10 micrometres at 90 degrees",
+        {"Kp": list(runs)},
+        [[run] for run in runs.values()],
+        shown=("overshoots", "misadjustments", "settled after"),
+        units={"Kp": "s/m"},
     )
     named = {f"Kp = {gain * 1e-6:.2f} s/um": run for gain, run in runs.items()}
     return Evidence(
-        found={"onset": Found(value=onset), "overshoot_turn": _turn(scene)},
-        reference={
-            "onset": Reference(value=sum(_ONSET) / 2, uncertainty=from_range(_ONSET)),
-            "overshoot_turn": Reference(value=math.pi),
+        found={
+            "onset": Found(value=onset, reference=_PRINTED_ONSET),
+            "overshoot_turn": _turn(scene).against(math.pi),
         },
         numbers={
             "rate_um": rate * 1e6,
@@ -330,14 +298,12 @@ def _turn(scene: Scene) -> Found:
     return Found(value=turn, numerical=1e-9)
 
 
-def gain_speed_ends(scene: Scene) -> Evidence:
-    """Without the gains beyond those that are judged."""
-    return Evidence(found=as_found(least_ratio=_least_ratio(_settling_times(scene, _RAISED))))
-
-
 def gain_speed(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """Settling time of the target-vector algorithm over Kp."""
-    times = _settling_times(scene, GAINS)
+    # The phase of the start makes no difference to this law.
+    groups = (runs_with(scene, proportional=gain, integral_time=None, derivative_time=0.0) for gain in GAINS)
+    times = np.array([[slowest_within(scene, [run]) for run in group] for group in groups])
+    raised = times[: len(_RAISED)]
     periods = [f"period {period:g} s" for period in PERIODS]
     table = Table(
         name="settling time, proportional part alone, 10 micrometres at 90 degrees",
@@ -345,21 +311,10 @@ def gain_speed(scene: Scene, level: Level, defect: str | None = None) -> Evidenc
         units={"Kp": "s/m", **dict.fromkeys(periods, "s")},
     )
     return Evidence(
-        found=as_found(least_ratio=_least_ratio(times[: len(_RAISED)])),
-        numbers={"periods": len(PERIODS), "beyond": float(np.max(times[-1] / times[-2]))},
+        found=as_found(least_ratio=np.min(raised[:-1] / raised[1:])),
+        numbers={"periods": len(PERIODS), "beyond": np.max(times[-1] / times[-2])},
         tables=(table,),
     )
-
-
-def _settling_times(scene: Scene, gains: tuple[float, ...]) -> FloatArray:
-    """s, shape (gains, periods); the phase of the start makes no difference to this law."""
-    groups = (runs_with(scene, proportional=gain, integral_time=None, derivative_time=0.0) for gain in gains)
-    return np.array([[slowest_within(scene, [run]) for run in group] for group in groups])
-
-
-def _least_ratio(times: FloatArray) -> float:
-    """Of the settling time at one gain to that at the next."""
-    return float(np.min(times[:-1] / times[1:]))
 
 
 def integral_time_ends(scene: Scene) -> Evidence:
@@ -372,20 +327,20 @@ def integral_time(scene: Scene, level: Level, defect: str | None = None) -> Evid
     """Overshoots of the target-vector algorithm over the integral time."""
     small = None if defect == "integral_left_out" else _SMALL
     runs = {time: _integrating(scene, time) for time in _INTEGRALS}
-    fractions = {time: overshooting(group) for time, group in runs.items()}
-    most = [float(max(run.overshoots for run in group)) for group in runs.values()]
-    table = Table(
-        name="overshoots over the integral time, Kp = 0.08 s/um",
-        columns={
-            "integral time": ["none" if time is None else time for time in _INTEGRALS],
-            "runs that overshoot": list(fractions.values()),
-            "most in one run": most,
-        },
+    table = runs_table(
+        "overshoots over the integral time, Kp = 0.08 s/um",
+        {"integral time": ["none" if time is None else time for time in _INTEGRALS]},
+        list(runs.values()),
+        shown=("runs that overshoot", "most in one run"),
         units={"integral time": "s"},
     )
     return Evidence(
-        found=as_found(fraction_small=fractions[small], fraction_set=fractions[_INTEGRAL]),
-        numbers={"runs": len(runs[_INTEGRAL]), "periods": len(PERIODS), "most": most[-1]},
+        found=as_found(fraction_small=overshooting(runs[small]), fraction_set=overshooting(runs[_INTEGRAL])),
+        numbers={
+            "runs": len(runs[_INTEGRAL]),
+            "periods": len(PERIODS),
+            "most": max(run.overshoots for run in runs[_INTEGRALS[-1]]),
+        },
         tables=(table,),
     )
 

@@ -19,7 +19,6 @@ from ringbalance.verification.evidence import (
     Evidence,
     Found,
     Level,
-    Reference,
     Table,
     figure,
 )
@@ -112,7 +111,7 @@ def _terms(scene: Scene, length: float) -> dict[str, float]:
     half_width = float(loss.uncertainty_parts["bends"][0])
     return {
         "friction": float(loss.terms["friction"][0]) + arcs,
-        "rotation": float(loss.terms["rotation"][0]),
+        "rotation": loss.terms["rotation"][0],
         "bends": bends,
         "bends_half_width": half_width,
         "shift": 2 * shift,
@@ -155,15 +154,14 @@ def bent_tube_3d(scene: Scene, level: Level, defect: str | None = None) -> Evide
     }
     return Evidence(
         found={
-            "straight": Found(value=_straight(flow, scene)),
-            "explained": Found(value=found / explained, numerical=half_width / explained / 2),
+            "straight": Found(value=_straight(flow, scene)).against(1.0),
+            "explained": Found(value=found / explained, numerical=half_width / explained / 2).against(1.0),
             "convergence": Found(value=half_width / found),
         },
-        reference=dict.fromkeys(("straight", "explained"), Reference(value=1.0)),
         numbers={
             **terms,
             "k": found,
-            "unknowns": float(flow.solution.statistics.unknowns),
+            "unknowns": flow.solution.statistics.unknowns,
             "rotation_reynolds": _rotation(scene),
             "reynolds": REYNOLDS,
             "bends_found": found - plain,

@@ -48,10 +48,13 @@ from ringbalance.verification.papers import (
 from ringbalance.verification.reference.chambers import central_lambda, exact_moment
 
 _LAMBDA_DIGIT: Final = 1e-3
-_LAMBDA_UNCERTAINTY: Final = math.hypot(
-    from_half_width(LAMBDA_TOLERANCE * paper.PAPER_LAMBDA), from_rounding(_LAMBDA_DIGIT)
+_PRINTED_LAMBDA: Final = Reference(
+    value=paper.PAPER_LAMBDA,
+    uncertainty=math.hypot(
+        from_half_width(LAMBDA_TOLERANCE * paper.PAPER_LAMBDA), from_rounding(_LAMBDA_DIGIT)
+    ),
 )
-"""Standard uncertainty from the stated error range and the rounding, m."""
+"""With the stated error range and the rounding, m."""
 
 
 def volume(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -68,11 +71,17 @@ def volume(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         return 2 * disc.axial_width * float(liquid_area(disc=disc, surface_radius=radius))
 
     departure = partial(_volume_from_departure, scene)
-    rounding = input_uncertainty([(departure, DEPARTURE_LOW.value, from_rounding(DEPARTURE_LOW.last_digit))])
+    rounding = input_uncertainty([(departure, DEPARTURE_LOW.value, DEPARTURE_LOW.uncertainty)])
     found = {
-        "volume": Found(value=from_radius(RING_RADIUS.value), input=rounded_radius(from_radius)),
+        "volume": Found(
+            value=from_radius(RING_RADIUS.value),
+            input=rounded_radius(from_radius),
+            reference=CHAMBER_VOLUME,
+        ),
         "volume_from_departure": Found(
-            value=departure(DEPARTURE_LOW.value), input=math.hypot(rounding, rounded_radius(liquid))
+            value=departure(DEPARTURE_LOW.value),
+            input=math.hypot(rounding, rounded_radius(liquid)),
+            reference=CHAMBER_VOLUME,
         ),
     }
     by_eq_4 = chamber_volume(disc=disc)
@@ -89,7 +98,6 @@ def volume(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     half_width = COVERAGE_FACTOR * rounded_radius(partial(_plate_from_radius, disc))
     return Evidence(
         found=found | as_found(flat_strip=flat_strip),
-        reference=dict.fromkeys(found, CHAMBER_VOLUME.reference),
         numbers={
             "plate_thickness": disc.plate_thickness,
             "plate_from_radius": _plate_from_radius(disc, RING_RADIUS.value),
@@ -135,13 +143,10 @@ def ring_radius(scene: Scene, level: Level, defect: str | None = None) -> Eviden
         Curve("no plates", "m", surface_radius(disc=bare, fill_ratio=x), style="reference"),
     )
     return Evidence(
-        found=as_found(
-            ring_radius=_half_full_radius(disc), max_liquid=0.5 * whole, initial_liquid=0.25 * whole
-        ),
-        reference={
-            "ring_radius": RING_RADIUS.reference,
-            "max_liquid": MAX_LIQUID_VOLUME.reference,
-            "initial_liquid": INITIAL_LIQUID_VOLUME.reference,
+        found={
+            "ring_radius": Found(value=_half_full_radius(disc), reference=RING_RADIUS),
+            "max_liquid": Found(value=0.5 * whole, reference=MAX_LIQUID_VOLUME),
+            "initial_liquid": Found(value=0.25 * whole, reference=INITIAL_LIQUID_VOLUME),
         },
         numbers={"radius_bare": _half_full_radius(bare)},
         series=(shown,),
@@ -175,14 +180,14 @@ def moment(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
     return Evidence(
         found={
-            "moment": found,
-            "arithmetic": Found(value=unrounded, input=rounded_radius(partial(_eq_7, disc))),
-            "without_plates": found_of(without, "moment", 0).scaled(
-                angle / _eq_7(bare, _radius_by_eq_3(bare))
+            "moment": found.against(CHAMBER_MOMENT),
+            "arithmetic": Found(
+                value=unrounded, input=rounded_radius(partial(_eq_7, disc)), reference=CHAMBER_MOMENT
             ),
+            "without_plates": found_of(without, "moment", 0)
+            .scaled(angle / _eq_7(bare, _radius_by_eq_3(bare)))
+            .against(1.0),
         },
-        reference=dict.fromkeys(("moment", "arithmetic"), CHAMBER_MOMENT.reference)
-        | {"without_plates": Reference(value=1.0)},
         numbers={
             "rounded": rounded,
             "rounding_step": abs(unrounded - rounded),
@@ -222,10 +227,12 @@ def disc_capacity(scene: Scene, level: Level, defect: str | None = None) -> Evid
         Curve("found", "kg m", largest),
         Curve("Eq. 8", "kg m", np.full(angle.shape, DISC_MOMENT.value), style="paper"),
     )
-    rounding = CHAMBER_MOMENT.reference.uncertainty * math.sqrt(2)
+    rounding = CHAMBER_MOMENT.uncertainty * math.sqrt(2)
     return Evidence(
-        found={"capacity": both, "arithmetic": Found(value=printed, input=rounding)},
-        reference=dict.fromkeys(("capacity", "arithmetic"), DISC_MOMENT.reference),
+        found={
+            "capacity": both.against(DISC_MOMENT),
+            "arithmetic": Found(value=printed, input=rounding, reference=DISC_MOMENT),
+        },
         numbers={"guaranteed": chamber},
         series=(shown,),
         status=ring_of(given, (given.disc.max_fill_ratio,)).status,
@@ -244,10 +251,9 @@ def density(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     oil = liquid_at(name="perfluorinated oil GPL 101", temperature=293.15).density
     return Evidence(
         found={
-            "ratio": Found(value=ratio, numerical=ratio * below.numerical / below.value),
-            "dense_capacity": capacity,
+            "ratio": Found(value=ratio, numerical=ratio * below.numerical / below.value).against(2.0),
+            "dense_capacity": capacity.against(DENSE_DISC_MOMENT),
         },
-        reference={"ratio": Reference(value=2.0), "dense_capacity": DENSE_DISC_MOMENT.reference},
         numbers={"oil_density": oil, "oil_capacity": capacity.value * oil / twice},
         status=dense.status,
     )
@@ -279,10 +285,9 @@ def lever(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
     return Evidence(
         found={
-            "central": dataclasses.replace(central, corrected=bare),
+            "central": dataclasses.replace(central, corrected=bare, reference=_PRINTED_LAMBDA),
             "variation": Found(value=float(np.ptp(curve)) / central.value),
         },
-        reference={"central": Reference(value=paper.PAPER_LAMBDA, uncertainty=_LAMBDA_UNCERTAINTY)},
         numbers={"bare": bare},
         series=(shown,),
         convergence=(mesh_table(ring, "moment_per_volume", "kg/m^2", middle),),
@@ -309,13 +314,12 @@ def correction(scene: Scene, level: Level, defect: str | None = None) -> Evidenc
         },
         units={"one chamber": "kg m", "disc": "kg m"},
     )
-    spread = _LAMBDA_UNCERTAINTY / paper.PAPER_LAMBDA
+    spread = _PRINTED_LAMBDA.uncertainty / _PRINTED_LAMBDA.value
     return Evidence(
         found={
-            "chamber": Found(value=chamber, input=spread * chamber),
-            "disc": Found(value=both, input=spread * both),
+            "chamber": Found(value=chamber, input=spread * chamber, reference=CHAMBER_MOMENT),
+            "disc": Found(value=both, input=spread * both, reference=DISC_MOMENT),
         },
-        reference={"chamber": CHAMBER_MOMENT.reference, "disc": DISC_MOMENT.reference},
         numbers={
             "exact": exact,
             "halved": chamber / 2,

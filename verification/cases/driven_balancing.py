@@ -28,16 +28,15 @@ from ringbalance.verification.evidence import (
     Evidence,
     Found,
     Level,
-    Reference,
     Series,
     as_found,
     figure,
-    from_rounding,
+    printed,
 )
 from ringbalance.verification.papers import at_constant_speed, changed, convergence_time, envelope, thinned
 
 _RPM: Final = 30 / np.pi
-_CRITICAL: Final = Reference(value=135.0, uncertainty=from_rounding(1.0))
+_CRITICAL: Final = printed(135.0, last_digit=1.0)
 """Printed, rpm."""
 _SHOWN: Final = 12.0
 """s."""
@@ -66,8 +65,10 @@ def run_up(scene: EccentricScene, level: Level, defect: str | None = None) -> Ev
     peak = largest if defect else float(np.max(balanced.amplitude[balanced.time >= begins]))
     runs = {"locked": locked, "balanced at 100 rpm": balanced}
     return Evidence(
-        found={"critical": Found(value=critical, corrected=without), "peak": Found(value=peak / largest)},
-        reference={"critical": _CRITICAL},
+        found={
+            "critical": Found(value=critical, corrected=without, reference=_CRITICAL),
+            "peak": Found(value=peak / largest),
+        },
         numbers={
             "locked": largest,
             "balanced": peak,
@@ -157,9 +158,9 @@ def positioning(scene: EccentricScene, level: Level, defect: str | None = None) 
     return Evidence(
         found=as_found(ratio=np.max(found.positioned / found.before)),
         numbers={
-            "before": float(found.before[0]),
-            "first": float(found.positioned[0]),
-            "second": float(found.positioned[1]),
+            "before": found.before[0],
+            "first": found.positioned[0],
+            "second": found.positioned[1],
             "arrived": max(arrived),
         },
         series=(_amplitudes("amplitude", found.runs, until=_SHOWN), angles),
@@ -176,9 +177,9 @@ def fine_tuning(scene: EccentricScene, level: Level, defect: str | None = None) 
             left=np.min(found.positioned / found.before), ended=np.max(found.after / found.before)
         ),
         numbers={
-            "left_m": float(found.positioned.min()),
-            "end": float(found.after.max()),
-            "time": float(max(settled)),
+            "left_m": found.positioned.min(),
+            "end": found.after.max(),
+            "time": max(settled),
         },
         series=(_amplitudes("amplitude", found.runs),),
     )

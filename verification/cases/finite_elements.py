@@ -24,7 +24,7 @@ from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
 from ringbalance.scene.platform.files import cache_folder
-from ringbalance.verification.evidence import Evidence, Level, Reference, Table, as_found
+from ringbalance.verification.evidence import Evidence, Level, Table, as_found
 from ringbalance.verification.extremes.point import Ending
 from ringbalance.verification.extremes.study import SIZES, Size, find_extremes
 from ringbalance.verification.finite_elements import found_of, mesh_table, mutated_force, ring_of
@@ -317,8 +317,8 @@ def extremes(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found=as_found(broken=result.broken(), worst=worst),
         numbers={
-            "judged": float(document["judged"]),
-            "points": float(document["points"]),
+            "judged": document["judged"],
+            "points": document["points"],
             "residual": document["worst_residual"],
             "worst": worst,
             **{ending.name.lower(): float(document["endings"][str(ending)]) for ending in named},
@@ -404,20 +404,18 @@ def independent_routes(scene: Scene, level: Level, defect: str | None = None) ->
     """Wall pressure, moment, volume and lambda by three routes: two meshes and closed forms."""
     exact = exact_totals(scene)
     exact["volume"] *= scene.disc.max_fill_ratio
-    reference = {"lambda_2d": Reference(value=exact.pop("lambda"))}
-    reference |= {f"{name}_{d}d": Reference(value=value) for name, value in exact.items() for d in (2, 3)}
     rings = {dimension: _ring(scene, dimension, defect) for dimension in (2, 3)}
     found = {
-        f"{name.removeprefix('liquid_')}_{d}d": found_of(ring, name, 0)
+        f"{short}_{d}d": found_of(ring, name, 0).against(exact[short])
         for d, ring in rings.items()
         for name in _SCALARS
+        for short in [name.removeprefix("liquid_")]
     }
-    centre = _ring(scene, 2, defect, share=0.5)
-    found["lambda_2d"] = found_of(centre, "moment_per_volume", 0).scaled(2 / scene.liquid.density)
+    centre = found_of(_ring(scene, 2, defect, share=0.5), "moment_per_volume", 0)
+    found["lambda_2d"] = centre.scaled(2 / scene.liquid.density).against(exact["lambda"])
     moment = found["moment_2d"]
     return Evidence(
         found=found,
-        reference=reference,
         numbers={"moment_share": abs(moment.value - exact["moment"]) / (2 * moment.numerical)},
         convergence=tuple(mesh_table(rings[2], name, unit, 0) for name, unit in _SCALARS.items()),
         status=rings[2].status,

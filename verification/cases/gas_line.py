@@ -34,7 +34,6 @@ from ringbalance.verification.evidence import (
     Found,
     Level,
     NotRunError,
-    Reference,
     Series,
     as_found,
     figure,
@@ -103,7 +102,7 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         },
         numbers={
             "best_radius": best,
-            "hole_radius": float(np.abs(hole).mean()),
+            "hole_radius": np.abs(hole).mean(),
             "max_fill": disc.max_fill_ratio,
             "safe_running": safe["running"],
             "safe_stopped": safe["stopped"],
@@ -331,15 +330,14 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         found={
             name: Found(
                 value=float(value), numerical=from_half_width((float(share) + 1e-8) * abs(float(value)))
-            )
+            ).against(exact[name])
             for name, (value, share) in values.items()
         },
-        reference={name: Reference(value=value) for name, value in exact.items()},
         numbers={
             **{f"{name}_change": exact[name] / bare[name] - 1 for name in ("volume", "moment", "lever")},
             "thickness": 2 * _RADIUS,
             "tip": _TIP,
-            "ring_radius": float(surface_radius(disc=scene.disc, fill_ratio=largest)),
+            "ring_radius": surface_radius(disc=scene.disc, fill_ratio=largest),
             "safe_stopped": hole["safe_stopped"],
             "safe_running": hole["safe_running"],
         },

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from ringbalance.mesh.geometry import surface_radius
-from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.law.flow_law import FlowLaw
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
@@ -20,7 +19,6 @@ from ringbalance.verification.evidence import (
     Found,
     Level,
     NotRunError,
-    Reference,
     Series,
     as_found,
     figure,
@@ -48,7 +46,7 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
 
     def priming(radius: float) -> float:
         """Gas pressure that lifts an almost empty chamber's liquid over the crest, the other side vented."""
-        return hydrostatic_pressure(density=DENSITY, angular_velocity=omega, inner=radius, outer=outer)
+        return DENSITY * omega**2 * (outer**2 - radius**2) / 2
 
     stall = paper.stall_pressure(disc=scene.disc, density=DENSITY, angular_velocity=omega)
     velocity_high = paper.velocity_from_pressures(
@@ -65,12 +63,14 @@ def working_pressure(scene: Scene, level: Level, defect: str | None = None) -> E
         Curve("stall by Eq. 19", "Pa", np.full(radius.shape, stall), style="reference"),
     )
     return Evidence(
-        found=as_found(by_eq_19=stall, by_priming=priming(crest)),
-        reference=dict.fromkeys(("by_eq_19", "by_priming"), LOWEST_PRESSURE.reference),
+        found={
+            "by_eq_19": Found(value=stall, reference=LOWEST_PRESSURE),
+            "by_priming": Found(value=priming(crest), reference=LOWEST_PRESSURE),
+        },
         numbers={
-            "by_ring": float(wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY)),
+            "by_ring": wall_pressure_of(scene, scene.disc.max_fill_ratio, density=DENSITY),
             "scene_hump": crest,
-            "velocity_high": float(velocity_high),
+            "velocity_high": velocity_high,
         },
         series=(shown,),
     )
@@ -95,12 +95,11 @@ def denser_liquid(scene: Scene, level: Level, defect: str | None = None) -> Evid
         min(own, full - residual_fill_ratio(scene, law=law)) for law, own in zip(laws, reach, strict=True)
     ]
     return Evidence(
-        found={
-            "gain": Found(value=_gain(scene, laws), numerical=_STANDARD, corrected=raised),
-            "gain_raised": Found(value=raised, numerical=_STANDARD),
-        },
         # Twice the density, twice the ability.
-        reference=dict.fromkeys(("gain", "gain_raised"), Reference(value=2.0)),
+        found={
+            "gain": Found(value=_gain(scene, laws), numerical=_STANDARD, corrected=raised).against(2.0),
+            "gain_raised": Found(value=raised, numerical=_STANDARD).against(2.0),
+        },
         numbers={
             "stall_light": stalls[0],
             "stall_dense": stalls[1],
@@ -175,7 +174,7 @@ def _priming(scene: Scene, density: float) -> float:
     if crest is None:
         return 0.0
     level = float(surface_radius(disc=scene.disc, fill_ratio=scene.disc.max_fill_ratio / 2))
-    return max(hydrostatic_pressure(density=density, angular_velocity=omega, inner=crest, outer=level), 0.0)
+    return max(density * omega**2 * (level**2 - crest**2) / 2, 0.0)
 
 
 def _over_gas_pressure(scene: Scene, laws: Sequence[FlowLaw]) -> Series:

@@ -20,15 +20,23 @@ from ringbalance.mesh.wall_integrals import (
     walls_about,
 )
 from ringbalance.physics.convergence import gci
-from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.physics.pressure.loads import ImportedRing, solved_ring
 from ringbalance.physics.pressure.solve import quadratic_basis, side, solve_on
 from ringbalance.reduced_model.chamber.values import chamber_closed_forms
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.chamber_file.record import CellKind, ChamberGeometry
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Evidence, Found, Level, Reference, as_found, from_half_width
-from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found, relative_rms
+from ringbalance.verification.evidence import (
+    Convergence,
+    Evidence,
+    Found,
+    Level,
+    as_found,
+    from_half_width,
+    order_figure,
+    orders_found,
+)
+from ringbalance.verification.finite_elements import relative_rms
 from ringbalance.verification.reference.chambers import block_chamber, disc_chamber, exact_totals
 from ringbalance.verification.reference.pressure import Manufactured
 
@@ -65,16 +73,14 @@ def totals(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     )
     exact = exact_totals(scene)
     exact["lever"] = exact.pop("lambda")
+    found = {name: _converged(row) for name, row in zip(("volume", "moment", "lever"), rows, strict=True)}
+    found["wall_pressure"] = Found(
+        value=float(ring.wall_pressure.value),
+        numerical=from_half_width(float(ring.wall_pressure.uncertainty)),
+        conclusive=ring.status.ok,
+    )
     return Evidence(
-        found={
-            **{name: _converged(row) for name, row in zip(("volume", "moment", "lever"), rows, strict=True)},
-            "wall_pressure": Found(
-                value=float(ring.wall_pressure.value),
-                numerical=from_half_width(float(ring.wall_pressure.uncertainty)),
-                conclusive=ring.status.ok,
-            ),
-        },
-        reference={name: Reference(value=value) for name, value in exact.items()},
+        found={name: each.against(exact[name]) for name, each in found.items()},
         numbers={"cells": float(len(records[0].cells))},
     )
 
@@ -99,9 +105,7 @@ def pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     disc, sizes, omega = scene.disc, _LEVELS[level], scene.rotor.speed
     field, wall = _studies(disc, sizes, defect if defect in _MANUFACTURED else None)
     a = float(surface_radius(disc=disc, fill_ratio=_FILL))
-    exact = hydrostatic_pressure(
-        density=scene.liquid.density, angular_velocity=omega, inner=a, outer=disc.outer_radius
-    )
+    exact = scene.liquid.density * omega**2 * (disc.outer_radius**2 - a**2) / 2
     cut = 1.01 * a if defect == "surface_off_by_a_percent" else a
     curved, straight = (_ring(scene, sizes[1], kind, cut) for kind in ("hexahedron27", "hexahedron"))
     off = [abs(float(ring.wall_pressure.value) - exact) for ring in (curved, straight)]
@@ -122,10 +126,7 @@ def pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         ),
         numbers={"straight": off[1] / exact, "unknowns": float(curved.statistics.unknowns)},
         series=(order_figure({"pressure field": field, "force on the outer wall": wall}),),
-        convergence=(
-            field.table("pressure field, relative error", 3.0),
-            wall.table("force on the outer wall, relative error", 4.0),
-        ),
+        convergence=(field, wall),
     )
 
 
@@ -140,7 +141,7 @@ def _ring(scene: Scene, size: int, kind: CellKind, a: float) -> ImportedRing:
 
 
 @lru_cache(maxsize=8)
-def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> tuple[OrderStudy, OrderStudy]:
+def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> tuple[Convergence, Convergence]:
     """Of the manufactured field, root mean square, and of its force on the outer wall."""
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
     radius = float(surface_radius(disc=disc, fill_ratio=_FILL))
@@ -155,8 +156,11 @@ def _studies(disc: Disc, sizes: tuple[int, ...], defect: str | None) -> tuple[Or
         force = np.sum(wall.weights * exact.pressure(wall.points))
         errors.append((field, abs(np.sum(wall.weights * wall.at_points(values)) / force - 1)))
     field, wall = np.transpose(errors).tolist()
-    steps = [1 / size for size in sizes]
-    return OrderStudy.of(size=steps, error=field), OrderStudy.of(size=steps, error=wall)
+    study, steps = Convergence.of_errors, [1 / size for size in sizes]
+    return (
+        study("pressure field, relative error", 3.0, size=steps, error=field),
+        study("force on the outer wall, relative error", 4.0, size=steps, error=wall),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,16 +205,18 @@ def round_chamber(scene: Scene, level: Level, defect: str | None = None) -> Evid
     )
     size = [1 / n for n in cells]
     studies = {
-        name: OrderStudy.of(size=size, error=errors[:, 0].tolist())
-        for name, errors in (("round", quadratic), ("straight", straight))
+        name: Convergence.of_errors(
+            "volume and moment", order, size=size, error=errors[:, 0].tolist(), geometry=geometry
+        )
+        for name, errors, order, geometry in (
+            ("round", quadratic, 4.0, "quadratic"),
+            ("straight", straight, 2.0, "straight"),
+        )
     }
     return Evidence(
         found=orders_found(studies) | as_found(tilted_error=quadratic[-1, 2], lever_error=quadratic[-1, 1]),
         numbers={"facets": 4.0 * cells[-1]},
-        convergence=(
-            studies["round"].table("volume and moment", 4.0, geometry="quadratic"),
-            studies["straight"].table("volume and moment", 2.0, geometry="straight"),
-        ),
+        convergence=tuple(studies.values()),
     )
 
 

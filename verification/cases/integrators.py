@@ -29,18 +29,17 @@ from ringbalance.reduced_model.paper import stall_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene, Tube
 from ringbalance.verification.evidence import (
+    Convergence,
     Curve,
     Evidence,
     Found,
     Level,
     NotRunError,
-    Reference,
     Series,
     as_found,
     figure,
     from_half_width,
 )
-from ringbalance.verification.finite_elements import OrderStudy
 
 _SHARE: Final = 0.9
 """Of the time until the chamber is empty or the flow stalls; at a stall itself no scheme has its order."""
@@ -170,8 +169,11 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     if defect == "frozen_velocity":
         first = float(operation.velocity(operation.fill))
         moved = [first * operation.exchange_rate * duration] * len(_COUNTS)
-    study = OrderStudy.of(
-        size=[_COUNTS[0] / count for count in _COUNTS], error=[abs(one / exact - 1) for one in moved]
+    study = Convergence.of_errors(
+        "moved fill ratio, relative",
+        1.0,
+        size=[_COUNTS[0] / count for count in _COUNTS],
+        error=[abs(one / exact - 1) for one in moved],
     )
     # Richardson's extrapolation at first order; half of the last correction bounds what it has left.
     limit = moved[-1] + (moved[-1] - moved[-2])
@@ -180,15 +182,16 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "error of the moved fill against the number of segments",
         ("segments", "1", counts),
         Curve("Eq. 20", "1", np.array(study.error), style="paper"),
-        Curve("first order", "1", study.error[0] * counts[0] / counts, style="reference"),
+        Curve("first order", "1", (study.error or ())[0] * counts[0] / counts, style="reference"),
         log=True,
     )
     return Evidence(
         found={
-            "moved_fill": Found(value=limit, numerical=from_half_width(abs(limit - moved[-1]) / 2)),
+            "moved_fill": Found(value=limit, numerical=from_half_width(abs(limit - moved[-1]) / 2)).against(
+                exact
+            ),
             **as_found(order=study.settled_order, finest_error=study.finest_error),
         },
-        reference={"moved_fill": Reference(value=exact)},
         numbers={
             "duration": duration,
             "moved": exact,
@@ -199,7 +202,7 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "short_segments": _segments_for(operation, _SHORT * duration, 1e-3),
         },
         series=(shown,),
-        convergence=(study.table("moved fill ratio, relative", 1.0),),
+        convergence=(study,),
     )
 
 
@@ -298,10 +301,10 @@ def _stall_study(
     # Durations differ a little between the runs of one count, so each is compared with its own bound.
     share = over / (bound[:, None] * _PHASES**2)
     judged = {
-        "overshoot_share": float(share.max()),
+        "overshoot_share": share.max(),
         # At the number of segments where it is least: the bound is met, not only kept.
-        "overshoot_reach": float(share.max(axis=1).min()),
-        "cycle_error": float(np.max(np.abs(cycle / bound - 1))),
+        "overshoot_reach": share.max(axis=1).min(),
+        "cycle_error": np.max(np.abs(cycle / bound - 1)),
         "limit_error": max(abs(_longest(operation, stall, d) * rate / math.sqrt(d) - 1) for d in _STARTS),
     }
     drawn = figure(

@@ -105,8 +105,8 @@ def rough_tubes(scene: Scene, level: Level, defect: str | None = None) -> Eviden
         numbers={
             **statistics.numbers(),
             **beside_judged(points),
-            "worst": float(np.max(points.predicted / points.measured - 1)),
-            "rough_points": float(rough.points),
+            "worst": np.max(points.predicted / points.measured - 1),
+            "rough_points": rough.points,
             "rough_bias": rough.bias,
             "rough_standard_deviation": rough.standard_deviation,
         },
@@ -135,9 +135,9 @@ def ducts(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         found=as_found(share_within=whole.share_within, laminar=abs(laminar.bias)),
         numbers={
             **whole.numbers(),
-            "laminar_points": float(laminar.points),
+            "laminar_points": laminar.points,
             "laminar_bias": laminar.bias,
-            "turbulent_points": float(turbulent.points),
+            "turbulent_points": turbulent.points,
             "turbulent_bias": turbulent.bias,
             "turbulent_standard_deviation": turbulent.standard_deviation,
             **beside_judged(narrow, {"wide": points.where(wide)}),
@@ -166,7 +166,7 @@ def laminar_tubes(scene: Scene, level: Level, defect: str | None = None) -> Evid
     more = {
         **beside_judged(compare(judged, mutation=defect), left_out, taught=int(taught.sum())),
         "laminar_points": found.numbers["points"],
-        "long_worst": float(np.max(np.abs(uncut.predicted / uncut.measured - 1))),
+        "long_worst": np.max(np.abs(uncut.predicted / uncut.measured - 1)),
     }
     return dataclasses.replace(found, numbers={**found.numbers, **more})
 
@@ -230,17 +230,20 @@ def rotor(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     return Evidence(
         found={
             # Two washers taught the coefficient, so their error counts n/2 times, as sqrt(2) of one.
-            f"washers_{count}": Found(value=float(predicted[count]), input=spread * count / math.sqrt(2))
+            f"washers_{count}": Found(
+                value=float(predicted[count]),
+                input=spread * count / math.sqrt(2),
+                reference=_amplitude(readings[count], count),
+            )
             for count in _PREDICTED
         },
-        reference={f"washers_{count}": _amplitude(readings[count], count) for count in _PREDICTED},
         numbers={
-            "points": float(sum(readings[count].size for count in _PREDICTED)),
-            "taught_points": float(sum(readings[count].size for count in _TAUGHT)),
+            "points": sum(readings[count].size for count in _PREDICTED),
+            "taught_points": sum(readings[count].size for count in _TAUGHT),
             "worst_mean": max((predicted[n] / amplitudes[n] - 1 for n in _PREDICTED), key=abs),
             "influence_coefficient": kappa,
-            "balls_up": float(np.mean(_readings(run, "abb_runup", 4))),
-            "balls_down": float(np.mean(_readings(run, "abb_rundown", 4))),
+            "balls_up": np.mean(_readings(run, "abb_runup", 4)),
+            "balls_down": np.mean(_readings(run, "abb_rundown", 4)),
         },
         series=(shown,),
     )

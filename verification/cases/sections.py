@@ -38,15 +38,18 @@ from ringbalance.physics.tube.rotation_table import rotating_friction_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
+    Convergence,
     Curve,
     Evidence,
+    Found,
     Level,
-    Reference,
     Table,
     as_found,
     figure,
+    order_figure,
+    orders_found,
 )
-from ringbalance.verification.finite_elements import OrderStudy, order_figure, orders_found, relative_rms
+from ringbalance.verification.finite_elements import relative_rms
 from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSystem
 from ringbalance.verification.navier_stokes.newton import Factors, FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.tube import (
@@ -129,12 +132,12 @@ def rotating_section(scene: Scene, level: Level, defect: str | None = None) -> E
         log=True,
     )
     return Evidence(
-        found=as_found(at_rest=abs(rest - 1), slow=slow, inertia=inertia, ekman=gaps[2] / gaps[3]),
-        # Exact limits.
-        reference={
-            "slow": Reference(value=1.0),
-            "inertia": Reference(value=1.0),
-            "ekman": Reference(value=math.sqrt(10)),
+        # Against exact limits.
+        found={
+            "at_rest": Found(value=abs(rest - 1)),
+            "slow": Found(value=slow).against(1.0),
+            "inertia": Found(value=inertia).against(1.0),
+            "ekman": Found(value=float(gaps[2] / gaps[3])).against(math.sqrt(10)),
         },
         numbers={"gap": float(gaps[-1])},
         series=(shown,),
@@ -210,20 +213,23 @@ def manufactured_flow(scene: Scene, level: Level, defect: str | None = None) -> 
     """Orders and finest errors of the manufactured flow on ever finer meshes."""
     around = _AROUND[level]
     solved = [_solve(count, _SPOILED[defect]) for count in around]
-    size = [around[0] / count for count in around]
-    flow = OrderStudy.of(size=size, error=[_velocity_error(*pair) for pair in solved])
-    stress = OrderStudy.of(size=size, error=[_pressure_error(*pair) for pair in solved])
     unknowns = [system.unknowns for system, _ in solved]
-    note = f"unknowns {', '.join(map(str, unknowns))}"
-    studies = {"velocity": flow, "pressure": stress}
+    studies = {
+        name: Convergence.of_errors(
+            f"{name}, relative error",
+            order,
+            size=[around[0] / count for count in around],
+            error=[error(*pair) for pair in solved],
+            geometry="quadratic",
+            note=f"unknowns {', '.join(map(str, unknowns))}",
+        )
+        for name, order, error in (("velocity", 3.0, _velocity_error), ("pressure", 2.0, _pressure_error))
+    }
     return Evidence(
         found=orders_found(studies),
         numbers={"unknowns": float(unknowns[-1])},
         series=(order_figure(studies),),
-        convergence=(
-            flow.table("velocity, relative error", 3.0, geometry="quadratic", note=note),
-            stress.table("pressure, relative error", 2.0, geometry="quadratic", note=note),
-        ),
+        convergence=tuple(studies.values()),
     )
 
 
@@ -283,12 +289,11 @@ def developing_flow(scene: Scene, level: Level, defect: str | None = None) -> Ev
         units={"found": "d", "bound": "d"},
     )
     return Evidence(
-        found=as_found(
-            creeping=np.min(np.abs(rates + exact)) / abs(exact),
-            fast=(fast[1] * step - fast[0]) / (step - 1),
-            bound=shares.max(),
-        ),
-        reference={"fast": Reference(value=_GEOSTROPHIC)},
+        found={
+            "creeping": Found(value=float(np.min(np.abs(rates + exact)) / abs(exact))),
+            "fast": Found(value=(fast[1] * step - fast[0]) / (step - 1)).against(_GEOSTROPHIC),
+            "bound": Found(value=float(shares.max())),
+        },
         numbers={"slower": fast[0], "faster": fast[1], "least": float(shares.min())},
         tables=(table,),
     )

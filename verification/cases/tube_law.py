@@ -44,7 +44,10 @@ _FILLS: Final = np.linspace(0.02, 1.0, 50)
 """In units of the largest."""
 _LEAST: Final = 0.05
 """Smallest head asked for, in units of the gas pressure's: below it lies a stall."""
-_ABOUT: Final = 0.1
+_PRINTED_K: Final = Reference(
+    value=PAPER_DRAG_COEFFICIENT, uncertainty=from_half_width(0.1 * PAPER_DRAG_COEFFICIENT)
+)
+"""About 50."""
 _BORES: Final = (0.5, 0.75, 1.0, 1.5, 2.0)
 """In units of the scene's."""
 _NARROWEST: Final = 0.1
@@ -139,7 +142,9 @@ def drag_coefficient_ends(scene: Scene) -> Evidence:
     return Evidence(
         found={
             "k_scene": Found(
-                value=float(middle.k.value[0]), input=from_half_width(float(middle.k.uncertainty[0]))
+                value=float(middle.k.value[0]),
+                input=from_half_width(float(middle.k.uncertainty[0])),
+                reference=_PRINTED_K,
             ),
             "fill_spread": Found(value=spread, input=from_half_width(both)),
         }
@@ -156,22 +161,20 @@ def drag_coefficient(scene: Scene, level: Level, defect: str | None = None) -> E
     liquids = {one.name: _under_gas(dataclasses.replace(scene, liquid=one)) for one in _liquids()}
     table, differences = _over_liquids(liquids), _differences(printed, bare)
     of_liquids = [float(run.k.value[0]) for run in liquids.values()]
-    about = from_half_width(_ABOUT * PAPER_DRAG_COEFFICIENT)
     return Evidence(
         found=drag_coefficient_ends(scene).found,
-        reference={"k_scene": Reference(value=PAPER_DRAG_COEFFICIENT, uncertainty=about)},
         numbers={
             "gas": scene.gas.pressure,
-            "velocity": float(middle.velocity[0]),
+            "velocity": middle.velocity[0],
             "bore": scene.tube.bore,
             "times_50": math.sqrt((PAPER_DRAG_COEFFICIENT + 1) / (k + 1)),
             "printed_bore": printed.tube.bore,
             "k_own": k,
             "bare_bore": bare.tube.bore,
-            "bare_k": float(narrow.k.value[0]),
-            "bare_velocity": float(narrow.velocity[0]),
-            "k_low": float(np.min(fills)),
-            "k_high": float(np.max(fills)),
+            "bare_k": narrow.k.value[0],
+            "bare_velocity": narrow.velocity[0],
+            "k_low": np.min(fills),
+            "k_high": np.max(fills),
             "bore_low": min(bores),
             "bore_high": max(bores),
             "liquid_low": min(of_liquids),

@@ -18,7 +18,6 @@ from ringbalance.verification.evidence import (
     Evidence,
     Found,
     Level,
-    Reference,
     Series,
     Table,
     as_found,
@@ -50,15 +49,19 @@ _JUDGED: Final = {"thin": 0, "half": 2, "full": 5}
 _SPEEDS: Final = (0.1, 0.2, 0.5, 1.0)
 """Of the scene's speed, for the table."""
 _PRESSURES: Final = {"low": LOW_PRESSURE, "high": HIGH_PRESSURE}
+_PRINTED: Final = {"low": DEPARTURE_LOW, "high": DEPARTURE_HIGH}
 _POINTS: Final = 41
 
 
 def wall_pressure_ends(scene: Scene) -> Evidence:
     """Eq. 12 against the closed form."""
     pressure = wall_pressure_of(scene, _SHARES * scene.disc.max_fill_ratio)
+    by_eq_12 = _eq_12(scene, scene.disc, _SHARES * scene.disc.max_fill_ratio)
     return Evidence(
-        found=as_found(**{name: pressure[index] for name, index in _JUDGED.items()}),
-        reference=_by_eq_12(scene),
+        found={
+            name: Found(value=float(pressure[index])).against(by_eq_12[index])
+            for name, index in _JUDGED.items()
+        }
     )
 
 
@@ -67,7 +70,8 @@ def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evid
     disc, bare = scene.disc, with_plate(scene.disc, 0.0)
     x = _SHARES * disc.max_fill_ratio
     ring = ring_of(scene, tuple(x.tolist()))
-    shortfall = 1 - _eq_12(scene, disc, x) / ring.wall_pressure.value
+    by_eq_12 = _eq_12(scene, disc, x)
+    shortfall = 1 - by_eq_12 / ring.wall_pressure.value
     without_plates = _eq_12(scene, bare, x)
     # What Eq. 12 gives for a volume is its pressure in a ring that no plates take anything from.
     same_volume = x * chamber_volume(disc=disc) / chamber_volume(disc=bare)
@@ -81,35 +85,29 @@ def wall_pressure(scene: Scene, level: Level, defect: str | None = None) -> Evid
         "pressure on the outer wall",
         ("fill ratio", "1", x),
         Curve("finite elements", "Pa", ring.wall_pressure.value, uncertainty=ring.wall_pressure.uncertainty),
-        Curve("Eq. 12", "Pa", _eq_12(scene, disc, x), style="paper"),
+        Curve("Eq. 12", "Pa", by_eq_12, style="paper"),
     )
     return Evidence(
         found={
             name: dataclasses.replace(
                 found_of(ring, "wall_pressure", index), corrected=float(corrected[index])
-            )
+            ).against(by_eq_12[index])
             for name, index in _JUDGED.items()
         }
-        | {"without_plates": shape.scaled(1 / float(without_plates[-1]))},
-        reference=_by_eq_12(scene) | {"without_plates": Reference(value=1.0)},
+        | {"without_plates": shape.scaled(1 / float(without_plates[-1])).against(1.0)},
         numbers={
-            "shortfall_full": float(shortfall[-1]),
-            "shortfall_thin": float(shortfall[0]),
+            "shortfall_full": shortfall[-1],
+            "shortfall_thin": shortfall[0],
             "bare_difference": float(
                 np.max(np.abs(without_plates / wall_pressure_of(scene, x, disc=bare) - 1))
             ),
-            "gravity": float(gravity.columns["change by gravity"][-1]),
+            "gravity": gravity.columns["change by gravity"][-1],
         },
         series=(over_fill, _over_plates(scene)),
         convergence=(mesh_table(ring, "wall_pressure", "Pa", -1),),
         tables=(gravity,),
         status=ring.status,
     )
-
-
-def _by_eq_12(scene: Scene) -> dict[str, Reference]:
-    pressure = _eq_12(scene, scene.disc, _SHARES * scene.disc.max_fill_ratio)
-    return {name: Reference(value=float(pressure[index])) for name, index in _JUDGED.items()}
 
 
 def _eq_12(scene: Scene, disc: Disc, fill: FloatArray) -> FloatArray:
@@ -154,15 +152,15 @@ def _gravity_table(scene: Scene) -> Table:
         for speed in speeds
     ]
     plain = float(wall_pressure_of(scene, middle)) * np.square(_SPEEDS)
-    mean = np.array([ring.wall_pressure.value[0] for ring in rings])
+    mean, closed = np.array([(ring.wall_pressure.value[0], ring.solved[0]) for ring in rings]).T
     ripple = np.array([ring.ripple["wall_pressure"][0] for ring in rings])
     return Table(
         name="gravity across the shaft: change of the mean wall pressure, and its ripple over a turn",
         columns={
             "speed": speeds,
-            "change by gravity": (mean / plain - 1).tolist(),
+            "change by gravity": np.where(closed, mean / plain - 1, 0.0).tolist(),
             "ripple": (ripple / plain).tolist(),
-            "ring": ["closed" if bool(ring.closed[0]) else "no closed ring" for ring in rings],
+            "ring": ["closed" if each else "no closed ring" for each in closed],
         },
         units={"speed": "rad/s", "change by gravity": "1", "ripple": "1"},
     )
@@ -176,11 +174,15 @@ def velocity_departure_ends(scene: Scene) -> Evidence:
 def velocity_departure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     """The fall under the true wall pressure, by Eq. 19's own arithmetic, and by the calibrated law."""
     given = at_paper_density(scene)
-    physics, printed = _departures(given), {"low": DEPARTURE_LOW, "high": DEPARTURE_HIGH}
+    physics = _departures(given)
     if defect == "eq_12_used":
         physics = {name: found.with_correction() for name, found in physics.items()}
     arithmetic = {
-        f"arithmetic_{name}": Found(value=_eq_19(given, p), input=rounded_radius(partial(_eq_19, given, p)))
+        f"arithmetic_{name}": Found(
+            value=_eq_19(given, p),
+            input=rounded_radius(partial(_eq_19, given, p)),
+            reference=_PRINTED[name],
+        )
         for name, p in _PRESSURES.items()
     }
     share = np.linspace(0, 1, _POINTS)
@@ -188,11 +190,6 @@ def velocity_departure(scene: Scene, level: Level, defect: str | None = None) ->
     laws = {name: _law_velocity(given, pressure, share) for name, pressure in _PRESSURES.items()}
     return Evidence(
         found={**physics, **arithmetic, **as_found(slope=np.min(np.diff(fall)) * (_POINTS - 1))},
-        reference={
-            f"{what}_{name}": number.reference
-            for name, number in printed.items()
-            for what in ("departure", "arithmetic")
-        },
         numbers={
             **{f"rounded_{name}": _eq_19(given, p, RING_RADIUS.value) for name, p in _PRESSURES.items()},
             "shortfall": 1 - _stall_by_eq_12(given) / _full_pressure(given),
@@ -207,7 +204,9 @@ def _departures(scene: Scene) -> dict[str, Found]:
     full = _full_pressure(scene)
     return {
         f"departure_{name}": Found(
-            value=1 - float(np.sqrt((p - full) / (p + full))), corrected=_eq_19(scene, p, RING_RADIUS.value)
+            value=1 - float(np.sqrt((p - full) / (p + full))),
+            corrected=_eq_19(scene, p, RING_RADIUS.value),
+            reference=_PRINTED[name],
         )
         for name, p in _PRESSURES.items()
     }
@@ -282,12 +281,8 @@ def rectangular_element(scene: Scene, level: Level, defect: str | None = None) -
     )
     return Evidence(
         found={
-            "wall_pressure": pressure,
-            "force_balance": force.scaled(1 / (scene.rotor.speed**2 * float(moment))),
-        },
-        reference={
-            "wall_pressure": Reference(value=float(exact[-1])),
-            "force_balance": Reference(value=1.0),
+            "wall_pressure": pressure.against(exact[-1]),
+            "force_balance": force.scaled(1 / (scene.rotor.speed**2 * float(moment))).against(1.0),
         },
         numbers={"whole_ring": 1 - whole_ring / float(exact[-1])},
         series=(shown,),

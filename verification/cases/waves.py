@@ -29,8 +29,7 @@ from ringbalance.physics.sloshing_system import (
 )
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Curve, Evidence, Level, as_found, figure
-from ringbalance.verification.finite_elements import OrderStudy
+from ringbalance.verification.evidence import Convergence, Curve, Evidence, Level, as_found, figure
 from ringbalance.verification.reference.chambers import CosineWaves, disc_chamber
 
 _MODES: Final = 4
@@ -96,11 +95,11 @@ def _overview(scene: Scene, points: int) -> Evidence:
     return Evidence(
         found={},
         numbers={
-            "first": float(ratios[-1, 0]),
+            "first": ratios[-1, 0],
             "third": dict(resonant_fills(disc=disc, modes=_MODES)).get(3, 0.0),
-            "double": float(np.interp(2.0, swings[fills > 0.2], fills[fills > 0.2])),
-            "equal": float(equal.amplification.value[0]),
-            "equal_pressure": float(equal.pressure_amplification.value[0]),
+            "double": np.interp(2.0, swings[fills > 0.2], fills[fills > 0.2]),
+            "equal": equal.amplification.value[0],
+            "equal_pressure": equal.pressure_amplification.value[0],
         },
         series=(frequencies, swinging),
     )
@@ -161,8 +160,8 @@ def _swing_errors(
         for waves, depth in zip(turned, _depths(disc, fills).tolist(), strict=True)
     ]
     return {
-        "forced": float(np.abs(swing.amplification.value / np.array(moments) - 1).max()),
-        "pressure": float(np.abs(swing.pressure_amplification.value / np.array(pressures) - 1).max()),
+        "forced": np.abs(swing.amplification.value / np.array(moments) - 1).max(),
+        "pressure": np.abs(swing.pressure_amplification.value / np.array(pressures) - 1).max(),
     }
 
 
@@ -193,7 +192,7 @@ def imported_waves(scene: Scene, level: Level, defect: str | None = None) -> Evi
             still_error=study.finest_error,
         ),
         series=(shown,),
-        convergence=(study.table("frequencies without Coriolis force, largest relative error", 2.0),),
+        convergence=(study,),
     )
 
 
@@ -210,7 +209,7 @@ def _mutated(defect: str | None) -> Callable[..., SloshingSystem]:
 
 
 @lru_cache(maxsize=2)
-def _still_study(disc: Disc, levels: tuple[int, ...]) -> OrderStudy:
+def _still_study(disc: Disc, levels: tuple[int, ...]) -> Convergence:
     """Frequencies without Coriolis force at half the depth, on meshes that become finer."""
     a = (disc.inner_radius + disc.outer_radius) / 2
     exact = _without_coriolis(disc, np.log(disc.outer_radius / a), _IMPORTED_MODES)
@@ -219,4 +218,5 @@ def _still_study(disc: Disc, levels: tuple[int, ...]) -> OrderStudy:
         cut = middle_section(disc_chamber(disc, (radial, 3 * radial, 2)), surface_radius=a)
         found = _frequencies(section_system(cut.mesh, ends=0.0), 0.0)[:_IMPORTED_MODES]
         errors.append(float(np.abs(found / exact - 1).max()))
-    return OrderStudy.of(size=[1 / n for n in levels], error=errors)
+    quantity = "frequencies without Coriolis force, largest relative error"
+    return Convergence.of_errors(quantity, 2.0, size=[1 / n for n in levels], error=errors)

@@ -16,7 +16,6 @@ import numpy.typing as npt
 from scipy.stats.qmc import Sobol
 
 from ringbalance.mesh.geometry import liquid_first_moment, surface_radius
-from ringbalance.physics.pressure.hydrostatics import hydrostatic_pressure
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.changes import document_of
 from ringbalance.scene.models import Scene
@@ -158,13 +157,9 @@ def _roughness(scene: Scene, value: float, point: Point) -> Changes:
 
 def _pressure(scene: Scene, value: float, point: Point) -> Changes:
     speed = math.pi / 30 * point["speed"] if "speed" in point else scene.rotor.speed
-    column = hydrostatic_pressure(
-        density=scene.liquid.density,
-        angular_velocity=speed,
-        inner=scene.tube.hump_radius or scene.disc.inner_radius,
-        outer=scene.disc.outer_radius,
-    )
-    return {"gas.pressure": value * float(column)}
+    crest = scene.tube.hump_radius or scene.disc.inner_radius
+    column = scene.liquid.density * speed**2 * (scene.disc.outer_radius**2 - crest**2) / 2
+    return {"gas.pressure": value * column}
 
 
 _CHANGES: Final[Mapping[str, Callable[[Scene, float, Point], Changes]]] = MappingProxyType(

@@ -33,15 +33,16 @@ from ringbalance.physics.pressure.surface import solve_with_gravity
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Convergence, Evidence, Found, Level, as_found
-from ringbalance.verification.finite_elements import (
-    OrderStudy,
-    field_error,
-    mutated_force,
+from ringbalance.verification.evidence import (
+    Convergence,
+    Evidence,
+    Found,
+    Level,
+    as_found,
     order_figure,
     orders_found,
-    refined_cells,
 )
+from ringbalance.verification.finite_elements import field_error, mutated_force, refined_cells
 
 _GAUSS_RING: Final = 60
 _TILT: Final = 0.1
@@ -185,12 +186,20 @@ def gravity_study(
     for solution in solutions:
         if not solution.status.ok:
             raise ValueError(solution.status.text)
-    size = [cells[0][0] / count[0] for count in cells]
-    surface = OrderStudy.of(size=size, error=[_surface_error(disc, s, exact) for s in solutions])
-    field = OrderStudy.of(size=size, error=[field_error(s, exact.pressure) for s in solutions])
+    study = partial(
+        Convergence.of_errors,
+        formal_order=3.0,
+        size=[cells[0][0] / count[0] for count in cells],
+        geometry="quadratic",
+        note=f"cells {_listed(cells)}",
+    )
+    surface = study(
+        "place of the free surface, over the depth",
+        error=[_surface_error(disc, s, exact) for s in solutions],
+    )
+    field = study("pressure field, relative error", error=[field_error(s, exact.pressure) for s in solutions])
     volume = max(abs(s.statistics.extra["volume_error"]) for s in solutions)
     middle = float(surface_radius(disc=disc, fill_ratio=fill))
-    note = "cells " + ", ".join(" x ".join(map(str, count)) for count in cells)
     return Evidence(
         found={
             **orders_found({"surface": surface, "field": field}),
@@ -198,11 +207,12 @@ def gravity_study(
         },
         numbers={"tilt": _GRAVITY / (true.angular_velocity**2 * middle), "direction": _DIRECTION},
         series=(order_figure({"free surface": surface, "pressure field": field}),),
-        convergence=(
-            surface.table("place of the free surface, over the depth", 3.0, geometry="quadratic", note=note),
-            field.table("pressure field, relative error", 3.0, geometry="quadratic", note=note),
-        ),
+        convergence=(surface, field),
     )
+
+
+def _listed(cells: Sequence[Sequence[int]]) -> str:
+    return ", ".join(" x ".join(map(str, count)) for count in cells)
 
 
 def tilted_liquid(*, disc: Disc, density: float, fill_ratio: float, shaft: Shaft) -> RotatingLiquid:
@@ -239,7 +249,6 @@ _SCALE: Final = 1e5
 _SLOPES: Final = (3.0, 0.7, 1.8)
 _SHIFTS: Final = (0.4, 0.2)
 _GAUSS: Final = 40
-_FIELD_ORDER: Final = {"quadratic": 3.0, "straight": 3.0}
 _WALL_ORDER: Final = {"quadratic": 4.0, "straight": 2.0}
 
 
@@ -304,48 +313,43 @@ def manufactured_study(
     """
     disc, cells = scene.disc, refined_cells(scene.disc, levels[level], dimension=dimension)
     exact = Manufactured(length=disc.outer_radius, width=disc.axial_width)
-    quadratic, straight = (
-        _solutions(disc, exact.problem(defect), cells, straight=straight) for straight in (False, True)
-    )
-    of_sizes = partial(OrderStudy.of, size=[cells[0][0] / count[0] for count in cells])
-    fields = {
-        name: of_sizes(error=[field_error(s, exact.pressure) for s in solutions])
-        for name, solutions in (("quadratic", quadratic), ("straight", straight))
-    }
-    wall = _exact_wall_integral(disc, exact, dimension=dimension)
-    walls = {
-        name: of_sizes(error=[abs(_wall_integral(s) / wall - 1) for s in solutions])
-        for name, solutions in (("quadratic", quadratic), ("straight", straight))
-    }
-    orders = {f"field_order_{name}": found.settled_order for name, found in fields.items()}
-    errors = {"field_error_quadratic": fields["quadratic"].finest_error}
-    orders |= {f"wall_order_{name}": found.settled_order for name, found in walls.items()}
-    errors |= {f"wall_error_{name}": found.finest_error for name, found in walls.items()}
-    unknowns = quadratic[-1].pressure.size
-    note = f"cells {', '.join(' x '.join(map(str, count)) for count in cells)}; up to {unknowns} unknowns"
+    wall, fields, walls = _exact_wall_integral(disc, exact, dimension=dimension), {}, {}
+    for name, wall_order in _WALL_ORDER.items():
+        solutions = _solutions(disc, exact.problem(defect), cells, straight=name == "straight")
+        unknowns = solutions[-1].pressure.size
+        study = partial(
+            Convergence.of_errors,
+            size=[cells[0][0] / count[0] for count in cells],
+            geometry=name,
+            note=f"cells {_listed(cells)}; up to {unknowns} unknowns",
+        )
+        fields[name] = study(
+            "pressure field, relative error", 3.0, error=[field_error(s, exact.pressure) for s in solutions]
+        )
+        walls[name] = study(
+            "force on the outer wall, relative error",
+            wall_order,
+            error=[abs(_wall_integral(s) / wall - 1) for s in solutions],
+        )
     return Evidence(
-        found=as_found(**orders | errors),
+        found=as_found(
+            **{f"field_order_{name}": each.settled_order for name, each in fields.items()},
+            field_error_quadratic=fields["quadratic"].finest_error,
+            **{f"wall_order_{name}": each.settled_order for name, each in walls.items()},
+            **{f"wall_error_{name}": each.finest_error for name, each in walls.items()},
+        ),
         numbers={
             "curving": walls["straight"].finest_error / walls["quadratic"].finest_error,
-            "unknowns": float(unknowns),
+            "unknowns": unknowns,
         },
         series=(
             order_figure(
-                {f"pressure field, {name}": found for name, found in fields.items()}
-                | {f"wall force, {name}": found for name, found in walls.items()}
+                {f"pressure field, {name}": each for name, each in fields.items()}
+                | {f"wall force, {name}": each for name, each in walls.items()}
             ),
         ),
-        convergence=(
-            *_tables(fields, "pressure field, relative error", _FIELD_ORDER, note),
-            *_tables(walls, "force on the outer wall, relative error", _WALL_ORDER, note),
-        ),
+        convergence=(*fields.values(), *walls.values()),
     )
-
-
-def _tables(
-    studies: Mapping[str, OrderStudy], quantity: str, formal: Mapping[str, float], note: str
-) -> list[Convergence]:
-    return [found.table(quantity, formal[name], geometry=name, note=note) for name, found in studies.items()]
 
 
 def _solutions(

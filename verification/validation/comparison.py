@@ -23,13 +23,11 @@ from ringbalance.scene.models import Scene
 from ringbalance.verification.evidence import (
     Curve,
     Evidence,
-    Found,
     Level,
     Series,
     Verdict,
     as_found,
     figure,
-    judge_quantity,
 )
 
 PROMISED: Final = 0.93
@@ -121,13 +119,7 @@ class Comparison:
     @property
     def verdict(self) -> Verdict:
         """Confirmed where both uncertainties hold the promised fraction of the points."""
-        return judge_quantity(
-            kind="validation",
-            metric="at_least",
-            limit=PROMISED,
-            found=Found(value=self.statistics.share_within),
-            reference=None,
-        )[0]
+        return Verdict.CONFIRMED if self.statistics.share_within >= PROMISED else Verdict.REFUTED
 
     def over_reynolds(self, of: str) -> Series:
         """Predicted friction factors with their stated uncertainty, and the measured ones."""

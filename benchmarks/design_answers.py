@@ -1,0 +1,146 @@
+"""Designs that `ringbalance design` finds, beside the best of a whole grid; and problems without any.
+
+python benchmarks/design_answers.py [PROBLEM ...]
+
+A grid's step in size is at most 2 %.  Its points are tried the smallest first, each with all settings that
+are tried at first and those that `tune` finds, until one meets what is required; where the disc does not
+change, all of them, for the least gas.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+import ringbalance as rb
+from ringbalance.controller.balancer import balancer_of
+from ringbalance.design.axes import Plan, Point
+from ringbalance.design.hunt import threshold
+from ringbalance.design.racing import judged_design, race
+from ringbalance.design.space import Space
+from ringbalance.results.requirements import MET
+from ringbalance.scene.models import Scene
+
+NEAR: Final = 0.05
+"""Below the fraction asked for, up to which a point of the grid is judged on more devices."""
+MEDIUM: Final = {"gas.conductance": "0.8 l/(s*bar)", "gas.critical_ratio": 0.28, "gas.valve_lag": "12 ms"}
+LARGE: Final = {"gas.conductance": "1.5 l/(s*bar)", "gas.critical_ratio": 0.36, "gas.valve_lag": "20 ms"}
+OPEN: Final = dict.fromkeys(("outer_radius", "axial_width", "pressure", "valves"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """The bundled spindle that looks for its balancer, with other things to choose from."""
+
+    vary: tuple[str, ...]
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    stands: str = ""
+    """Code of the finding that says what stands against every design; empty: there is one."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene to design."""
+        scene = rb.load_scene(rb.bundled_scene("spindle_design"))
+        space = {f"design.{key}": value for key, value in {**OPEN, "vary": list(self.vary)}.items()}
+        changed = scene.with_values({**MEDIUM, **space, **self.changes})
+        assert isinstance(changed, Scene)
+        return changed
+
+
+WIDTHS: Final = "disc.axial_width=18mm:36mm:36:log"
+PROBLEMS: Final = {
+    "width": Problem(
+        vary=("disc.axial_width=10mm:40mm:71:log", "tube.bore=0.8mm", "gas.pressure=0.8MPa"),
+        changes={"requirement.fraction": 0.8},
+    ),
+    "radius": Problem(
+        vary=("disc.outer_radius=48mm:60mm:24:log", "tube.bore=0.8mm", "gas.pressure=0.8MPa"),
+        changes={"requirement.fraction": 0.8},
+    ),
+    "width and pressure": Problem(
+        vary=(WIDTHS, "gas.pressure=0.5MPa:0.8MPa:6", "tube.bore=0.8mm"),
+        changes={"requirement.fraction": 0.8},
+    ),
+    "width and bore": Problem(
+        vary=(WIDTHS, "tube.bore=0.6mm:1.1mm:7:log", "gas.pressure=0.8MPa"),
+        changes={"requirement.fraction": 0.8},
+    ),
+    "width and chambers": Problem(
+        vary=(WIDTHS, "disc.chambers=4,6", "tube.bore=0.75mm", "gas.pressure=0.8MPa")
+    ),
+    "bore and pressure": Problem(
+        vary=("tube.bore=0.6mm:1.2mm:8:log", "gas.pressure=0.5MPa:0.8MPa:7"),
+        changes={"requirement.fraction": 0.8, "disc.axial_width": "30 mm"},
+    ),
+    "too large an unbalance": Problem(
+        vary=(WIDTHS, "tube.bore=0.6mm:1.1mm:5:log"),
+        changes={"rotor.initial_vibration": {"amplitude": "80 um", "phase": "90 deg"}},
+        stands="design_none_able",
+    ),
+    "too little time": Problem(
+        vary=(WIDTHS, "tube.bore=0.8mm", "gas.pressure=0.8MPa"),
+        changes={**LARGE, "requirement.settling_time": "0.2 s"},
+        stands="design_demand",
+    ),
+    "too little pressure": Problem(
+        vary=(WIDTHS, "gas.pressure=0.05MPa:0.1MPa:5", "tube.bore=0.8mm"), stands="design_none_flows"
+    ),
+    "too little space": Problem(
+        vary=("disc.axial_width=4mm:8mm:36:log", "tube.bore=0.6mm:1.1mm:5:log", "gas.pressure=0.8MPa"),
+        stands="design_none_able",
+    ),
+}
+
+
+def answers(space: Space, points: list[Point]) -> Iterator[tuple[Point, float]]:
+    """Points of a grid that meet what is required, with the median of their gas, J."""
+    asked = balancer_of(space.scene).asked_fraction()
+    for point in points:
+        first = race(space.hasty, point, places=None, asked=threshold(asked), settings=True)
+        if first is None or first.fraction < asked - NEAR:
+            continue
+        judgement = judged_design(space.hasty, point, settings=first.settings, search=True)
+        if judgement is not None and judgement.verdict == MET:
+            yield point, float(np.nanmedian(judgement.outcomes.energy))
+
+
+def best_of_grid(space: Space) -> tuple[float, Point] | None:
+    """Size, m^3, or gas, J, of the best point of the grid; None: none meets what is required."""
+    points = sorted((space.followed(each) for each in Plan(axes=space.axes).points()), key=space.size)
+    met = answers(space, points)
+    if space.sized:
+        return next(((space.size(point), point) for point, _ in met), None)
+    return min(((gas, point) for point, gas in met), key=lambda each: each[0], default=None)
+
+
+def compared(name: str) -> str:
+    """One problem: processor times, what was found, and what the grid has."""
+    problem = PROBLEMS[name]
+    start = time.process_time()
+    design = rb.find_design(problem.scene, workers=1)
+    spent = time.process_time() - start
+    best = best_of_grid(design.space)
+    grid = time.process_time() - start - spent
+    codes = [each.code for each in design.rows().findings]
+    if best is None or not design.succeeded:
+        right = best is None and not design.succeeded and problem.stands in codes
+        text = (
+            f"grid: {'none' if best is None else best}, named: {codes[0]} ({'right' if right else 'WRONG'})"
+        )
+    else:
+        judged = design.judgement
+        assert judged is not None
+        gas = float(np.nanmedian(judged.outcomes.energy))
+        value = design.size if design.space.sized else gas
+        text = f"{value:.4g}, grid {best[0]:.4g}: {value / best[0] - 1:+.1%}; {dict(design.point)}; {best[1]}"
+    return f"{name}: {text}; {spent:.1f} s, grid {grid:.1f} s of processor time"
+
+
+if __name__ == "__main__":
+    for chosen in sys.argv[1:] or PROBLEMS:
+        print(compared(chosen), flush=True)

@@ -1,0 +1,274 @@
+"""What a host can run: the law, the disc in time, the controller; each of constants and one row of numbers.
+
+A block's functions read the constants and change the row, in which each variable has its place; the source is
+the same for every host.
+"""
+
+from __future__ import annotations
+
+import cmath
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from types import ModuleType
+from typing import Any, Final, Literal
+
+from ringbalance.controller.rotor import chamber_directions, chamber_letters
+from ringbalance.controller.terms import dynamics_of
+from ringbalance.export import controller, disc, point
+from ringbalance.export.compact import VELOCITIES, CompactLaw
+from ringbalance.export.translate import Source, number_text
+from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
+from ringbalance.reduced_model.law.flow_law import BalancerModel
+from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
+from ringbalance.reduced_model.terms import FILLING, LAG
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+
+Kind = Literal["law", "disc", "controller"]
+Numbers = tuple[float, ...]
+_LONGEST: Final = 1e-3
+"""s, of a part of a step of the disc."""
+_OF_LINE: Final = 0.04
+"""Of the line's time constant: near its end a pressure changes some fifty times as fast, and the method is
+stable up to 2.8 of the reciprocal."""
+RANGE: Final = "{:g} to {:g} m/s".format(*VELOCITIES)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variable:
+    """One that a host sees."""
+
+    name: str
+    kind: str
+    """ "Real", "Integer" or "Boolean"."""
+    input: bool
+    place: int
+    """In the block's row."""
+    description: str
+    range: Mapping[str, str]
+    """Unit, minimum, maximum and nominal value, as far as its kind has them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """One thing for a host."""
+
+    kind: Kind
+    title: str
+    scene: str
+    """File that it was made from."""
+    facts: str
+    """What it holds and how exact it is."""
+    constants: Numbers
+    start: Numbers
+    """The row before the first step."""
+    modules: tuple[ModuleType, ...]
+    steps: str
+    """Function that lets a time pass and brings the outputs up to date; the law's does the latter alone."""
+    timed: bool
+    """Whether a time passes."""
+    variables: tuple[Variable, ...]
+
+    def source(self, entries: Sequence[str] = ()) -> Source:
+        """What some functions need; default the one that a host calls."""
+        return Source.of_modules(self.modules, entries or (self.steps,))
+
+    def outputs(self, row: list[float]) -> dict[str, float]:
+        """By name, of a row that is up to date."""
+        return {each.name: row[each.place] for each in self.variables if not each.input}
+
+    def run(self, row: list[float], time: float, inputs: Mapping[str, float]) -> dict[str, float]:
+        """Set inputs, let a time pass, s, as a host does. Returns: the outputs."""
+        places = {each.name: each.place for each in self.variables if each.input}
+        for name, value in inputs.items():
+            row[places[name]] = float(value)
+        step = getattr(self.modules[-1], self.steps)
+        step(self.constants, row, *((time,) if self.timed else ()))
+        return self.outputs(row)
+
+
+def law_block(law: CompactLaw) -> Block:
+    """The law alone: its outputs follow from its inputs."""
+    half = law.max_fill_ratio / 2
+    row = [half, half] + [0.0] * (point.PLACES_OF_QUERY - 2)
+    return Block(
+        kind="law",
+        title="Flow law of a liquid-ring balancer",
+        scene=law.scene,
+        facts=law_facts(law),
+        constants=law.constants,
+        start=tuple(row),
+        modules=(point,),
+        steps="answer_all",
+        timed=False,
+        variables=_variables("law", lambda offset, _: int(getattr(point, offset)), most=law.max_fill_ratio),
+    )
+
+
+def law_facts(law: CompactLaw) -> str:
+    """What a law holds and how exact it is, in sentences."""
+    return (
+        f"{len(law.constants)} constants, {8 * len(law.constants)} bytes; velocities {RANGE}, beyond\n"
+        f"   extrapolated. Largest error of tabulation: {law.departure:.1e} of a velocity,\n"
+        f"   {law.level_error:.1e} Pa of a chamber's level; both are part of the uncertainty."
+    )
+
+
+def disc_block(scene: Scene, law: CalibratedLaw, compact: CompactLaw) -> Block:
+    """Fills and gas of all chambers in time, and the vibration of the scene's rotor.
+
+    Raises: SceneError: chambers that are not symmetric, whose moment across their middle the numbers lack.
+    """
+    if law.moment.across is not None:
+        raise SceneError.of_file(
+            scene.file, "the chambers are asymmetric: the disc's moment would miss a part", "--block law"
+        )
+    constants = [*compact.constants, *_disc_numbers(scene, law)]
+    constants[point.BLOCK] = float(len(compact.constants))
+    half, fill, ambient = scene.disc.chambers // 2, scene.disc.initial_fill, scene.gas.ambient_pressure
+    row = [0.0] * (disc.FIRST_PAIR + disc.PER_PAIR * half)
+    content = ambient * disc.gas_volume(constants, fill) / scene.gas.temperature
+    for pair in range(half):
+        at = disc.FIRST_PAIR + disc.PER_PAIR * pair
+        row[at : at + disc.STATES] = [fill, ambient, ambient, content, content]
+    disc.show(constants, row)
+
+    def place(offset: str, chamber: int | None) -> int:
+        value = int(getattr(disc, offset))
+        if chamber is None:
+            return value
+        return disc.FIRST_PAIR + disc.PER_PAIR * (chamber % half) + value + chamber // half
+
+    return Block(
+        kind="disc",
+        title="Disc of a liquid-ring balancer on its rotor",
+        scene=scene.file,
+        facts=law_facts(compact) + "\n   Liquid without mass: its velocity is the law's at every instant.",
+        constants=tuple(constants),
+        start=tuple(row),
+        modules=(point, disc),
+        steps="step",
+        timed=True,
+        variables=_variables("disc", place, most=law.max_fill_ratio, chambers=scene.disc.chambers),
+    )
+
+
+def _disc_numbers(scene: Scene, law: CalibratedLaw) -> Numbers:
+    """What `disc` finds behind the law."""
+    gas, rotor, half = scene.gas, scene.rotor, scene.disc.chambers // 2
+    modelled = [
+        name for name, given in ((FILLING, gas.conductance), (LAG, gas.valve_lag)) if given is not None
+    ]
+    dynamics = dynamics_of(scene=scene, model=BalancerModel.of(law), modelled=modelled)
+    plant = dynamics.plant(total=2 * scene.disc.initial_fill)[0]
+    least = (1 - law.max_fill_ratio) * law.chamber_volume + dynamics.dead_volume
+    longest = _LONGEST
+    if dynamics.line is not None:
+        longest = min(longest, _OF_LINE * dynamics.line.time_constant(volume=least))
+    ratio = float(plant["heat_capacity_ratio"])
+    axes = chamber_directions(scene.disc.chambers)[:half]
+    return (
+        float(half),
+        2 * scene.disc.initial_fill,
+        law.tube_area / law.chamber_volume,
+        law.chamber_volume,
+        dynamics.dead_volume,
+        gas.ambient_pressure + gas.pressure,
+        dynamics.valve_lag,
+        residual_fill_ratio(scene, law=law),
+        longest,
+        float(dynamics.line is not None),
+        float(plant["passing"]),
+        float(plant["critical_ratio"]),
+        gas.temperature,
+        ratio,
+        float(ratio > 1.0),
+        *_parts(rotor.initial_vibration),
+        *_parts(rotor.influence),
+        *(part for axis in axes for part in _parts(complex(axis))),
+    )
+
+
+def _parts(value: complex) -> tuple[float, float]:
+    return value.real, value.imag
+
+
+def controller_block(scene: Scene) -> Block:
+    """The target-vector controller with the scene's settings.
+
+    Raises: SceneError: another algorithm.
+    """
+    kind = scene.controller.kind
+    if kind != "target_vector":
+        problem = f"the controller {kind!r} is not exported"
+        raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')
+    chambers = scene.disc.chambers
+
+    def place(offset: str, chamber: int | None) -> int:
+        value = int(getattr(controller, offset))
+        if chamber is None:
+            return value
+        return controller.FIRST_CHAMBER + controller.PER_CHAMBER * chamber + value
+
+    return Block(
+        kind="controller",
+        title="Target-vector controller of a liquid-ring balancer",
+        scene=scene.file,
+        facts="Settings of the scene; the vibration enters by its components.",
+        constants=_settings(scene),
+        start=(0.0,) * (controller.FIRST_CHAMBER + controller.PER_CHAMBER * chambers),
+        modules=(point, controller),
+        steps="step",
+        timed=True,
+        variables=_variables("controller", place, chambers=chambers),
+    )
+
+
+def _settings(scene: Scene) -> Numbers:
+    """What `controller` finds in its constants."""
+    settings, chambers = scene.controller, scene.disc.chambers
+    sectors = zip(chamber_directions(chambers).tolist(), settings.offsets(chambers), strict=True)
+    return (
+        float(chambers),
+        settings.limit,
+        settings.proportional,
+        0.0 if settings.integral_time is None else 1.0 / settings.integral_time,
+        settings.derivative_time,
+        settings.minimum_gas_time,
+        settings.maximum_gas_time,
+        settings.period,
+        1.0,  # the integral is dropped when the residual has turned round
+        *_parts(cmath.rect(1.0, settings.assumed_lag_angle)),
+        *(number for axis, offset in sectors for number in (*_parts(axis), offset)),
+    )
+
+
+def declared_units() -> Mapping[str, Mapping[str, str]]:
+    """Units of all blocks' variables in base units, as FMI has them."""
+    units: Mapping[str, Mapping[str, str]] = _declared()["units"]
+    return units
+
+
+def _declared() -> dict[str, Any]:
+    return tomllib.loads(
+        files("ringbalance.export").joinpath("templates/variables.toml").read_text(encoding="utf-8")
+    )
+
+
+def _variables(
+    kind: Kind, place: Callable[[str, int | None], int], *, most: float = 0.0, chambers: int = 2
+) -> tuple[Variable, ...]:
+    """As declared. Args: `place`: of an offset's name, and of a chamber where each has one."""
+    found = []
+    for each in _declared()[kind]:
+        heads = {**each, "input": each.get("input", False)}
+        heads["range"] = {key: text.replace("MOST", number_text(most)) for key, text in each["range"].items()}
+        heads["description"] = each["description"].replace("MOST", number_text(most))
+        letters = chamber_letters(chambers) if "#" in each["name"] else (None,)
+        for chamber, letter in enumerate(letters):
+            texts = {key: heads[key].replace("#", letter or "") for key in ("name", "description")}
+            at = place(each["place"], chamber if letter else None)
+            found.append(Variable(**{**heads, **texts, "name": texts["name"].lower(), "place": at}))
+    return tuple(found)

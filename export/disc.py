@@ -1,0 +1,275 @@
+"""The disc in time: fills and gas of every pair of chambers, in + - * / sqrt and comparisons alone.
+
+Liquid moves as the law says (`point`), without mass of its own; gas fills and vents at once, or through the
+scene's valve and line.  `c` is the law with the disc behind it, `w` the disc's state with its inputs and
+outputs; the names below are places in them.  A step is cut where a valve moves and where a driven chamber
+comes to its residual fill, and then into parts of at most c[LONGEST], each of the classical Runge-Kutta
+method.  Source: `physics.gas` for the line, whose equations and names these are.
+"""
+
+from math import sqrt
+
+from ringbalance.export.point import (
+    AMBIENT,
+    BLOCK,
+    BLOCKED,
+    DOWN_GAS,
+    DOWN_LEVEL,
+    GAS_FACTOR,
+    LARGEST_FILL,
+    PRIMED,
+    PRIMED_AFTER,
+    REGIME,
+    REVERSE,
+    UP_GAS,
+    UP_LEVEL,
+    VELOCITY,
+    Law,
+    Query,
+    larger,
+    moment,
+    set_answer,
+    set_level,
+    smaller,
+)
+
+# fmt: off
+# Behind the place in c[BLOCK]; of each pair the direction of its positive chamber.
+PAIRS, TOTAL, PER_SECOND, VOLUME, DEAD, SUPPLY, LAG, RESIDUAL, LONGEST = 0, 1, 2, 3, 4, 5, 6, 7, 8
+LINE, PASSING, CRITICAL, WARMTH, RATIO, TEMPERATURE_VARIES = 9, 10, 11, 12, 13, 14
+START_X, START_Y, INFLUENCE_X, INFLUENCE_Y, DIRECTIONS = 15, 16, 17, 18, 19
+
+# Of the disc; then in a part of a step.
+MOMENT_X, MOMENT_Y, VIBRATION_X, VIBRATION_Y = 39, 40, 41, 42
+STATES, RATES, BEFORE, SUM, FIRST_PAIR, PER_PAIR = 5, 43, 48, 53, 58, 18
+# Of a pair: what moves by rates, the tube, and of both chambers each.
+X, GAS, CONTENT, IS_PRIMED, ASKED, LIQUID, HELD, VALVE, OPENS, CLOSES = 0, 1, 3, 5, 6, 8, 10, 12, 14, 16
+# fmt: on
+
+LAMINAR, LEAST_GAS, CLOSE, SHORTEST = 0.999, 1e-3, 1e-9, 1e-7
+
+
+def gas_volume(c: Law, fill: float) -> float:
+    """Of the gas that belongs to a chamber, m^3."""
+    d = int(c[BLOCK])
+    return larger(1.0 - fill, LEAST_GAS) * c[d + VOLUME] + c[d + DEAD]
+
+
+def passed(c: Law, ratio: float) -> float:
+    """Mass flow over its choked value by the ratio of the pressures."""
+    b = c[int(c[BLOCK]) + CRITICAL]
+    if ratio <= b:
+        return 1.0
+    kept = smaller(ratio, larger(LAMINAR, b))
+    part = (kept - b) / (1.0 - b)
+    ellipse = sqrt(larger(1.0 - part * part, 0.0))
+    if ratio > kept:
+        return ellipse * (1.0 - ratio) / (1.0 - kept)
+    return ellipse
+
+
+def set_gas_rates(c: Law, w: Query, at: int, side: int, fill: float, growth: float) -> None:
+    """Of a chamber's pressure, Pa/s, and of its content p V/T, W/K, with the growth of its volume, m^3/s."""
+    d = int(c[BLOCK])
+    w[RATES + GAS + side] = 0.0
+    w[RATES + CONTENT + side] = 0.0
+    if c[d + LINE] == 0.0:
+        return
+    outside = c[AMBIENT]
+    if w[at + VALVE + side] != 0.0:
+        outside = c[d + SUPPLY]
+    pressure = w[at + GAS + side]
+    volume = gas_volume(c, fill)
+    warmth = c[d + WARMTH]
+    if pressure <= outside:
+        flow = c[d + PASSING] * outside * passed(c, pressure / outside)
+    else:
+        if c[d + TEMPERATURE_VARIES] != 0.0:
+            warmth = pressure * volume / larger(w[at + CONTENT + side], 1e-9 * volume)
+        flow = -c[d + PASSING] * sqrt(warmth / c[d + WARMTH]) * pressure * passed(c, outside / pressure)
+    w[RATES + GAS + side] = (flow - pressure * growth) * c[d + RATIO] / volume
+    w[RATES + CONTENT + side] = flow / warmth
+
+
+def held(c: Law, fill: float) -> float:
+    """A fill within the law's range."""
+    return larger(0.0, smaller(fill, c[LARGEST_FILL]))
+
+
+def set_tube(c: Law, w: Query, at: int) -> None:
+    """Velocity out of a pair's positive chamber, by the law."""
+    set_level(c, w, held(c, w[at + X]), UP_LEVEL)
+    set_level(c, w, held(c, c[int(c[BLOCK]) + TOTAL] - w[at + X]), DOWN_LEVEL)
+    w[UP_GAS] = c[GAS_FACTOR] * (w[at + GAS] - c[AMBIENT])
+    w[DOWN_GAS] = c[GAS_FACTOR] * (w[at + GAS + 1] - c[AMBIENT])
+    w[PRIMED] = w[at + IS_PRIMED]
+    w[VELOCITY] = 0.0
+    w[REGIME] = BLOCKED
+    set_answer(c, w)
+    if w[REGIME] == REVERSE:
+        w[VELOCITY] = -w[VELOCITY]
+
+
+def set_rates(c: Law, w: Query, at: int) -> None:
+    """Of a pair's fill, 1/s, and of its gases."""
+    d = int(c[BLOCK])
+    set_tube(c, w, at)
+    x = w[at + X]
+    total = c[d + TOTAL]
+    rate = -c[d + PER_SECOND] * w[VELOCITY]
+    if rate < 0.0 and x <= larger(0.0, total - c[LARGEST_FILL]):
+        rate = 0.0
+    if rate > 0.0 and x >= smaller(total, c[LARGEST_FILL]):
+        rate = 0.0
+    w[RATES] = rate
+    growth = rate * c[d + VOLUME]
+    set_gas_rates(c, w, at, 0, x, -growth)
+    set_gas_rates(c, w, at, 1, total - x, growth)
+
+
+def take(w: Query, at: int, weight: float, time: float) -> None:
+    """Count rates, and go to where they lead in a time from the beginning of a part."""
+    i = 0
+    while i < STATES:
+        w[SUM + i] = w[SUM + i] + weight * w[RATES + i]
+        w[at + i] = w[BEFORE + i] + time * w[RATES + i]
+        i = i + 1
+
+
+def move(c: Law, w: Query, at: int, time: float) -> None:
+    """One part of a step of a pair."""
+    i = 0
+    while i < STATES:
+        w[BEFORE + i] = w[at + i]
+        w[SUM + i] = 0.0
+        i = i + 1
+    set_rates(c, w, at)
+    take(w, at, 1.0, time / 2.0)
+    set_rates(c, w, at)
+    take(w, at, 2.0, time / 2.0)
+    set_rates(c, w, at)
+    take(w, at, 2.0, time)
+    set_rates(c, w, at)
+    take(w, at, 1.0, time)
+    i = 0
+    while i < STATES:
+        w[at + i] = w[BEFORE + i] + time / 6.0 * w[SUM + i]
+        i = i + 1
+    total = c[int(c[BLOCK]) + TOTAL]
+    most = c[LARGEST_FILL]
+    w[at + X] = larger(larger(0.0, total - most), smaller(w[at + X], smaller(total, most)))
+
+
+def command(c: Law, w: Query, at: int) -> None:
+    """Valves open and close a lag after their command."""
+    lag = c[int(c[BLOCK]) + LAG]
+    side = 0
+    while side < 2:
+        if w[at + ASKED + side] > 0.0:
+            if w[at + CLOSES + side] <= 0.0:
+                w[at + HELD] = 0.0
+                w[at + HELD + 1] = 0.0
+                w[at + OPENS + side] = lag
+                if lag <= 0.0:
+                    w[at + VALVE + side] = 1.0
+            w[at + CLOSES + side] = w[at + ASKED + side] + lag
+        side = side + 1
+
+
+def settle(c: Law, w: Query, at: int) -> None:
+    """Before a part: valves close at the residual fill, gas may fill at once, the tube may be primed."""
+    d = int(c[BLOCK])
+    side = 0
+    fill = w[at + X]
+    while side < 2:
+        if w[at + VALVE + side] != 0.0 and fill - c[d + RESIDUAL] < CLOSE:
+            w[at + VALVE + side] = 0.0
+            w[at + OPENS + side] = 0.0
+            w[at + CLOSES + side] = 0.0
+            w[at + HELD + side] = 1.0
+        if c[d + LINE] == 0.0:
+            w[at + GAS + side] = c[AMBIENT]
+            if w[at + VALVE + side] != 0.0:
+                w[at + GAS + side] = c[d + SUPPLY]
+        fill = c[d + TOTAL] - w[at + X]
+        side = side + 1
+    set_tube(c, w, at)
+    if w[PRIMED_AFTER] != 0.0:
+        w[at + IS_PRIMED] = 1.0
+    elif w[REGIME] == BLOCKED:
+        w[at + IS_PRIMED] = 0.0
+
+
+def length(c: Law, w: Query, at: int, left: float) -> float:
+    """Of the next part, s: to where a valve moves, or a driven chamber comes to its residual fill."""
+    d = int(c[BLOCK])
+    found = smaller(left, c[d + LONGEST])
+    falls = c[d + PER_SECOND] * w[VELOCITY]
+    fill = w[at + X]
+    side = 0
+    while side < 2:
+        if w[at + OPENS + side] > 0.0:
+            found = smaller(found, w[at + OPENS + side])
+        if w[at + CLOSES + side] > 0.0:
+            found = smaller(found, w[at + CLOSES + side])
+        if w[at + VALVE + side] != 0.0 and falls > 0.0:
+            found = smaller(found, larger((fill - c[d + RESIDUAL]) / falls, SHORTEST))
+        fill = c[d + TOTAL] - w[at + X]
+        falls = -falls
+        side = side + 1
+    return found
+
+
+def tick(w: Query, at: int, time: float) -> None:
+    """The clocks of the valves."""
+    side = 0
+    while side < 2:
+        if w[at + OPENS + side] > 0.0:
+            w[at + OPENS + side] = w[at + OPENS + side] - time
+            if w[at + OPENS + side] <= 0.0:
+                w[at + OPENS + side] = 0.0
+                w[at + VALVE + side] = 1.0
+        if w[at + CLOSES + side] > 0.0:
+            w[at + CLOSES + side] = w[at + CLOSES + side] - time
+            if w[at + CLOSES + side] <= 0.0:
+                w[at + CLOSES + side] = 0.0
+                w[at + VALVE + side] = 0.0
+        side = side + 1
+
+
+def show(c: Law, w: Query) -> None:
+    """Fills, the disc's moment, kg m, and the vibration with it, m."""
+    d = int(c[BLOCK])
+    w[MOMENT_X] = 0.0
+    w[MOMENT_Y] = 0.0
+    pair = 0
+    while pair < int(c[d + PAIRS]):
+        at = FIRST_PAIR + PER_PAIR * pair
+        axis = d + DIRECTIONS + 2 * pair
+        w[at + LIQUID] = w[at + X]
+        w[at + LIQUID + 1] = c[d + TOTAL] - w[at + X]
+        along = moment(c, w[at + LIQUID]) - moment(c, w[at + LIQUID + 1])
+        w[MOMENT_X] = w[MOMENT_X] + along * c[axis]
+        w[MOMENT_Y] = w[MOMENT_Y] + along * c[axis + 1]
+        pair = pair + 1
+    x = c[d + INFLUENCE_X] * w[MOMENT_X] - c[d + INFLUENCE_Y] * w[MOMENT_Y]
+    y = c[d + INFLUENCE_X] * w[MOMENT_Y] + c[d + INFLUENCE_Y] * w[MOMENT_X]
+    w[VIBRATION_X] = c[d + START_X] + x
+    w[VIBRATION_Y] = c[d + START_Y] + y
+
+
+def step(c: Law, w: Query, time: float) -> None:
+    """Let a time pass, s, with each valve open from its beginning on for as long as is asked."""
+    pair = 0
+    while pair < int(c[int(c[BLOCK]) + PAIRS]):
+        at = FIRST_PAIR + PER_PAIR * pair
+        command(c, w, at)
+        left = time
+        while left > 0.0:
+            settle(c, w, at)
+            part = length(c, w, at, left)
+            move(c, w, at, part)
+            tick(w, at, part)
+            left = left - part
+        pair = pair + 1
+    show(c, w)

@@ -1,0 +1,146 @@
+"""Disc and controller in other languages: the program's own closed loop, and the same bits in each host."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import pytest
+
+import ringbalance as rb
+from ringbalance.controller.simulation import Simulation
+from ringbalance.export.blocks import Block, controller_block, disc_block
+from ringbalance.export.compact import compact_law
+from ringbalance.export.hosts import c_files, python_files
+from ringbalance.scene.arrays import FloatArray
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+
+WARNINGS = [
+    "-std=c99",
+    "-pedantic",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Wshadow",
+    "-Werror",
+]
+SANITIZERS = ["-O1", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
+IN_A_STEP = 10.0
+"""s, longer than any wait for a sample: the disc goes from sample to sample."""
+
+
+def exact_scene(name: str) -> Scene:
+    """A bundled scene whose sensor is exact."""
+    quiet = {"sensor.amplitude_noise": "0 m", "sensor.phase_noise": "0 deg"}
+    return cast(Scene, rb.load_scene(rb.bundled_scene(name)).with_values(quiet))
+
+
+def loop_in_c(folder: Path, disc: Block, controller: Block, *, samples: int, longest: float) -> FloatArray:
+    """Time, vibration x and y, then open time and fill of each chamber, a row for each sample."""
+
+    def places(block: Block, begins: str) -> str:
+        return ", ".join(str(each.place) for each in block.variables if each.name.startswith(begins))
+
+    of_chambers = {
+        "asked": places(disc, "open_time"),
+        "told": places(controller, "open_time"),
+        "held": places(disc, "at_residual"),
+        "emptied": places(controller, "at_residual"),
+        "fills": places(disc, "fill_ratio"),
+    }
+    header = f"enum {{ SAMPLES = {samples} }};\nstatic const double LONGEST = {longest!r};\n"
+    header += "".join(f"static const int {key}[] = {{{text}}};\n" for key, text in of_chambers.items())
+    texts = c_files(disc, "plant") | c_files(controller, "ctrl") | {"places.h": header}
+    for file, text in texts.items():
+        (folder / file).write_text(text)
+    main = str(Path(__file__).parent / "closed_loop.c")
+    command = ["gcc", *WARNINGS, *SANITIZERS, "-I.", "plant.c", "ctrl.c", main, "-lm", "-o", "loop"]
+    subprocess.run(command, cwd=folder, check=True)
+    ran = subprocess.run([folder / "loop"], capture_output=True, text=True, check=True)
+    return np.array([[float(cell) for cell in line.split()] for line in ran.stdout.splitlines()])
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+@pytest.mark.parametrize(
+    ("name", "longest", "late"),
+    [
+        ("six_chamber", IN_A_STEP, 1e-4),
+        ("grinding_spindle", IN_A_STEP, 1e-4),
+        ("liquid_ring_paper", 2e-4, 1e-3),
+    ],
+)
+def test_in_c_they_run_as_the_programs_own_loop(
+    tmp_path: Path, name: str, longest: float, late: float
+) -> None:
+    """The spindle has valves and a gas line; on the paper's disc a chamber comes to its residual fill.
+
+    There the host takes small steps, since the controller sees at a step's end that a valve was closed.
+    """
+    scene = exact_scene(name)
+    law = rb.calibrate(scene).flow_law
+    gas = scene.gas
+    line = {"gas filling": gas.conductance, "valve lag": gas.valve_lag}
+    own = rb.simulate(
+        scene, flow_law=law, modelled=[term for term, given in line.items() if given is not None]
+    )
+    assert isinstance(own, Simulation)
+    assert own.settled
+    controller, disc = controller_block(scene), disc_block(scene, law, compact_law(scene=scene, law=law))
+    rows = loop_in_c(tmp_path, disc, controller, samples=len(own.samples), longest=longest)
+    right = np.array([vibration_of(each.measurement) for each in own.samples])
+    assert rows[:, 0] == pytest.approx([each.time for each in own.samples], abs=late)
+    assert np.abs(rows[:, 1] + 1j * rows[:, 2] - right) == pytest.approx(0.0, abs=3e-4 * abs(right[0]))
+    fills = np.array(list(own.fill_ratio.values()))[
+        :, np.searchsorted(own.time, [e.time for e in own.samples])
+    ]
+    assert pytest.approx(fills, abs=3e-4) == rows[:, 4::2].T
+    for row, sample in zip(rows, own.samples, strict=True):
+        asked = np.zeros(scene.disc.chambers)
+        asked[[each.chamber for each in sample.command.valves]] = [e.duration for e in sample.command.valves]
+        assert row[3::2] == pytest.approx(asked, abs=late)
+
+
+def vibration_of(seen: object) -> complex:
+    assert isinstance(seen, rb.Measurement)
+    return complex(seen.amplitude * np.exp(1j * seen.phase))
+
+
+def test_a_module_of_its_own_has_the_same_bits(blocks: dict[str, Block]) -> None:
+    for kind, inputs in (
+        ("disc", {"open_time_a": 0.03, "open_time_e": 0.02}),
+        ("controller", {"vibration_x": 3e-6, "vibration_y": -2e-6}),
+    ):
+        block, names = blocks[kind], dict[str, object]()
+        exec(python_files(block, "m")["m.py"], names)
+        made = names["Block"]
+        assert callable(made)
+        mine, row = made(), list(block.start)
+        for step in range(8):
+            given = inputs if step % 3 == 0 else dict.fromkeys(inputs, 0.0)
+            assert mine.step(0.03, **given) == block.run(row, 0.03, given)
+        assert mine.w == row
+
+
+def test_the_controller_passes_over_what_is_no_number_and_forgets_nothing(blocks: dict[str, Block]) -> None:
+    block = blocks["controller"]
+    row = list(block.start)
+    wait = block.run(row, 0.0, {"vibration_x": 3e-6, "vibration_y": 0.0})["wait"]
+    before = list(row)
+    told = block.run(row, wait, {"vibration_x": np.nan})
+    assert told["samples"] == 2
+    assert not any(told[f"open_time_{letter}"] for letter in "abcdef")
+    changed = {place for place, (a, b) in enumerate(zip(before, row, strict=True)) if a != b and b == b}
+    module = block.modules[-1]
+    openings = {each.place for each in block.variables if each.name.startswith("open_time")}
+    assert changed <= {module.SAMPLES, module.WAIT, module.SINCE, *openings}
+
+
+def test_another_controller_is_refused() -> None:
+    other = exact_scene("six_chamber").with_values({"controller.kind": "law_based"})
+    with pytest.raises(SceneError, match="law_based"):
+        controller_block(other)

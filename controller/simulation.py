@@ -188,7 +188,14 @@ class Sample:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Simulation(PresentedResult):
-    """One closed-loop run."""
+    """One closed-loop run.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> run = rb.simulate(scene)
+        >>> len(run.injections), float(run.amplitude[-1]) < scene.controller.limit
+        (10, True)
+    """
 
     scene: Scene
     plant: LiquidRing

@@ -14,6 +14,7 @@ from importlib.resources import files
 from types import ModuleType
 from typing import Any, Final, Literal
 
+from ringbalance.controller.algorithms.built_in import TargetVector
 from ringbalance.controller.rotor import chamber_directions, chamber_letters
 from ringbalance.controller.terms import dynamics_of
 from ringbalance.export import controller, disc, point
@@ -239,7 +240,7 @@ def _settings(scene: Scene) -> Numbers:
         settings.minimum_gas_time,
         settings.maximum_gas_time,
         settings.period,
-        1.0,  # the integral is dropped when the residual has turned round
+        float(TargetVector.on_reversal == "reset"),
         *_parts(cmath.rect(1.0, settings.assumed_lag_angle)),
         *(number for axis, offset in sectors for number in (*_parts(axis), offset)),
     )

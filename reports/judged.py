@@ -116,7 +116,7 @@ def judgement_record(judgement: Judgement) -> Record:
             for each, demand in pairs
         ],
         "further_s": FURTHER,
-        "settled": _settled(judgement.outcomes),
+        "settled": settled_record(judgement.outcomes),
     }
 
 
@@ -124,7 +124,7 @@ def _watched(judgement: Judgement, further: float) -> Record:
     return {"further_s": further, "fraction": judgement.fraction.document(), "verdict": judgement.verdict}
 
 
-def _settled(outcomes: Outcomes) -> Record:
+def settled_record(outcomes: Outcomes) -> Record:
     """Fraction of the devices that has settled by a time, with its bounds."""
     times = np.sort(outcomes.settling_time[outcomes.settled])
     counts = np.unique(np.linspace(1, times.size, _POINTS).round()) if times.size else np.zeros(0)

@@ -19,7 +19,7 @@ from ringbalance.reduced_model.injection.dynamics import EVENTS, RELATIVE_ERROR,
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance
-from ringbalance.reduced_model.injection.pair import Motion, packed
+from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio
 from ringbalance.scene.arrays import ComplexArray, FloatArray, Record, Records
@@ -122,7 +122,7 @@ class LawBased(BuiltIn):
 
     @cached_property
     def _liquid(self) -> Records:
-        level = packed(self.plant, fill=self.ring.total / 2, primed=False, motion=Motion())
+        level = at_rest(self.plant, fill=self.ring.total / 2)
         return np.repeat(level, self.ring.chambers // 2 + 1)
 
 

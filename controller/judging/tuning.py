@@ -40,7 +40,14 @@ class BestOfKind:
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Tuning(Result):
-    """Settings for a scene's controller, and the fraction of drawn devices that they serve."""
+    """Settings for a scene's controller, and the fraction of drawn devices that they serve.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> tuning = rb.tune(scene)
+        >>> tuning.recommended.verdict
+        'met'
+    """
 
     given: SceneFile
     """The scene as it was."""

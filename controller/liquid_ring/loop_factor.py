@@ -198,7 +198,7 @@ def _stationary_deviation(
     return noise * math.sqrt(max(float(variance.real), 0.0))
 
 
-_FREQUENCIES: Final = np.concatenate([np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi, 1600)])
+FREQUENCIES: Final = np.concatenate([np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi, 1600)])
 """Angles of z on the unit circle, rad."""
 
 
@@ -231,7 +231,7 @@ def loop_margins(
     Source: Seiler, Packard and Gahinet, "An Introduction to Disk Margins", IEEE Control Systems Magazine 40
         (2020), with the balanced sensitivity (S - T)/2.
     """
-    z = np.exp(1j * _FREQUENCIES)
+    z = np.exp(1j * FREQUENCIES)
     shape = 1.0 + integral / 2.0 * (z + 1.0) / (z - 1.0) + derivative * (1.0 - 1.0 / z)
     loop = loop_factor * shape / (z - 1.0)
     disk = min(float(np.min(np.abs(2.0 * (1.0 + loop) / (1.0 - loop)))), 2.0)

@@ -14,7 +14,7 @@ from ringbalance.reports.summary import (
     tone,
     verdict_counts,
 )
-from ringbalance.verification.evidence import VOCABULARY
+from ringbalance.verification.verdicts import VOCABULARY
 
 Record = dict[str, Any]
 

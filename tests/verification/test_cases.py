@@ -21,10 +21,10 @@ from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import placeholders
 from ringbalance.verification.catalogue import case_code, load_cases
-from ringbalance.verification.evidence import Verdict, combine, judge_quantity
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases
+from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
 
 FOLDER = Path(__file__).resolve().parents[2] / "verification" / "cases"
 CASES = {definition.id: definition for definition in load_cases()}
@@ -368,10 +368,10 @@ def test_light_cases_hold_at_level_heavy(paper_scene: Scene) -> None:
         assert result.definition.kind == "claim" or result.verdict in known, result.definition.id
 
 
-def test_the_readme_has_the_table_of_what_stands_behind_each_quantity(
+def test_a_page_has_the_table_of_what_stands_behind_each_quantity(
     results: Mapping[str, CaseResult],
 ) -> None:
-    page = text_of("README.md")
+    page = text_of("docs/standing.md")
     table = standing_table([results[case.id].to_dict() for case in load_cases()])
     assert fresh(page, {"standing": table}) == page
     assert "| Residual liquid over the port | no data |" in page

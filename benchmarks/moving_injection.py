@@ -28,7 +28,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import WORKSPACE, Dynamics, Lift
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.march import advance
-from ringbalance.reduced_model.injection.pair import Motion, packed
+from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.terms import FILLING, HELD, INERTIA, LAG
@@ -208,7 +208,7 @@ def _inject(  # type: ignore[no-untyped-def]
 def ours(dynamics: Dynamics, duration: float, *, error: float, count: int, fill: float = 0.25) -> float:
     """Fill after the same, `count` times over."""
     plant = dynamics.plant(total=0.5, relative_error=error)
-    motions = np.repeat(packed(plant, fill=fill, primed=False, motion=Motion()), 2)
+    motions = np.repeat(at_rest(plant, fill=fill), 2)
     return float(_inject(plant[0], motions, duration, TAIL, count, np.zeros(WORKSPACE)))
 
 

@@ -17,7 +17,7 @@ from ringbalance.identification.reading import read_observations
 from ringbalance.identification.saving import save_result
 from ringbalance.results.result import print_rows
 from ringbalance.scene.faults import SceneError, did_you_mean
-from ringbalance.scene.loader import read_scene
+from ringbalance.scene.loader import load_scene
 from ringbalance.scene.platform.files import check_file
 from ringbalance.scene.platform.terminal import activity, print_message
 
@@ -48,7 +48,7 @@ def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tupl
         check_file(asked.save)
     if scene.suffix.lower() == ".csv":
         raise _usage(str(scene), "this looks like a file of measurements, and the scene comes first")
-    given, text = read_scene(scene)
+    given = load_scene(scene)
     observations = read_observations(data, scene=given)
     names = None if asked.parameters is None else _names(asked.parameters)
     try:
@@ -66,9 +66,7 @@ def run_fit(scene: Path | None, data: Sequence[Path], asked: FitRequest) -> tupl
         rows = fit_rows(result, data=observations, told=told, following=following)
         print_rows(rows, headline=False)
     if asked.save is not None:
-        save_result(
-            asked.save, text=text, result=result, data=observations, folder=scene.parent, said=told.sentences
-        )
+        save_result(asked.save, scene=given, result=result, data=observations, said=told.sentences)
         print_message(f"fitted scene written to {asked.save}")
     return (DONE if told.holds else FAILED), result
 

@@ -33,7 +33,7 @@ from scipy.stats import chi2
 
 from ringbalance.identification.fitting import FitResult
 from ringbalance.identification.kinds.kind import Observations
-from ringbalance.identification.likelihood import Block, basis_of
+from ringbalance.identification.likelihood import Block, Problem, basis_of
 from ringbalance.identification.optimisation import Optimum
 from ringbalance.identification.other_laws import by_other_machines, by_other_tubes
 from ringbalance.identification.readings import ComparedColumn, Reading, compared_columns, other_readings
@@ -60,6 +60,8 @@ class LinearFit:
     """What a row is of, such as "run.csv", shape (n,), empty for a prior; in the order of measurement."""
     known_noise: BoolArray
     """Whether its sigma was given; else it was estimated from the residuals of its block."""
+    turn: FloatArray
+    """Rotation of a fit's first rows into these: of vibrations into parts along their change and across."""
 
     @cached_property
     def _basis(self) -> FloatArray:
@@ -229,7 +231,7 @@ def summaries(comparisons: Sequence[LawComparison]) -> Iterator[tuple[Outcome, s
             yield outcome, text_of(code, law=" or ".join(filter(None, (", ".join(others[:-1]), others[-1]))))
 
 
-LEAST_SHARE: Final = 0.5
+_LEAST_SHARE: Final = 0.5
 _HIDDEN: Final = 4.0
 """Variance of the noise over that of the effect which the scene predicts, from which none is to be seen."""
 
@@ -269,7 +271,7 @@ def _shares_explained(best: Optimum) -> Iterator[_Explained]:
             share = 1 - noise / measured
             seen = block.estimated and noise < _HIDDEN * effect
             yield _Explained(
-                file=block.observations.file, share=share, fails=bool(seen and share < LEAST_SHARE)
+                file=block.observations.file, share=share, fails=bool(seen and share < _LEAST_SHARE)
             )
 
 
@@ -331,60 +333,44 @@ class Review:
     @classmethod
     def of(cls, result: FitResult) -> Review:
         """Test the residuals of a fit, read its data otherwise, and compare its law with others."""
-        found, best = _at_solution(result), result.optimum
+        best = result.optimum
+        fit = _at_solution(best)
         ranges = tuple(compared_columns(best.residuals.problem))
         return cls(
-            criticism=Criticism.of(found.fit),
-            laws=tuple(_comparisons(result, found)),
+            criticism=Criticism.of(fit),
+            laws=tuple(_comparisons(result, fit)),
             explained=tuple(_shares_explained(best)),
             readings=other_readings(best, ranges),
             ranges=ranges,
         )
 
 
-def _comparisons(result: FitResult, found: _AtSolution) -> Iterator[LawComparison]:
+def _comparisons(result: FitResult, fit: LinearFit) -> Iterator[LawComparison]:
     best = result.optimum
     problem, scene = best.residuals.problem, best.residuals.problem.scene_at(best.t)
     # Each yields nothing without data of the kinds that it is about.
     for name, predicted in (*by_other_tubes(problem, scene), *by_other_machines(problem, scene)):
-        residuals = found.turned(best.residuals.at(best.t, predicted=predicted))
-        yield LawComparison.of(found.fit, other=name, residuals=residuals)
+        residuals = _turned(fit.turn, best.residuals.at(best.t, predicted=predicted))
+        yield LawComparison.of(fit, other=name, residuals=residuals)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _AtSolution:
-    """Rows are those of all files, then held inputs, then priors."""
-
-    fit: LinearFit
-    """Of a vibration the part along its predicted change, and the part across."""
-    turn: FloatArray
-    """Rotation of the rows of vibrations into these parts, shape (measured, measured)."""
-
-    def turned(self, rows: FloatArray) -> FloatArray:
-        """Rows of the fit's own order, with those of vibrations along and across."""
-        count = self.turn.shape[0]
-        return np.concatenate([self.turn @ rows[:count], rows[count:]])
+def _turned(turn: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows of all files, then of held inputs and priors, with those of vibrations along and across."""
+    return np.concatenate([turn @ rows[: len(turn)], rows[len(turn) :]])
 
 
-def _at_solution(result: FitResult) -> _AtSolution:
+def _at_solution(best: Optimum) -> LinearFit:
     """The fit linearised at its optimum; what is no parameter but was fitted too counts as one."""
-    best = result.optimum
     problem, residuals = best.residuals.problem, best.residuals
-    count, parts = problem.measured.size, best.at
-    turn = _rotation(result)
-    more = np.zeros((parts.size - residuals.base.shape[0], residuals.base.shape[1]))
-    whole = np.hstack([-best.slopes, np.concatenate([residuals.base, more])])
-    known = np.zeros(parts.size, dtype=np.bool_)
-    known[:count] = problem.group < 0
-    blocks = np.concatenate([_titles(b.observations, b.measured.size) for b in problem.blocks])
-    rest = np.full(parts.size - count, "")
-    return _AtSolution(
-        fit=LinearFit(
-            residuals=np.concatenate([turn @ parts[:count], parts[count:]]),
-            derivatives=np.concatenate([turn @ whole[:count], whole[count:]]),
-            block=np.concatenate([blocks, rest]),
-            known_noise=known,
-        ),
+    count, rows = problem.measured.size, best.at
+    turn = _rotation(problem, best.t)
+    more = np.zeros((rows.size - residuals.base.shape[0], residuals.base.shape[1]))
+    blocks = [_titles(block.observations, block.measured.size) for block in problem.blocks]
+    return LinearFit(
+        residuals=_turned(turn, rows),
+        derivatives=_turned(turn, np.hstack([-best.slopes, np.concatenate([residuals.base, more])])),
+        block=np.concatenate([*blocks, np.full(rows.size - count, "")]),
+        known_noise=np.concatenate([problem.group < 0, np.zeros(rows.size - count, dtype=np.bool_)]),
         turn=turn,
     )
 
@@ -397,9 +383,8 @@ def _titles(observations: Observations, size: int) -> StringArray:
     return np.repeat([f"{title} {part}" for part in parts], len(observations))
 
 
-def _rotation(result: FitResult) -> FloatArray:
+def _rotation(problem: Problem, t: FloatArray) -> FloatArray:
     """Rotates a vibration's real and imaginary part into those along its predicted change and across."""
-    problem, t = result.optimum.residuals.problem, result.optimum.t
     predicted, turn = problem.at(t), np.eye(problem.measured.size)
     for block, mine in problem.rows:
         rows = len(block.observations)

@@ -21,7 +21,7 @@ from ringbalance.identification.kinds.kind import Observations
 from ringbalance.reduced_model.injection.dynamics import WORKSPACE, X
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.march import advance
-from ringbalance.reduced_model.injection.pair import Motion, packed
+from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw, nominal_law
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.residual_liquid import Holding
@@ -138,7 +138,7 @@ class Device:
         """
         plant, work = self._plant, np.zeros(WORKSPACE)
         plant["gas_pressure"] = pressure + self.scene.gas.pressure - self.models.gas_pressure
-        motion = packed(plant, fill=fill, primed=False, motion=Motion())
+        motion = at_rest(plant, fill=fill)
         # Of a shorter time the model would have nothing left to start.
         left = max(gas_time - self._delay, _LEAST_LEFT * gas_time)
         command(plant[0], motion[0], chamber, left)

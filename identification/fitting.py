@@ -35,7 +35,7 @@ from ringbalance.scene.narrowing import AnyScene
 from ringbalance.scene.origins import Origin
 from ringbalance.scene.uncertain import NORMAL_95
 
-LAMBDA_FAR: Final = 2**0.25
+_LAMBDA_FAR: Final = 2**0.25
 """Factor on lambda, or its inverse, from which it is doubted: halfway, in logarithms, from 1 to the square
 root of two that rms amplitudes are wrong by where zero to peak is stated."""
 
@@ -85,7 +85,7 @@ class FittedParameter:
             found.append(
                 "the fitted value lies outside what the scene's [uncertainty] states; one of the two is wrong"
             )
-        if self.name == "lambda_factor" and not 1 / LAMBDA_FAR < self.value < LAMBDA_FAR:
+        if self.name == "lambda_factor" and not 1 / _LAMBDA_FAR < self.value < _LAMBDA_FAR:
             found.append(
                 "lambda follows from the geometry within a few percent, and a value so far from 1 mostly has "
                 "another cause: how amplitudes are counted, a unit, the influence coefficient, or the law"
@@ -172,7 +172,7 @@ class FitResult:
 
 
 Loss = Literal["linear", "soft_l1"]
-STARTS: Final = 3
+_STARTS: Final = 3
 _NO_EFFECT: Final = 1e-3
 """Of a standard deviation of the data, in all, below which a held input is left out."""
 _HALF: Final = 0.5
@@ -186,7 +186,7 @@ def fit(
     data: Sequence[Observations],
     parameters: Sequence[str] | None = None,
     loss: Loss = "linear",
-    starts: int = STARTS,
+    starts: int = _STARTS,
 ) -> FitResult:
     """Fit parameters of a scene to measurements.
 

@@ -23,7 +23,7 @@ from ringbalance.results.rows import Value, text_of
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.narrowing import AnyScene
 
-ASSUMED_NOISE: Final = 0.01
+_ASSUMED_NOISE: Final = 0.01
 """Standard deviation of a kind that was not measured, relative to the largest that is predicted."""
 _BEYOND: Final = (0.5, 1.0, 2.0)
 """Of the middle of what was measured, or of what makes the vibration at the start."""
@@ -96,7 +96,7 @@ def _candidates(result: FitResult) -> Iterator[Candidate]:
         free = _free(problem, before, block)
         rows = np.hstack([by_parameters[mine], free, by_held[mine]])
         scale = 1 / _noise(result, before, block, asked.at(t)[mine])
-        assumed = "" if before is not None else f" (noise of {100 * ASSUMED_NOISE:g} % assumed)"
+        assumed = "" if before is not None else f" (noise of {100 * _ASSUMED_NOISE:g} % assumed)"
         for i in range(count):
             yield Candidate(
                 text=f"{_words_of(block.observations, i)}{assumed}",
@@ -110,7 +110,7 @@ def _noise(result: FitResult, measured: Block | None, block: Block, predicted: F
     residuals = result.optimum.residuals
     if measured is None:
         parts = np.reshape(predicted, (-1, len(block.observations)))
-        return np.full(size, ASSUMED_NOISE * max(float(np.max(np.hypot.reduce(parts, axis=0))), 1e-300))
+        return np.full(size, _ASSUMED_NOISE * max(float(np.max(np.hypot.reduce(parts, axis=0))), 1e-300))
     if not measured.estimated:
         return np.ones(size)
     return np.full(size, residuals.noise[residuals.problem.estimated_groups.index(measured.group)])

@@ -25,12 +25,12 @@ LAMINAR: Final = "laminar flow (a loss in proportion to the velocity)"
 TURBULENT: Final = "turbulent flow (a loss in proportion to its square)"
 UNBROKEN: Final = "a column that never separates over the crest"
 BROKEN: Final = "a column that separates at ambient pressure"
-UNSPILT: Final = "a column that runs full without spilling first"
-EXPONENTS: Final[Mapping[str, float]] = MappingProxyType({LAMINAR: 1.0, TURBULENT: 2.0})
+_UNSPILT: Final = "a column that runs full without spilling first"
+_EXPONENTS: Final[Mapping[str, float]] = MappingProxyType({LAMINAR: 1.0, TURBULENT: 2.0})
 """Of the loss over the velocity, of those of these laws that are powers."""
-_OF_THE_CREST: Final = (UNBROKEN, BROKEN, UNSPILT)
+_OF_THE_CREST: Final = (UNBROKEN, BROKEN, _UNSPILT)
 
-WITHOUT: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
+_WITHOUT: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = MappingProxyType(
     {
         "a rotor without damping": ("run_up", ("rotor.damping",)),
         "masses without friction": ("positioning", ("masses.friction_arm[0]", "masses.friction_arm[1]")),
@@ -44,7 +44,7 @@ def by_other_machines(problem: Problem, scene: EccentricScene) -> Iterator[tuple
     """Without one of the effects that move the data, unless its size is fitted: then its interval tells."""
     fitted = {parameter.name for parameter in problem.parameters}
     kinds = {block.observations.kind for block in problem.blocks}
-    for name, (kind, paths) in WITHOUT.items():
+    for name, (kind, paths) in _WITHOUT.items():
         if kind in kinds and not fitted & set(paths):
             yield name, problem.predicted(with_values_at(scene, dict.fromkeys(paths, 0.0)))
 
@@ -61,7 +61,7 @@ def by_other_tubes(problem: Problem, scene: Scene) -> Iterator[tuple[str, FloatA
         yield (
             name,
             np.concatenate(
-                [b.whiten @ _predicted(b, scene, other, EXPONENTS.get(name)) for b in problem.blocks]
+                [b.whiten @ _predicted(b, scene, other, _EXPONENTS.get(name)) for b in problem.blocks]
             ),
         )
 
@@ -109,18 +109,18 @@ def _straight(table: HermiteTable, velocity: float, exponent: float) -> HermiteT
 
 def _other_law(law: CalibratedLaw, *, name: str, velocity: float) -> CalibratedLaw:
     """The other law of a name, from the fitted one; a power has the same loss at a velocity, m/s."""
-    if name in EXPONENTS:
-        return power_of(law, velocity, EXPONENTS[name])
+    if name in _EXPONENTS:
+        return power_of(law, velocity, _EXPONENTS[name])
     if name == UNBROKEN:
         heads = replace(law.heads, hump_head=None, return_hump_head=None)
         return replace(law, path=replace(law.path, hump_pressure=None), heads=heads)
     if name == BROKEN:
         return replace(law, path=replace(law.path, vapour_pressure=0.0, released=0.0))
-    if name == UNSPILT:
+    if name == _UNSPILT:
         return replace(law, path=replace(law.path, froude_velocity=0.0))
     raise ValueError(f"{name!r} is no other law")
 
 
 def _laws_to_compare(law: CalibratedLaw) -> tuple[str, ...]:
     """Names of those that mean something for a law: a tube without crest has no column to break."""
-    return (*EXPONENTS, *(() if law.path.hump_pressure is None else _OF_THE_CREST))
+    return (*_EXPONENTS, *(() if law.path.hump_pressure is None else _OF_THE_CREST))

@@ -9,7 +9,7 @@ restricted to what parameters, held inputs and free unknowns leave (A their slop
 estimated again, y' what was measured as the other reading has it.  The other reading is fitted linearly from
 the scene, so that it loses a little by curvature; the given one from its optimum.  Both know that lambda
 follows from the geometry: without that, peak to peak in one file is a lambda of two.  A reading is named from
-a gain of `DECISIVE` on: of thirty, and one file in a hundred read wrongly, odds of 100 to 1 are left.
+a gain of `_DECISIVE` on: of thirty, and one file in a hundred read wrongly, odds of 100 to 1 are left.
 Source: restricted likelihood, Harville, J. Am. Stat. Assoc. 72 (1977) 320; slopes of held inputs in
 proportion to the prediction are ours.
 """
@@ -31,7 +31,7 @@ from ringbalance.identification.optimisation import Optimum
 from ringbalance.results.rows import text_of
 from ringbalance.scene.arrays import FloatArray
 
-FAR: Final = 5.0
+_FAR: Final = 5.0
 """Ratio of a column's median to the nearer end of the scene's range: below the ten of the smallest mistake of
 a unit, and beyond what a test rig changes."""
 _FAR_VIBRATION: Final = 100.0
@@ -65,7 +65,7 @@ def compared_columns(problem: Problem) -> Iterator[ComparedColumn]:
             low, high = known
             middle = float(np.median(np.abs(values[values != 0])))
             ratio = middle / high if middle > high else middle / low if middle < low else 1.0
-            limit = _FAR_VIBRATION if column.amplitude else FAR
+            limit = _FAR_VIBRATION if column.amplitude else _FAR
             yield ComparedColumn(
                 file=observations.file,
                 column=column.name,
@@ -175,7 +175,7 @@ def _seconds(observations: Observations, _: Any) -> Observations | None:
     return observations.with_columns(gas_time=times) if np.median(times) < _LONGEST_TIME else None
 
 
-MISREADINGS: Final[Mapping[str, _Misreading]] = {
+_MISREADINGS: Final[Mapping[str, _Misreading]] = {
     "before_and_after_exchanged": _Misreading(
         words="vibrations before and after exchanged", change=_exchanged, settings=False, together=False
     ),
@@ -228,7 +228,7 @@ MISREADINGS: Final[Mapping[str, _Misreading]] = {
 """By code."""
 
 
-DECISIVE: Final = math.log(1e6)
+_DECISIVE: Final = math.log(1e6)
 """Gain of the log likelihood."""
 _ROUNDS: Final = 12
 _AGREES: Final = 1e-2
@@ -262,7 +262,7 @@ def other_readings(best: Optimum, ranges: Sequence[ComparedColumn] = ()) -> tupl
     compare, far = _Comparison.of(best), {(each.file, each.column) for each in ranges if each.fails}
     tried = [
         (code, chosen, compare.gain(kind, chosen))
-        for code, kind in MISREADINGS.items()
+        for code, kind in _MISREADINGS.items()
         for chosen in _choices(compare.problem, kind)
     ]
     gains = sorted(
@@ -283,8 +283,8 @@ def other_readings(best: Optimum, ranges: Sequence[ComparedColumn] = ()) -> tupl
 
 def _asked(problem: Problem, code: str, chosen: Sequence[int], far: Collection[tuple[str, str]]) -> float:
     """Gain of the log likelihood from which a reading is named."""
-    changed = [(problem.blocks[i].observations.file, MISREADINGS[code].column) for i in chosen]
-    return 0.0 if all(each in far for each in changed) else DECISIVE
+    changed = [(problem.blocks[i].observations.file, _MISREADINGS[code].column) for i in chosen]
+    return 0.0 if all(each in far for each in changed) else _DECISIVE
 
 
 def _reading(problem: Problem, code: str, chosen: Sequence[int], gain: float, *, named: bool) -> Reading:
@@ -292,7 +292,7 @@ def _reading(problem: Problem, code: str, chosen: Sequence[int], gain: float, *,
     text = text_of(
         "read_otherwise_better" if named else "read_otherwise",
         files=" and ".join(Path(file).name for file in files),
-        reading=MISREADINGS[code].words,
+        reading=_MISREADINGS[code].words,
         gain=f"{gain:+.3g}",
     )
     return Reading(code=code, files=files, gain=gain, named=named, text=text)

@@ -6,11 +6,9 @@ models of the tube; and, in [fitted], how uncertain all of these are together.
 
 from __future__ import annotations
 
-import os
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from itertools import combinations
 from pathlib import Path, PurePath
 from typing import Any, Final
@@ -22,19 +20,16 @@ from ringbalance.identification.identifiability import Combination
 from ringbalance.identification.kinds.kind import Observations
 from ringbalance.identification.parameters import START, inputs_of, path_of
 from ringbalance.results.rows import text_of
+from ringbalance.scene.changes import document_of, file_text
 from ringbalance.scene.describe import usual_unit
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.fitted import ERROR_NAME, MODEL, NO_UNIT, ModelError
+from ringbalance.scene.fitted import ERROR_NAME, MODEL, NO_UNIT
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import ORIGIN
 from ringbalance.scene.kinds import scene_kind
-from ringbalance.scene.loader import scene_from
-from ringbalance.scene.models import Scene
 from ringbalance.scene.narrowing import AnyScene, liquid_ring_scene
-from ringbalance.scene.origins import MeasuredFile, MeasuredFinding
+from ringbalance.scene.origins import MeasuredFile, MeasuredFinding, Origin
 from ringbalance.scene.platform.files import write_whole
-from ringbalance.scene.registry import balancers
-from ringbalance.scene.toml import toml_bytes
 from ringbalance.scene.uncertain import NORMAL_95, SHAPE
 from ringbalance.scene.units import DIMENSIONS, format_quantity, unit_factor, unit_of
 
@@ -57,37 +52,79 @@ _CUT: Final = "the interval of {} is wider than its value, which a scene cannot 
 def save_result(
     path: Path,
     *,
-    text: str,
+    scene: AnyScene,
     result: FitResult,
     data: Sequence[Observations],
-    folder: Path,
     said: Sequence[str] = (),
 ) -> Path:
-    """Write the scene that a fit found, see `_save_fitted`.
+    """Write the scene that a fit found, see `fitted_scene`: every key of the scene stays, no comment does.
 
-    Args: `folder`: of the scene file that was fitted. `said`: what the criticism of the fit says.
+    Args: `scene`: that was fitted. `said`: what the criticism of the fit says.
+    Raises: SceneError: the fitted values make no scene. OSError: the file cannot be written.
     """
-    text = _found_from(text, folder=folder, to=path.parent)
     files = [
         MeasuredFile(file=PurePath(each.file).name, kind=each.kind, rows=len(each), sha256=each.sha256)
         for each in data
     ]
-    findings = [
-        *(MeasuredFinding(about="residuals", text=_short(each)) for each in said),
-        *(
-            MeasuredFinding(about="value", text=_short(f"{each.name}: {doubt}"))
-            for each in result.parameters
-            for doubt in each.doubts
-        ),
-        *(MeasuredFinding(about="value", text=_short(each.text)) for each in result.pulled),
-        *(MeasuredFinding(about="combination", text=_combination(each)) for each in result.combinations),
-        *(MeasuredFinding(about="correlation", text=each) for each in _correlations(result)),
+    texts = [
+        *(("residuals", each) for each in said),
+        *(("value", f"{each.name}: {doubt}") for each in result.parameters for doubt in each.doubts),
+        *(("value", each.text) for each in result.pulled),
+        *(("combination", _combination(each)) for each in result.combinations),
+        *(("correlation", each) for each in _correlations(result)),
     ]
-    fitted = [each for each in result.parameters if each.name not in START]
-    together = _joint_entries(result)
-    return _save_fitted(
-        path, text=text, fitted=fitted, files=files, findings=findings, joint=together, scene=result.scene
+    saved = fitted_scene(
+        scene,
+        fitted=[each for each in result.parameters if each.name not in START],
+        files=files,
+        findings=[MeasuredFinding(about=about, text=_short(text)) for about, text in texts],
+        joint=_joint_entries(result),
+        found=result.scene,
     )
+    return write_whole(path, file_text(saved, to=path.parent))
+
+
+def fitted_scene(
+    scene: AnyScene,
+    *,
+    fitted: Sequence[FittedParameter],
+    files: Sequence[MeasuredFile],
+    findings: Sequence[MeasuredFinding] = (),
+    joint: Sequence[_JointEntry] = (),
+    found: AnyScene | None = None,
+) -> AnyScene:
+    """A scene with fitted values, their uncertainties and origins, checked as a file is.
+
+    Held inputs stay as stated where their fitted values make no scene, such as a wall inside the port.
+    Args: `joint`: what was fitted together. `found`: the scene that has the values of its held inputs.
+    Raises: SceneError: the fitted values make no scene, such as a crest outside the port. ValueError: a path
+        that no scene file has.
+    """
+    pulled = list(joint)
+    while True:
+        changes = _Changes(scene)
+        if found is not None and joint:
+            _put_joint(changes, joint, pulled, found)
+        placed = [(changes.place(each.path), each) for each in fitted]
+        for place, each in placed:
+            changes.put(place, each.value, origin=each.origin)
+        cut = tuple(_put_widths(changes, placed))
+        changes.values["measured.files"] = [asdict(each) for each in files]
+        changes.values["measured.quantities"] = [_record(place, each) for place, each in placed]
+        changes.values["measured.findings"] = [asdict(each) for each in (*findings, *cut)]
+        try:
+            return scene.with_values(changes.whole())
+        except SceneError as error:
+            pulled = _fewer(pulled, error)
+
+
+def _fewer(pulled: Sequence[_JointEntry], error: SceneError) -> list[_JointEntry]:
+    """Without those that the error names, else those of the disc, else all held ones. Raises: SceneError."""
+    everything = {each.key for each in pulled}
+    for suspected in ({fault.key for fault in error.faults}, set(SHAPE), everything):
+        if suspected & everything:
+            return [each for each in pulled if each.key not in suspected]
+    raise error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,66 +135,88 @@ class _Place:
     key: str
     entry: int | None
     """Of a list; None for a single value."""
-    by_table: bool
-    """Whether [uncertainty] has a table for each table."""
+    width: str
+    """Path of its uncertainty."""
     dimension: str | None
     unit: str
     """Empty for a number without unit."""
 
+    @property
+    def path(self) -> str:
+        """Of the value, or of the list."""
+        return f"{self.table}.{self.key}"
+
     def written(self, value: float) -> str | float:
-        """A value as it stands in the file."""
+        """A value, SI, as it stands in the file."""
         number = self.number(value)
         return number if self.dimension is None else f"{number!r} {self.unit}"
 
     def number(self, value: float) -> float:
         """A value, SI, in the unit."""
         if self.dimension is None:
-            return float(f"{value:.{_DIGITS}g}")
+            return _rounded(value)
         return float(format_quantity(value, self.dimension, self.unit, digits=_DIGITS).split(" ")[0])
 
     def difference(self, value: float) -> float:
         """A difference of two values, SI, in the unit."""
-        return float(f"{value / (unit_factor(self.unit) if self.unit else 1.0):.{_DIGITS}g}")
-
-    def put(self, document: dict[str, Any], value: float) -> bool:
-        """Write a value, SI; whether that changes the document."""
-        content, written = document.setdefault(self.table, {}), self.written(value)
-        before = content.get(self.key)
-        if self.entry is None:
-            content[self.key] = written
-        else:
-            both = list(before or [self.written(0.0)] * _ENTRIES)
-            both[self.entry] = written
-            content[self.key] = both
-        return bool(content[self.key] != before)
-
-    def uncertainties(self, document: dict[str, Any]) -> dict[str, Any]:
-        """Where the document states its uncertainty."""
-        stated: dict[str, Any] = document.setdefault("uncertainty", {})
-        return stated.setdefault(self.table, {}) if self.by_table else stated
+        return _rounded(value / (unit_factor(self.unit) if self.unit else 1.0))
 
 
-def _place_of(path: str, document: Mapping[str, Any]) -> _Place:
-    """The place of a path such as "tube.bore" or "masses.friction_arm[0]".
+@dataclass
+class _Changes:
+    """Values of a scene file that a fit gives, by path, and their origins."""
 
-    Raises: ValueError: a scene file has no such value.
-    """
-    schema = scene_kind(document.get("balancer", balancers()[0])).schema
-    match = _ENTRY.fullmatch(path)
-    if match is None or match[1] not in schema.tables or match[2] not in schema.tables[match[1]].keys:
-        raise ValueError(f"a scene file has no value {path!r}")
-    table, key, entry = match.groups()
-    takes = schema.key_at((table, key)).takes
-    dimension = takes.dimension if isinstance(takes, Reader) else None
-    here = document.get(table, {}).get(key)
-    return _Place(
-        table=table,
-        key=key,
-        entry=None if entry is None else int(entry),
-        by_table=table in schema.tables["uncertainty"].keys,
-        dimension=dimension,
-        unit=_unit(here, path, dimension),
-    )
+    scene: AnyScene
+    values: dict[str, Any] = field(default_factory=dict)
+    origins: dict[str, dict[str, Origin]] = field(default_factory=dict)
+
+    def before(self, path: str) -> Any:
+        """What the file has at a path; None for nothing."""
+        value: Any = document_of(self.scene)
+        for step in path.split("."):
+            value = value.get(step) if isinstance(value, Mapping) else None
+        return value
+
+    def place(self, path: str) -> _Place:
+        """The place of a path such as "tube.bore" or "masses.friction_arm[0]".
+
+        Raises: ValueError: a scene file has no such value.
+        """
+        schema = scene_kind(self.scene.balancer).schema
+        match = _ENTRY.fullmatch(path)
+        if match is None or match[1] not in schema.tables or match[2] not in schema.tables[match[1]].keys:
+            raise ValueError(f"a scene file has no value {path!r}")
+        table, key, entry = match.groups()
+        takes = schema.key_at((table, key)).takes
+        dimension = takes.dimension if isinstance(takes, Reader) else None
+        by_table = table in schema.tables["uncertainty"].keys
+        return _Place(
+            table=table,
+            key=key,
+            entry=None if entry is None else int(entry),
+            width=f"uncertainty.{table}.{key}" if by_table else f"uncertainty.{key}",
+            dimension=dimension,
+            unit=_unit(self.before(f"{table}.{key}"), path, dimension),
+        )
+
+    def put(self, place: _Place, value: float, *, origin: Origin) -> None:
+        """Write a value, SI."""
+        written: Any = place.written(value)
+        if place.entry is not None:
+            zeros = [place.written(0.0)] * _ENTRIES
+            both = list(self.values.get(place.path) or self.before(place.path) or zeros)
+            both[place.entry] = written
+            written = both
+        self.values[place.path] = written
+        self.origins.setdefault(place.table, {})[place.key] = origin
+
+    def whole(self) -> dict[str, Any]:
+        """Values and, after them, origins, by path."""
+        origins = {
+            f"{table}.{ORIGIN}": {**(self.before(f"{table}.{ORIGIN}") or {}), **keys}
+            for table, keys in self.origins.items()
+        }
+        return {**self.values, **origins}
 
 
 def _unit(here: object, path: str, dimension: str | None) -> str:
@@ -165,11 +224,8 @@ def _unit(here: object, path: str, dimension: str | None) -> str:
     if dimension is None:
         return ""
     one = here[0] if isinstance(here, list) and here else here
-    return (
-        (unit_of(one) if isinstance(one, str) else "")
-        or usual_unit(path)
-        or next(iter(DIMENSIONS[dimension].units))
-    )
+    stated = unit_of(one) if isinstance(one, str) else ""
+    return stated or usual_unit(path) or next(iter(DIMENSIONS[dimension].units))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,87 +288,87 @@ def _joint_entries(result: FitResult) -> list[_JointEntry]:
 
 
 def _put_joint(
-    document: dict[str, Any],
-    joint: Sequence[_JointEntry],
-    pulled: Sequence[_JointEntry],
-    scene: AnyScene | None,
+    changes: _Changes, joint: Sequence[_JointEntry], pulled: Sequence[_JointEntry], found: AnyScene
 ) -> None:
-    """Write values of held inputs, corrections and the joint distribution into a scene's document.
+    """Values of held inputs, corrections and the joint distribution.
 
-    Args: `pulled`: those whose values are written. `scene`: that has them.
+    Args: `pulled`: those whose values are written. `found`: the scene that has them.
     """
-    if scene is None or not joint:
-        return
-    values = [(_place_of(each.path, document), each) for each in pulled if each.held and not each.is_model]
-    known = inputs_of(scene).inputs
-    for place, each in values:
-        _put_value(document, place, known[each.name].value)
-        _put_width(document, place, each.standard_deviation, known[each.name].value)
+    known = inputs_of(found).inputs
+    for each in pulled:
+        if each.held and not each.is_model:
+            _put_held(changes, changes.place(each.path), known[each.name].value, each.standard_deviation)
     if any(each.is_model for each in joint):
-        _put_errors(document, liquid_ring_scene(scene))
-    if any(each.name == "pressure" for each in (*pulled, *joint) if each in pulled or not each.held):
-        correction = liquid_ring_scene(scene).gas.gauge_correction
-        _place_of("gas.gauge_correction", document).put(document, correction)
-    document["fitted"] = {"quantities": list(_quantities(document, joint))}
-
-
-def _put_value(document: dict[str, Any], place: _Place, value: float) -> None:
-    """Write a value that a fit has moved; where it stays as it is, nothing changes."""
-    if place.put(document, value):
-        document[place.table].setdefault(ORIGIN, {})[place.key] = "inferred"
-
-
-def _put_width(document: dict[str, Any], place: _Place, size: float, value: float) -> None:
-    """State the uncertainty that is left, for whoever looks at one quantity."""
-    if place.entry is None:
-        place.uncertainties(document)[place.key] = place.written(
-            min(NORMAL_95 * size, abs(value)) if value else NORMAL_95 * size
-        )
-
-
-def _put_errors(document: dict[str, Any], scene: Scene) -> None:
-    """Corrections of models, one entry a cause."""
-    causes = dict.fromkeys(each.cause for each in scene.tube.model_errors)
-    sums = [
-        ModelError(
-            cause=cause,
-            even=sum(each.even for each in scene.tube.model_errors if each.cause == cause),
-            odd=sum(each.odd for each in scene.tube.model_errors if each.cause == cause),
-        )
-        for cause in causes
-    ]
-    if sums:
-        document["tube"]["model_errors"] = [
-            {"cause": each.cause, "even": _rounded(each.even), "odd": _rounded(each.odd)} for each in sums
-        ]
-        document["tube"].setdefault(ORIGIN, {})["model_errors"] = "inferred"
-
-
-def _quantities(document: dict[str, Any], joint: Sequence[_JointEntry]) -> Iterator[dict[str, Any]]:
-    for each in joint:
-        place = None if each.is_model else _place_of(each.path, document)
-        yield {
+        _put_errors(changes, found)
+    if any(each.name == "pressure" for each in (*pulled, *(one for one in joint if not one.held))):
+        place = changes.place("gas.gauge_correction")
+        changes.values[place.path] = place.written(liquid_ring_scene(found).gas.gauge_correction)
+    places = [None if each.is_model else changes.place(each.path) for each in joint]
+    changes.values["fitted.quantities"] = [
+        {
             "quantity": each.path,
             "unit": NO_UNIT if place is None or not place.unit else place.unit,
-            "standard_deviation": _rounded(each.standard_deviation)
-            if place is None
-            else place.difference(each.standard_deviation),
+            "standard_deviation": place.difference(each.standard_deviation)
+            if place is not None
+            else _rounded(each.standard_deviation),
             "correlations": list(each.correlations),
         }
+        for place, each in zip(places, joint, strict=True)
+    ]
+
+
+def _put_held(changes: _Changes, place: _Place, value: float, size: float) -> None:
+    """A value that a fit has moved, and what is left of its uncertainty for whoever looks at it alone."""
+    before = changes.before(place.path)
+    here = before[place.entry] if place.entry is not None and isinstance(before, list) else before
+    if here != place.written(value):
+        changes.put(place, value, origin="inferred")
+    if place.entry is None:
+        width = min(NORMAL_95 * size, abs(value)) if value else NORMAL_95 * size
+        changes.values[place.width] = place.written(width)
+
+
+def _put_errors(changes: _Changes, found: AnyScene) -> None:
+    """Corrections of models, one entry a cause."""
+    errors = liquid_ring_scene(found).tube.model_errors
+    sums = [
+        {
+            "cause": cause,
+            "even": _rounded(sum(each.even for each in errors if each.cause == cause)),
+            "odd": _rounded(sum(each.odd for each in errors if each.cause == cause)),
+        }
+        for cause in dict.fromkeys(each.cause for each in errors)
+    ]
+    if sums:
+        changes.values["tube.model_errors"] = sums
+        changes.origins.setdefault("tube", {})["model_errors"] = "inferred"
+
+
+def _put_widths(
+    changes: _Changes, placed: Iterable[tuple[_Place, FittedParameter]]
+) -> Iterator[MeasuredFinding]:
+    """Write the uncertainties; entries of a list share the largest. Yields: What a scene cannot state."""
+    by_path: dict[str, list[tuple[_Place, FittedParameter]]] = {}
+    for place, one in placed:
+        by_path.setdefault(place.path, []).append((place, one))
+    for group in by_path.values():
+        place, each = group[0][0], [one for _, one in group]
+        width = max((w for one in each if (w := one.half_width) is not None), default=None)
+        if width is None:
+            continue
+        if place.entry is not None and len(each) < _ENTRIES and changes.before(place.width) is not None:
+            # The uncertainty stands for both entries, and nothing was learnt of the other one.
+            yield MeasuredFinding(about="uncertainty", text=_KEPT.format(each[0].path))
+            continue
+        largest = min(abs(one.value) for one in each)
+        cut = width > largest and place.key not in _ANY_SIGN
+        changes.values[place.width] = place.written(largest if cut else width)
+        if cut:
+            yield MeasuredFinding(about="uncertainty", text=_CUT.format(each[0].path))
 
 
 def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS}g}")
-
-
-def _found_from(text: str, *, folder: Path, to: Path) -> str:
-    """A scene whose mesh, if it names one, is found from another folder."""
-    document = tomllib.loads(text)
-    mesh = document.get("disc", {}).get("mesh")
-    if mesh is None or folder.resolve() == to.resolve():
-        return text
-    document["disc"]["mesh"] = Path(os.path.relpath(folder / mesh, to)).as_posix()
-    return toml_bytes(document).decode()
 
 
 def _combination(found: Combination) -> str:
@@ -330,94 +386,6 @@ def _correlations(result: FitResult) -> Iterator[str]:
 def _short(text: str) -> str:
     """Text that a scene file takes."""
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
-
-
-def _save_fitted(
-    path: Path,
-    *,
-    text: str,
-    fitted: Sequence[FittedParameter],
-    files: Sequence[MeasuredFile],
-    findings: Sequence[MeasuredFinding] = (),
-    joint: Sequence[_JointEntry] = (),
-    scene: AnyScene | None = None,
-) -> Path:
-    """Write a scene with fitted values, their uncertainties and origins; whole or not at all.
-
-    Every key of the scene stays, its comments do not.
-    Held inputs stay as stated where their fitted values make no scene, such as a wall inside the port.
-    Args: `text`: of the scene file that was fitted. `joint`: what was fitted together. `scene`: as fitted.
-    Raises: SceneError: the fitted values make no scene, such as a crest outside the port. OSError: the file
-        cannot be written.
-    """
-    held = list(joint)
-    while True:
-        content = _fitted_scene(
-            text, fitted=fitted, files=files, findings=findings, joint=joint, pulled=held, scene=scene
-        )
-        try:
-            scene_from(content=content, file=str(path))
-        except SceneError as error:
-            wrong = {fault.key for fault in error.faults}
-            for suspected in (wrong, set(SHAPE), {each.key for each in held}):
-                left = [each for each in held if each.key not in suspected]
-                if len(left) < len(held):
-                    held = left
-                    break
-            else:
-                raise
-        else:
-            return write_whole(path, content.decode())
-
-
-def _fitted_scene(
-    text: str,
-    *,
-    fitted: Sequence[FittedParameter],
-    files: Sequence[MeasuredFile],
-    findings: Sequence[MeasuredFinding] = (),
-    joint: Sequence[_JointEntry] = (),
-    pulled: Sequence[_JointEntry] = (),
-    scene: AnyScene | None = None,
-) -> bytes:
-    """The bytes of that scene, not yet tried. Args: `pulled`: those of `joint` whose values are written."""
-    document: dict[str, Any] = tomllib.loads(text)
-    _put_joint(document, joint, pulled, scene)
-    placed = [(_place_of(each.path, document), each) for each in fitted]
-    for place, each in placed:
-        place.put(document, each.value)
-        document[place.table].setdefault(ORIGIN, {})[place.key] = each.origin
-    cut = tuple(_put_widths(document, placed))
-    document["measured"] = {
-        "files": [asdict(each) for each in files],
-        "quantities": [_record(place, each) for place, each in placed],
-        "findings": [asdict(each) for each in (*findings, *cut)],
-    }
-    return toml_bytes(document)
-
-
-def _put_widths(
-    document: dict[str, Any], placed: Iterable[tuple[_Place, FittedParameter]]
-) -> Iterator[MeasuredFinding]:
-    """Write the uncertainties; entries of a list share the largest. Yields: What a scene cannot state."""
-    by_key: dict[tuple[str, str], list[tuple[_Place, FittedParameter]]] = {}
-    for place, one in placed:
-        by_key.setdefault((place.table, place.key), []).append((place, one))
-    for group in by_key.values():
-        place, each = group[0][0], [one for _, one in group]
-        width = max((w for one in each if (w := one.half_width) is not None), default=None)
-        if width is None:
-            continue
-        largest = min(abs(one.value) for one in each)
-        cut = width > largest and place.key not in _ANY_SIGN
-        inside = place.uncertainties(document)
-        if place.entry is not None and len(each) < _ENTRIES and place.key in inside:
-            # The uncertainty stands for both entries, and nothing was learnt of the other one.
-            yield MeasuredFinding(about="uncertainty", text=_KEPT.format(each[0].path))
-            continue
-        inside[place.key] = place.written(largest if cut else width)
-        if cut:
-            yield MeasuredFinding(about="uncertainty", text=_CUT.format(each[0].path))
 
 
 def _record(place: _Place, fitted: FittedParameter) -> dict[str, Any]:

@@ -25,7 +25,7 @@ LARGEST_FILE: Final = 8 * 2**20
 MOST_ROWS: Final = 2000
 """A row is a measurement; more of them are a recording, which is averaged or thinned out first. A fit
 holds the covariance of every pair of rows: more would take gigabytes."""
-SERIES: Final = "series"
+_SERIES: Final = "series"
 _MARK: Final = "#"
 _SEPARATORS: Final = ";\t,"
 _SETS_A_KEY: Final = re.compile(r'"?#\s*\w+\s*=')
@@ -87,7 +87,7 @@ class Table:
     @property
     def series(self) -> StringArray:
         """The column of series, or one series for all rows."""
-        return np.array(self.texts(SERIES) if SERIES in self.heads else ("one",) * len(self.rows))
+        return np.array(self.texts(_SERIES) if _SERIES in self.heads else ("one",) * len(self.rows))
 
     def texts(self, head: str) -> tuple[str, ...]:
         """The cells of a column of text."""

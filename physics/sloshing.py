@@ -7,8 +7,10 @@ across the shaft at every speed. A new force on the free surface or another damp
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -40,45 +42,41 @@ class _SloshingModes:
     """s, natural angular frequency seen in the disc over the angular velocity, shape (n, modes)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Meshes:
-    """On which waves are solved: those given of a sector, two of an imported chamber's section."""
+def _systems(
+    disc: Disc, radius: float, cells: tuple[tuple[int, int], ...]
+) -> Iterator[tuple[SloshingSystem, float]]:
+    """The problem below a surface of a radius, m, and its unit of length, m, finest mesh first.
 
-    disc: Disc
-    cells: tuple[tuple[int, int], ...]
-    """Of a sector, finest first."""
+    Of a sector on meshes with these cells; of an imported chamber's middle section on two.
+    """
+    if disc.geometry is None:
+        for each in cells:
+            yield sloshing_system(disc=disc, surface_radius=radius, cells=each), disc.outer_radius
+        return
+    for coarse in (False, True):
+        yield imported_system(disc.geometry, surface_radius=radius, width=disc.axial_width, coarse=coarse)
 
-    @property
-    def levels(self) -> tuple[int, ...]:
-        """Numbers of the meshes, finest first."""
-        return tuple(range(len(self.cells) if self.disc.geometry is None else 2))
 
-    def system(self, radius: float, level: int) -> tuple[SloshingSystem, float]:
-        """The problem below a surface of this radius, m, and its unit of length, m."""
-        disc = self.disc
-        if disc.geometry is None:
-            found = sloshing_system(disc=disc, surface_radius=radius, cells=self.cells[level])
-            return found, disc.outer_radius
-        return imported_system(
-            disc.geometry, surface_radius=radius, width=disc.axial_width, coarse=bool(level)
-        )
+def _half_widths(
+    disc: Disc, radius: float, cells: tuple[tuple[int, int], ...], values: FloatArray
+) -> FloatArray:
+    """Uncertainties (95 %) of the values on the finest mesh. Args: `values`: shape (meshes, quantities).
 
-    def half_width(self, values: FloatArray, radius: float) -> float:
-        """Uncertainty (95 %) of the first of the values on each mesh.
-
-        Source: grid convergence of Celik et al. (2008); of a section in straight lines, of order two, all
-        that halving them changes, and what the facets of a wall, between its nodes, miss of the depth.
-        """
-        if self.disc.geometry is None:
-            noise = 1e-12 * float(np.abs(values).max())
-            sizes = [1 / counts[1] for counts in self.cells]
-            return gci(
-                values=list(values), sizes=sizes, formal_order=FORMAL_ORDER, round_off=noise
-            ).uncertainty
-        outer = self.disc.outer_radius
+    Source: grid convergence of Celik et al. (2008); of a section in straight lines, of order two, all that
+    halving them changes, and what the facets of a wall, between its nodes, miss of the depth.
+    """
+    if disc.geometry is not None:
+        outer = disc.outer_radius
         # Frequencies grow with the root of the depth; r^2 changes by twice r times the depth.
-        deeper = SAFETY * faceting(self.disc.geometry).wall / (2 * outer)
-        return float(abs(values[0] - values[1]) + deeper / (2 * (outer - radius)) * abs(values[0]))
+        deeper = SAFETY * faceting(disc.geometry).wall / (2 * outer)
+        missed = deeper / (2 * (outer - radius)) * np.abs(values[0])
+        return np.asarray(np.abs(values[0] - values[1]) + missed)
+    sizes = [1 / counts[1] for counts in cells]
+    records = (
+        gci(values=each, sizes=sizes, formal_order=FORMAL_ORDER, round_off=1e-12 * float(np.abs(each).max()))
+        for each in values.T
+    )
+    return np.array([record.uncertainty for record in records])
 
 
 def sloshing_modes(
@@ -106,14 +104,14 @@ def sloshing_modes(
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     if fills.size == 0 or not np.all((fills > 0) & (fills <= 1)) or modes < 1:
         raise ValueError("fill_ratio must lie within (0, 1], and at least one mode must be asked for")
-    meshes = _Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc, modes=modes))
-    if len(meshes.cells) != 3:
+    meshes = cells or default_sloshing_cells(disc=disc, modes=modes)
+    if len(meshes) != 3:
         raise ValueError("cells must list three meshes, finest first")
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
-    found = np.array([[_lowest(meshes, float(a), level, modes) for level in meshes.levels] for a in radii])
-    widths = [
-        [meshes.half_width(values, float(a)) for values in at.T] for a, at in zip(radii, found, strict=True)
-    ]
+    found = np.array(
+        [[_lowest(system, modes) for system, _ in _systems(disc, float(a), meshes)] for a in radii]
+    )
+    widths = [_half_widths(disc, float(a), meshes, at) for a, at in zip(radii, found, strict=True)]
     return _SloshingModes(
         fill_ratio=fills,
         surface_radius=radii,
@@ -146,12 +144,13 @@ def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ..
     if modes < 1:
         raise ValueError("at least one mode must be asked for")
     top = disc.max_fill_ratio
-    meshes = _Meshes(disc=disc, cells=default_sloshing_cells(disc=disc, modes=modes)[1:])
+    meshes = default_sloshing_cells(disc=disc, modes=modes)[1:]
     tolerance = 1e-6 if disc.geometry is None else 1e-3
 
     def excess(logarithm: float, mode: int) -> float:
         a = float(surface_radius(disc=disc, fill_ratio=np.exp(logarithm)))
-        return float(_lowest(meshes, a, 0, modes)[mode - 1] - 1)
+        system, _ = next(_systems(disc, a, meshes))
+        return float(_lowest(system, modes)[mode - 1] - 1)
 
     found = []
     low, high = np.log(1e-4 * top), float(np.log(top))
@@ -162,8 +161,8 @@ def resonant_fills(*, disc: Disc, modes: int = 4) -> tuple[tuple[int, float], ..
     return tuple(found)
 
 
-def _lowest(meshes: _Meshes, a: float, level: int, modes: int) -> FloatArray:
-    ratios = meshes.system(a, level)[0].natural_frequencies()
+def _lowest(system: SloshingSystem, modes: int) -> FloatArray:
+    ratios = system.natural_frequencies()
     if ratios.size < modes:
         raise ValueError(f"a mesh has {ratios.size} modes, not {modes}: give it more cells along the surface")
     return ratios[:modes]
@@ -268,21 +267,24 @@ def sloshing_response(
     fills = np.atleast_1d(np.asarray(fill_ratio, dtype=np.float64)).ravel()
     _check(fills, angular_velocity, kinematic_viscosity, gravity)
     radii = np.atleast_1d(surface_radius(disc=disc, fill_ratio=fills))
-    meshes = _Meshes(disc=disc, cells=cells or default_sloshing_cells(disc=disc))
+    meshes = cells or default_sloshing_cells(disc=disc)
     ekman = kinematic_viscosity / (angular_velocity * disc.outer_radius**2)
-
-    def on_mesh(radius: float, level: int) -> FloatArray:
-        system, unit = meshes.system(radius, level)
-        answers = _answers(system, np.array([1.0]), ekman)[0]
-        return np.asarray(answers * [1.0, unit / disc.outer_radius, 1.0])
-
-    found = np.array([[on_mesh(float(a), level) for level in meshes.levels] for a in radii])
-    widths = np.array(
-        [[meshes.half_width(values, float(a)) for values in at.T] for a, at in zip(radii, found, strict=True)]
+    found = np.array(
+        [
+            [
+                _answers(system, np.array([1.0]), ekman)[0] * [1.0, unit / disc.outer_radius, 1.0]
+                for system, unit in _systems(disc, float(a), meshes)
+            ]
+            for a in radii
+        ]
     )
+    widths = np.array([_half_widths(disc, float(a), meshes, at) for a, at in zip(radii, found, strict=True)])
     scale = gravity / angular_velocity**2
     amplitude = Estimate(value=scale * found[:, 0, 1], uncertainty=scale * widths[:, 1])
-    ends = np.array([_interval(meshes, float(a), ekman) for a in radii])
+    # Peaks are looked for on the mesh in the middle, if there are three.
+    middle = 0 if disc.geometry is not None else len(meshes) // 3
+    systems = (next(islice(_systems(disc, float(a), meshes), middle, None))[0] for a in radii)
+    ends = np.array([_interval(system, ekman) for system in systems])
     # At either end the solution errs by about the same share as in the middle.
     share = widths / found[:, 0]
     ends *= 1 + np.stack([-np.minimum(share, 1.0), share], axis=1)
@@ -299,14 +301,9 @@ def sloshing_response(
     )
 
 
-def _interval(meshes: _Meshes, radius: float, ekman: float) -> FloatArray:
+def _interval(system: SloshingSystem, ekman: float) -> FloatArray:
     """Ends by natural frequencies of moment, displacement (as `_answers`) and wall pressure, shape (2, 3)."""
-    # Peaks are looked for on the mesh in the middle, if there are three.
-    system, _ = meshes.system(radius, len(meshes.levels) // 3)
-
-    def response(ratios: FloatArray) -> FloatArray:
-        return _answers(system, ratios, ekman)
-
+    response = partial(_answers, system, ekman=ekman)
     return np.stack(_swept(response, natural=system.natural_frequencies()))
 
 

@@ -52,8 +52,6 @@ class Answers:
     """`Regime` of the flow at equal fills under the design's gas pressure, gas over the crest beforehand."""
     velocity: FloatArray
     """u of that flow, m/s; zero where it is blocked."""
-    primed_velocity: FloatArray
-    """The same of a tube that holds a column beforehand, m/s."""
     drag_coefficient: FloatArray
     """k at u or, blocked, at the velocity of a primed tube; u follows."""
     crest_pressure: FloatArray
@@ -78,10 +76,9 @@ class Answers:
     """Largest unbalance that all pairs together cancel in whatever direction it lies, kg m."""
     holds: BoolArray
     """Whether the fullest chamber keeps its liquid with the gas off."""
-    vibration_rate: FloatArray
-    """Change of the vibration per valve-open time at equal fills, kappa lambda rho S u, m/s."""
     loop_factor: FloatArray
-    """The same times the scene's proportional gain."""
+    """Change of the vibration per valve-open time at equal fills, kappa lambda rho S u, times the scene's
+    proportional gain."""
 
     @classmethod
     def of(cls, designs: Designs) -> Answers:
@@ -135,7 +132,6 @@ class Answers:
             moment_per_mass=ratio[0],
             regime=np.where(flow.velocity > 0, separated, Regime.BLOCKED).astype(np.int64),
             velocity=flow.velocity,
-            primed_velocity=primed.velocity,
             drag_coefficient=tube.drag_coefficient(at),
             crest_pressure=lowest[0],
             cavitation_margin=lowest[1],
@@ -148,7 +144,6 @@ class Answers:
             usable_moment=usable,
             reach=np.where(residual >= stalled, share, 1.0) * usable,
             holds=holds,
-            vibration_rate=rate,
             loop_factor=scene.controller.proportional * rate,
         )
 

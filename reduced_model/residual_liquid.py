@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.draw_down import port_depth
@@ -76,7 +76,7 @@ class ResidualLiquid:
         stated = half_widths(scene).get(FACTOR, 0.0) / scene.tube.draw_down_factor
         relative = math.hypot(stated, _by_flow(scene, rate, width))
         change = min(relative, 0.99)
-        low, high = residual_fill_ratios(scene, law=law, depth=np.array([1 - change, 1 + change])).tolist()
+        low, high = _residual_fills(scene, law, [1 - change, 1 + change]).tolist()
         stalled = stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure)
         least = min(max(x, stalled), top / 2)
         usable, share = (
@@ -109,7 +109,7 @@ class ResidualLiquid:
         top, x = scene.disc.max_fill_ratio, self.fill_ratio
         rate, width = (float(v[0]) for v in _flow_rate(scene, law, np.array([x])))
         change = min(_by_flow(scene, rate, width), 0.99)
-        drawn = residual_fill_ratios(scene, law=law, depth=np.array([1 - change, 1 + change]))
+        drawn = _residual_fills(scene, law, [1 - change, 1 + change])
         stalled = [
             stalled_fill_ratio(law=law, total=top, gas_pressure=scene.gas.pressure + side * head)
             for side in (1, -1)
@@ -134,21 +134,19 @@ def reach_share(chambers: int, *, passes_on: bool = True) -> float:
 
 
 def residual_fill_ratio(scene: Scene, *, law: FlowLaw) -> float:
-    """Fill ratio below which gas enters the port of the driven chamber under the scene's gas pressure."""
-    return float(residual_fill_ratios(scene, law=law)[0])
-
-
-def residual_fill_ratios(
-    scene: Scene, *, law: FlowLaw, depth: npt.ArrayLike = 1.0, velocity: npt.ArrayLike = 1.0
-) -> FloatArray:
-    """The same with factors of the draw-down depth and of the velocity, of their broadcast shape.
+    """Fill ratio below which gas enters the port of the driven chamber under the scene's gas pressure.
 
     Raises: ValueError: a disc at rest.
     """
-    factor, faster = np.broadcast_arrays(np.atleast_1d(depth), np.atleast_1d(velocity))
+    return float(_residual_fills(scene, law, [1.0])[0])
+
+
+def _residual_fills(scene: Scene, law: FlowLaw, depths: Sequence[float]) -> FloatArray:
+    """The same with factors of the draw-down depth, shape (n,)."""
+    factor = np.asarray(depths)
 
     def drawn(rows: IntArray, fills: FloatArray) -> FloatArray:
-        rate = faster[rows] * _flow_rate(scene, law, fills)[0]
+        rate = _flow_rate(scene, law, fills)[0]
         return drawn_fill(scene, flow_rate=rate, factor=factor[rows])
 
     return first_gas(scene, drawn, top=np.full(factor.shape, scene.disc.max_fill_ratio))

@@ -27,13 +27,12 @@ from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.documents import calibration_document
-from ringbalance.reduced_model.law.flow_law import FlowLaw, Regime
+from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
-from ringbalance.reports.pages.plain import decision
-from ringbalance.reports.pictures.fields import shown_field
+from ringbalance.reports.pictures.fields import chamber_field
 from ringbalance.reports.saved import keep_cases, kept_cases, looks_at_no_scene, provenance, versions
-from ringbalance.reports.section import Record, Work
-from ringbalance.reports.sections import begun, collected, completed
+from ringbalance.reports.section import Record, Work, ring_of
+from ringbalance.reports.sections import begun, collected_beside, completed
 from ringbalance.results.numbers import given, short, with_unit
 from ringbalance.scene import AnyScene, Scene, scene_table
 from ringbalance.scene.keys.declaration import Key, keys_of
@@ -48,7 +47,7 @@ from ringbalance.verification.catalogue import load_cases
 from ringbalance.verification.evidence import Level
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult, merge_saved
-from ringbalance.verification.runner import DRIVEN, cases_under_way, paper_scene
+from ringbalance.verification.runner import cases_under_way, paper_scene
 
 Progress = Callable[[str], None]
 
@@ -60,66 +59,50 @@ LAW_POINTS: Final = 51
 
 
 def collect_evidence(
-    scene: Scene,
+    scene: AnyScene,
     *,
     level: Level = "light",
     scene_text: str = "",
     saved: Sequence[Mapping[str, Any]] = (),
     pool: Workers | None = None,
     progress: Progress | None = None,
-    judged: Callable[[list[Record]], None] | None = None,
 ) -> Record:
     """Run everything that a report rests on, pictures excepted, and gather it in one JSON-able document.
 
-    Args: `scene_text`: the scene file's own text, for the appendix; empty where there is none. `pool`: runs
-    cases beside this process. `judged`: called with all cases as soon as they are there.
+    Args: `scene_text`: the scene file's own text, for the appendix; empty where there is none. `saved`:
+    results of heavy cases, which take the place of those not run. `pool`: runs cases beside this process.
     Raises: SceneError: a scene that cannot be calibrated or simulated.
     """
     tell = progress or (lambda _: None)
-    # The claims about the other balancer stand in the reports on it; here only where everything is asked for.
-    ids = [case.id for case in load_cases() if level == "heavy" or case.paper != DRIVEN]
+    work = Work(scene=scene, level=level)
     # Before the cases, the last of which this process takes when it has nothing else to do.
-    apart = begun(scene, level, pool)
-    with _cases_of_report(ids, scene=scene, level=level, pool=pool) as judged_cases:
-        tell("pressure field")
-        pressure = _pressure(scene)
-        tell("calibration")
-        calibration = calibration_of(scene)
-        tell("closed loop")
-        runs = _closed_loop(scene, calibration)
+    apart = begun(work, pool)
+    with _cases_of_report(scene, level=level, pool=pool) as judged_cases:
+        study = _STUDIES.get(scene.balancer, _plain_study)(scene, tell)
         tell("sections")
-        work = Work(scene=scene, calibration=calibration, level=level)
-        sections = collected(work, without=apart)
+        sections = collected_beside(work, apart)
         tell("verification")
-        found, kept = judged_cases(tell)
-    cases = merge_saved(found, saved)
-    if judged is not None:
-        judged(cases)
+        verification, kept = judged_cases(tell)
     sections = completed(sections, apart, work, pool)
     # What a section measured by the clock does not reproduce.
     clocked = {name: record.pop("times") for name, record in sections.items() if "times" in record}
     return {
         "format": FORMAT,
         "level": level,
+        "balancer": scene.balancer,
         "versions": versions(),
-        "scene": scene_record(scene, scene_text, [asdict(row) for row in scene_table(scene)]),
+        "scene": scene_record(scene, scene_text),
         "seeds": {"run": scene.run.seed},
-        "limit_m": scene.controller.limit,
-        "paper": _paper(),
-        "operating_point": _operating_point(scene, calibration),
-        "pressure": pressure,
-        "calibration": calibration_document(calibration),
-        "flow_law": _flow_law(scene, calibration),
-        "closed_loop": runs,
+        **study,
         **sections,
-        "verification": cases,
+        "verification": merge_saved(verification, saved),
         "pictures": {"drawn": False, "text": "The 3-D pictures were not asked for.", "files": []},
         "provenance": provenance(),
         "times": {"date": date.today().isoformat(), "kept_cases": kept} | clocked,
     }
 
 
-def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
+def scene_record(scene: AnyScene, text: str) -> Record:
     """Names, hashes and text of a scene file, with the rows of its values."""
     return {
         "name": scene.name,
@@ -130,42 +113,43 @@ def scene_record(scene: AnyScene, text: str, rows: list[Record]) -> Record:
         "origins": dict(scene.origins),
         "measured": asdict(scene.measured) if scene.measured.files else None,
         "states_uncertainty": bool(scene.uncertainty),
-        "table": rows,
+        "table": _ROWS.get(scene.balancer, parameters)(scene),
     }
 
 
-def _paper() -> Record:
-    """What the paper says, for comparison."""
-    low, high = papers.LOWEST_PRESSURE, papers.HIGHEST_PRESSURE
-    return {
-        "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
-        "lambda_m": paper.PAPER_LAMBDA,
-        "lambda_spread": papers.LAMBDA_TOLERANCE,
-        "working_range_Pa": [low.value, high.value],
-        "figure_4_pressures_Pa": [papers.LOW_PRESSURE, papers.HIGH_PRESSURE],
-    }
-
-
-def _pressure(scene: Scene) -> Record:
-    field = shown_field(scene, fill_ratio=scene.disc.max_fill_ratio)
-    return {"profile": field.pressure_profile(scene=scene), "mesh": field.record()}
-
-
-def _closed_loop(scene: Scene, calibration: Calibration) -> Record:
+def _ring_study(scene: Scene, tell: Progress) -> Record:
+    """What several sections of a liquid ring look at."""
+    tell("pressure field")
+    field = chamber_field(scene, fill_ratio=scene.disc.max_fill_ratio)
+    tell("calibration")
+    calibration = calibration_of(scene)
+    tell("closed loop")
     models = {"calibrated": calibration.model, "paper": paper_model(scene)}
-    return {name: simulate(scene, model).to_dict() for name, model in models.items()}
+    return {
+        "limit_m": scene.controller.limit,
+        "paper": {
+            "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
+            "lambda_m": paper.PAPER_LAMBDA,
+            "lambda_spread": papers.LAMBDA_TOLERANCE,
+        },
+        "operating_point": _operating_point(scene, calibration),
+        "pressure": {"profile": field.pressure_profile(scene=scene), "mesh": field.record},
+        "calibration": calibration_document(calibration),
+        "flow_law": _flow_law(scene, calibration),
+        "closed_loop": {name: simulate(scene, model).to_dict() for name, model in models.items()},
+    }
 
 
 @contextmanager
 def _cases_of_report(
-    ids: Sequence[str], *, scene: Scene, level: Level, pool: Workers | None = None
+    scene: AnyScene, *, level: Level, pool: Workers | None
 ) -> Iterator[Callable[[Progress], tuple[list[Record], dict[str, str]]]]:
     """Start the cases of a report that no earlier one has kept; they run beside the body.
 
-    Args: `pool`: runs cases beside this process.
     Yields: What waits for them, to be called in the body: records of all cases, and the date of each that an
     earlier report has kept.
     """
+    ids = [case.id for case in load_cases() if case.paper == scene.balancer]
     kept = kept_cases() if level == "light" else {}
     wanted = [name for name in ids if name not in kept]
 
@@ -173,25 +157,22 @@ def _cases_of_report(
         ran = {case["id"]: case for case in _finished(under_way, tell)}
         if level == "light":
             _keep(ran, kept)
-        found = {name: ran[name] if name in ran else kept[name]["record"] for name in ids}
-        return list(found.values()), {name: kept[name]["date"] for name in ids if name not in ran}
+        records = [ran[name] if name in ran else kept[name]["record"] for name in ids]
+        return records, {name: kept[name]["date"] for name in ids if name not in ran}
 
     if not wanted:
         yield partial(finished, iter(()))
         return
-    with cases_under_way(
-        wanted, scene=scene, level=level, mutations=level == "heavy", workers=pool
-    ) as under_way:
+    options: Record = {"level": level, "mutations": level == "heavy", "workers": pool}
+    with cases_under_way(wanted, scene=ring_of(scene) or paper_scene(), **options) as under_way:
         yield partial(finished, under_way)
 
 
-def _finished(under_way: Iterator[CaseResult], tell: Progress) -> list[Record]:
-    """Records of the cases as they come."""
-    results = []
+def _finished(under_way: Iterator[CaseResult], tell: Progress) -> Iterator[Record]:
+    """Records of the cases as they come; wall time does not reproduce, and no verdict hangs on it."""
     for result in under_way:
         tell(f"verification: {result.definition.title}")
-        results.append(result)
-    return [_without_time(case) for case in [each.to_dict() for each in results]]
+        yield {key: value for key, value in result.to_dict().items() if key != "time_s"}
 
 
 def _keep(ran: Mapping[str, Record], kept: Mapping[str, Record]) -> None:
@@ -206,11 +187,6 @@ def _keep(ran: Mapping[str, Record], kept: Mapping[str, Record]) -> None:
         keep_cases({**kept, **new})
 
 
-def _without_time(case: Record) -> Record:
-    """Wall time does not reproduce, and a verdict must not hang on it."""
-    return {key: value for key, value in case.items() if key != "time_s"}
-
-
 def _operating_point(scene: Scene, calibration: Calibration) -> Record:
     """The calibration's operating point, with the flow state there and Eq. 19's velocity."""
     record: Record = dict(calibration_document(calibration)["operating_point"])
@@ -222,19 +198,19 @@ def _operating_point(scene: Scene, calibration: Calibration) -> Record:
         opposite_fill_ratio=record["fill_ratio"],
         gas_pressure=scene.gas.pressure,
     )
+    budgets = calibration.budgets
+
+    def total(name: str) -> float | None:
+        return budgets[name].total if name in budgets else None
+
     return record | {
         "reynolds": reynolds,
         "flow_state": str(np.asarray(tube.flow_state)[nearest]),
         "velocity_paper_m_s": float(by_paper.velocity),
-        "priming_uncertainty": _total(calibration, "priming_pressure_vented"),
-        "stall_uncertainty": _total(calibration, "stall_pressure"),
+        # None where a quantity has no budget.
+        "priming_uncertainty": total("priming_pressure_vented"),
+        "stall_uncertainty": total("stall_pressure"),
     }
-
-
-def _total(calibration: Calibration, quantity: str) -> float | None:
-    """Expanded uncertainty (95 %) of a quantity; None where it has no budget."""
-    budget = calibration.budgets.get(quantity)
-    return None if budget is None else budget.total
 
 
 def _flow_law(scene: Scene, calibration: Calibration) -> Record:
@@ -243,65 +219,23 @@ def _flow_law(scene: Scene, calibration: Calibration) -> Record:
     pressures = drawn if scene.gas.pressure in drawn else [scene.gas.pressure, 2 * scene.gas.pressure]
     fill = np.linspace(0.0, scene.disc.max_fill_ratio, LAW_POINTS)
 
-    def rows(law: FlowLaw) -> Record:
-        flow = law.evaluate(fill_ratio=fill[None, :], gas_pressure=np.array(pressures)[:, None])
-        return {
-            "velocity": flow.velocity.tolist(),
-            "uncertainty": flow.uncertainty.tolist(),
-            "regime": [[Regime(int(value)).label for value in row] for row in flow.regime],
-        }
-
-    found, printed = rows(calibration.flow_law), rows(calibration.paper_law)
+    found, printed = (
+        law.evaluate(fill_ratio=fill[None, :], gas_pressure=np.array(pressures)[:, None])
+        for law in (calibration.flow_law, calibration.paper_law)
+    )
     return {
         "gas_pressure_Pa": pressures,
         "fill_ratio": fill.tolist(),
-        "velocity_m_s": found["velocity"],
-        "velocity_uncertainty": found["uncertainty"],
-        "regime": found["regime"],
-        "velocity_paper_m_s": printed["velocity"],
-        "regime_paper": printed["regime"],
+        "velocity_m_s": found.velocity.tolist(),
+        "velocity_uncertainty": found.uncertainty.tolist(),
+        "regime": [[Regime(int(value)).label for value in row] for row in found.regime],
+        "velocity_paper_m_s": printed.velocity.tolist(),
     }
 
 
-def collect_run(
-    scene: SceneFile,
-    *,
-    level: Level = "light",
-    scene_text: str = "",
-    pool: Workers | None = None,
-    progress: Progress | None = None,
-) -> Record:
-    """The evidence of a balancer without liquid: what its study or one run of it comes to, and the claims of
-    its paper.
-
-    Raises: SceneError: a run that takes too many samples or steps.
-    """
-    tell = progress or (lambda _: None)
-    ids = [case.id for case in load_cases() if case.paper == scene.balancer]
-    with _cases_of_report(ids, scene=paper_scene(), level=level, pool=pool) as judged_cases:
-        tell("drawn devices")
-        summary = decision(balancer_of(scene))
-        tell("run")
-        study = _STUDIES.get(scene.balancer, _plain_study)(scene)
-        verification, kept = judged_cases(tell)
-    return {
-        "format": FORMAT,
-        "level": level,
-        "balancer": scene.balancer,
-        "versions": versions(),
-        "scene": scene_record(scene, scene_text, parameters(scene)),
-        "seeds": {"run": scene.run.seed},
-        "summary": summary,
-        **study,
-        "verification": verification,
-        "provenance": provenance(),
-        "pictures": {"drawn": True, "text": "", "files": []},
-        "times": {"date": date.today().isoformat(), "kept_cases": kept},
-    }
-
-
-def _plain_study(scene: SceneFile) -> Record:
+def _plain_study(scene: SceneFile, tell: Progress) -> Record:
     """One run of any balancer as its scene says, as `simulate` shows it, and what the scene demands."""
+    tell("run")
     balancer = balancer_of(scene)
     run = balancer.run({}, AS_GIVEN, trace=True).traced[0].run
     return {
@@ -311,8 +245,9 @@ def _plain_study(scene: SceneFile) -> Record:
     }
 
 
-def _eccentric_study(scene: EccentricScene) -> Record:
+def _eccentric_study(scene: EccentricScene, tell: Progress) -> Record:
     """The run, balanced and with its masses locked, drawn devices, loops, and the true values."""
+    tell("run")
     run, balancer = simulate_eccentric(scene), balancer_of(scene)
     several = balancer.run({}, Draws.block(FRESH, _TRACED), trace=True)
     truth = {
@@ -330,7 +265,9 @@ def _eccentric_study(scene: EccentricScene) -> Record:
     }
 
 
-_STUDIES: Final[Mapping[str, Callable[..., Record]]] = MappingProxyType({"eccentric_mass": _eccentric_study})
+_STUDIES: Final[Mapping[str, Callable[..., Record]]] = MappingProxyType(
+    {"liquid_ring": _ring_study, "eccentric_mass": _eccentric_study}
+)
 """By balancer, what has more to show than one run."""
 
 
@@ -383,3 +320,11 @@ def _written(value: Any, takes: object, *, digits: int = 6) -> str:
     dimension = takes.dimension if isinstance(takes, Reader) else None
     unit = next(iter(DIMENSIONS[dimension].units)).replace("*", " ") if dimension else ""
     return given(value, unit, digits=digits) if unit else short(float(value), digits=digits)
+
+
+def _ring_rows(scene: Scene) -> list[Record]:
+    return [asdict(row) for row in scene_table(scene)]
+
+
+_ROWS: Final[Mapping[str, Callable[..., list[Record]]]] = MappingProxyType({"liquid_ring": _ring_rows})
+"""By balancer, how the values of a scene are described where its keys alone would not do."""

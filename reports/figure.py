@@ -22,7 +22,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import AutoLocator, FuncFormatter, NullLocator
 from numpy.typing import ArrayLike
 
-from ringbalance.reports.pictures import style
 from ringbalance.results.numbers import MINUS, display_unit, number, power_of_ten
 
 INK: Final = "#010101"
@@ -53,19 +52,6 @@ _MARKERS: Final = ("o", "s", "^", "D", "v", "P")
 MAP: Final = tuple(f"#0a0a{step:02x}" for step in range(1, 13))
 """Twelve shades from low to high, for a field in colour."""
 
-_VARIABLES: Final = {
-    INK: "--fig-ink",
-    MUTED: "--fig-muted",
-    GRID: "--fig-grid",
-    PAPER: "--fig-paper",
-    FOUND: "--fig-found",
-    THIRD: "--fig-third",
-    FOURTH: "--fig-fourth",
-    FIFTH: "--fig-fifth",
-    SURFACE: "--fig-surface",
-    **{shade: f"--fig-map-{step}" for step, shade in enumerate(MAP)},
-}
-
 
 def _shades(low: str, middle: str, high: str) -> tuple[str, ...]:
     """From one colour over another to a third; lines in the text's colour stand out on each."""
@@ -73,20 +59,34 @@ def _shades(low: str, middle: str, high: str) -> tuple[str, ...]:
     return tuple(to_hex(ramp(step / (len(MAP) - 1))) for step in range(len(MAP)))
 
 
-_MAP_LIGHT: Final = _shades("#f1f5fa", "#a9c9ec", "#5597d6")
-_MAP_DARK: Final = _shades("#18202a", "#1d4a7c", "#3f83c9")
+_PALETTE: Final = {
+    INK: ("--fig-ink", "#1d2530", "#e4e8ee"),
+    MUTED: ("--fig-muted", "#5b6675", "#9aa6b5"),
+    GRID: ("--fig-grid", "#dfe3e8", "#2c3540"),
+    PAPER: ("--fig-paper", "#9d6600", "#ff9d3c"),
+    FOUND: ("--fig-found", "#1757ee", "#5f86ff"),
+    THIRD: ("--fig-third", "#0a4420", "#8cf07a"),
+    FOURTH: ("--fig-fourth", "#cf1fb0", "#a084c4"),
+    FIFTH: ("--fig-fifth", "#565400", "#b58a1a"),
+    SURFACE: ("--fig-surface", "#ffffff", "#12171e"),
+    **{
+        shade: (f"--fig-map-{step}", light, dark)
+        for step, (shade, light, dark) in enumerate(
+            zip(
+                MAP,
+                _shades("#f1f5fa", "#a9c9ec", "#5597d6"),
+                _shades("#18202a", "#1d4a7c", "#3f83c9"),
+                strict=True,
+            )
+        )
+    },
+}
+"""By sentinel: CSS variable, and colours on a light and a dark page.
 
-
-def _variables(palette: style.Palette, shades: Sequence[str]) -> dict[str, str]:
-    """CSS variables of a page's figures."""
-    names = ("ink", "muted", "grid", "paper", "found", "third", "fourth", "fifth")
-    colours = {f"--fig-{name}": getattr(palette, name) for name in names}
-    steps = {f"--fig-map-{step}": shade for step, shade in enumerate(shades)}
-    return {**colours, "--fig-surface": palette.background, **steps}
-
-
-LIGHT: Final = _variables(style.LIGHT, _MAP_LIGHT)
-DARK: Final = _variables(style.DARK, _MAP_DARK)
+The lines tell apart for deuteranopes and protanopes, and as text.
+"""
+LIGHT: Final = {name: light for name, light, _ in _PALETTE.values()}
+DARK: Final = {name: dark for name, _, dark in _PALETTE.values()}
 
 _FONT: Final = "DejaVu Sans, Arial, sans-serif"
 """Of figures that are files."""
@@ -299,7 +299,8 @@ def amplitudes(curves: Iterable[Curve], limit: float) -> Paint:
 def _to_page(text: str, name: str) -> str:
     """Bare svg element: variables for colours and font, ids of its own, no fixed size."""
     body = text[text.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
+    # The page's style sheet has this rule once.
+    body = re.sub(r"<(metadata|style).*?</\1>\s*", "", body, flags=re.DOTALL)
     body = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", body, count=1)
     body = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", body, count=1)
     body = re.sub(r'\bid="', f'id="{name}-', body)
@@ -307,7 +308,7 @@ def _to_page(text: str, name: str) -> str:
     # Matplotlib before 3.11 writes the font in one property.
     body = re.sub(r"font: ((?:\w+ )?[\d.]+px) [^;\"]*", r"font: \1 var(--fig-font)", body)
     body = re.sub(r"font-family: [^;\"]*", "font-family: var(--fig-font)", body)
-    for sentinel, variable in _VARIABLES.items():
+    for sentinel, (variable, *_) in _PALETTE.items():
         body = body.replace(sentinel, f"var({variable})")
     # The frame around it on the page is what is read aloud, by the figure's caption.
     body = body.replace("<svg ", '<svg aria-hidden="true" ', 1)
@@ -376,10 +377,13 @@ def _in_unit(axis: XAxis | YAxis, limits: tuple[float, float], shown: Axis) -> N
     axis.set_major_formatter(FuncFormatter(lambda value, place: text(value * display.factor, place)))
 
 
-def panels(axes: Axes, *boxes: tuple[float, float, float, float]) -> list[Axes]:
-    """Axes of their own in place of a figure's, each by left, bottom, width and height over the figure's."""
+def panels(axes: Axes, *boxes: tuple[float, float, float, float], **kind: Any) -> list[Axes]:
+    """Axes of their own in place of a figure's, each by left, bottom, width and height over the figure's.
+
+    Args: `kind`: of the axes, such as their `projection`.
+    """
     axes.set_axis_off()
-    return [figure_of(axes).add_axes(box) for box in boxes]
+    return [figure_of(axes).add_axes(box, **kind) for box in boxes]
 
 
 def nice_span(span: float) -> list[float]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import product
 from typing import Any, Final
 
@@ -13,9 +12,15 @@ from ringbalance.controller.balancer import FURTHER, Balancer, Draws, Outcomes, 
 from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_all
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
-from ringbalance.controller.judging.search import Along, searched
+from ringbalance.controller.judging.search import searched
 from ringbalance.controller.judging.tuning import Tuning
-from ringbalance.controller.judging.tuning_rows import setting_text
+from ringbalance.controller.judging.tuning_rows import (
+    LONGER,
+    judgement_document,
+    plain_settings,
+    required_document,
+    setting_text,
+)
 from ringbalance.reports.prose import key_words
 from ringbalance.reports.section import Record
 from ringbalance.results.proportion import Proportion
@@ -27,16 +32,10 @@ from ringbalance.scene.origins import SceneFile, value_at
 from ringbalance.scene.toml import toml_text
 from ringbalance.scene.units import shortest, shortest_quantity
 
-LONGER: Final = 300.0
-"""s, for which runs are watched again, to show what longer watching changes."""
-HALF, MOST = 0.5, 0.9
-"""Fractions of all devices whose settling times are told."""
 _COARSE: Final = 16
 """Devices on which settings for what can be bought are chosen."""
 _POINTS: Final = 50
 """Most entries of a curve."""
-_BAND: Final = (0.025, 0.5, 0.975)
-"""Quantiles between which 95 % of the devices lie, and their median."""
 
 
 def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Record:
@@ -54,19 +53,17 @@ def own_record(balancer: Balancer, *, first: int, most: int = MOST_DRAWS) -> Rec
 
 def tuning_record(balancer: Balancer, tuning: Tuning) -> Record:
     """The scene's own settings beside the recommended ones, both watched longer too, and what else to do."""
-    best, own = tuning.recommended, tuning.own
-    longer = tuning.longer and _watched(tuning.longer, LONGER)
-    recommended = judgement_record(best) | {"longer": longer}
+    best, own, document = tuning.recommended, tuning.own, tuning.to_dict()
+    recommended = judgement_record(best) | {"longer": tuning.longer and _watched(tuning.longer, LONGER)}
+    measures: Iterable[Finding] = tuning.ranking.findings()
+    if best.verdict == MET:
+        measures = () if own is not None and own.verdict == MET else (Finding(code="settings_suffice"),)
     return {
         "own": None if own is None else judgement_record(own) | {"longer": _longer(balancer)},
         "recommended": recommended if own is None or best.settings else None,
-        "along": {
-            "path": tuning.along_name,
-            "levels": [_level(each) for each in tuning.along],
-        },
         "moved": _moved(tuning),
-        "ranking": tuning.ranking.document(),
-        **_advice(tuning),
+        **{name: document[name] for name in ("along", "ranking", "remedies")},
+        "measures": [each.document() for each in measures],
     }
 
 
@@ -91,19 +88,6 @@ def _longer(balancer: Balancer) -> Record:
     return _watched(longer, LONGER)
 
 
-def _advice(tuning: Tuning) -> Record:
-    """Remedies and measurements where too few devices meet what is asked, and what can be bought."""
-    best, own = tuning.recommended, tuning.own
-    if best.verdict == MET:
-        enough = own is not None and own.verdict == MET
-        measures = () if enough else (Finding(code="settings_suffice"),)
-        return {"remedies": [], "measures": [each.document() for each in measures]}
-    return {
-        "remedies": [each.document() for each in tuning.remedies],
-        "measures": [each.document() for each in tuning.ranking.findings()],
-    }
-
-
 def choice_records(balancer: Balancer) -> list[Record]:
     """What can be bought for a scene that leaves it open, and what each makes of it."""
     return [each.document() for each in tried_choices(balancer, search=_coarsely)]
@@ -120,59 +104,24 @@ def _coarsely(balancer: Balancer) -> Settings:
     return max(ran, key=lambda each: np.count_nonzero(each[1].settled), default=({}, None))[0]
 
 
-def _level(each: Along) -> Record:
-    """Of the axis on which the scene's gas pressure lies."""
-    found = each.judgement
-    return {
-        "value": each.level,
-        "fraction": found.fraction.document(),
-        "verdict": found.verdict,
-        "half_s": _time(found, HALF),
-        "most_s": _time(found, MOST),
-        "usable_moment_kg_m": np.nanquantile(found.outcomes.usable_moment, _BAND).tolist(),
-    }
-
-
 def judgement_record(judgement: Judgement) -> Record:
     """One setting over drawn devices; SI."""
-    outcomes = judgement.outcomes
+    pairs = zip(required_document(judgement), judgement.demands, strict=True)
     return {
-        "settings": dict(judgement.settings),
+        **judgement_document(judgement),
+        "settings": plain_settings(judgement.settings),
         "asked": judgement.asked,
-        "demands": [
-            {
-                "code": each.code,
-                "sense": each.sense,
-                "required": each.required,
-                "unit": each.unit,
-                "stated": each.stated,
-                "fraction": judgement.fraction_of(each).document(),
-                "verdict": judgement.fraction_of(each).verdict(judgement.asked),
-            }
-            for each in judgement.demands
+        "required": [
+            {**each, "verdict": judgement.fraction_of(demand).verdict(judgement.asked)}
+            for each, demand in pairs
         ],
-        **_watched(judgement, FURTHER),
-        "half_s": _time(judgement, HALF),
-        "most": MOST,
-        "most_s": _time(judgement, MOST),
-        "usable_moment_kg_m": np.nanquantile(outcomes.usable_moment, _BAND).tolist(),
-        "settled": _settled(outcomes),
-        "ended": dict(Counter(outcomes.ended).most_common()),
-        "clipped": dict(outcomes.clipped),
+        "further_s": FURTHER,
+        "settled": _settled(judgement.outcomes),
     }
 
 
 def _watched(judgement: Judgement, further: float) -> Record:
-    return {
-        "further_s": further,
-        "fraction": judgement.fraction.document(),
-        "verdict": judgement.verdict,
-    }
-
-
-def _time(judgement: Judgement, fraction: float) -> list[float] | None:
-    times = judgement.settling_time(fraction)
-    return None if times is None else list(times)
+    return {"further_s": further, "fraction": judgement.fraction.document(), "verdict": judgement.verdict}
 
 
 def _settled(outcomes: Outcomes) -> Record:
@@ -204,22 +153,15 @@ def _remedy(row: Record) -> str:
     return f"{text[0].upper()}{text[1:]}"
 
 
-def settings_text(rows: Iterable[Record]) -> str:
-    """Settings as a block to put into a scene file."""
+def settings_lines(scene: SceneFile, paths: Iterable[str]) -> list[Record]:
+    """Values of a scene as lines of its file, by table; what it leaves out is left out."""
     tables: dict[str, list[str]] = {}
-    for row in rows:
-        table, _, key = row["path"].partition(".")
-        tables.setdefault(table, []).append(f"{key} = {row['text']}")
-    return "\n\n".join("\n".join([f"[{table}]", *lines]) for table, lines in tables.items())
-
-
-def settings_rows(scene: SceneFile, paths: Iterable[str]) -> Iterator[Record]:
-    """Values of a scene as its file would have them, by path; what it leaves out is left out."""
     for path in paths:
         table, _, key = path.partition(".")
         value = getattr(getattr(scene, table), key)
         if value not in (None, ()):
-            yield {"path": path, "text": toml_text(_written(value, path))}
+            tables.setdefault(table, []).append(f"{key} = {toml_text(_written(value, path))}")
+    return [{"table": table, "lines": lines} for table, lines in tables.items()]
 
 
 def _written(value: Any, path: str) -> Any:

@@ -8,7 +8,6 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike
 
 from ringbalance.reports.figure import (
@@ -27,11 +26,10 @@ from ringbalance.reports.figure import (
     draw,
     level,
     note,
-    panels,
-    plain_number,
+    upright,
 )
 from ringbalance.reports.section import Record
-from ringbalance.results.numbers import number
+from ringbalance.results.numbers import number, shown
 from ringbalance.scene.arrays import FloatArray
 
 DEVIATIONS: Final = 2.0
@@ -39,13 +37,9 @@ DEVIATIONS: Final = 2.0
 _COLOURS: Final = (FOUND, THIRD)
 _LOCKED: Final = {**AS_PAPER, "linewidth": 1.2, "label": "masses locked"}
 _BALANCED: Final = {"color": FOUND, "linewidth": 1.2, "label": "balanced"}
-_LIMIT: Final = {"color": MUTED, "linewidth": 1, "linestyle": ":", "label": "limit"}
-_DRAWN: Final[dict[str, Any]] = {"color": FOUND, "alpha": 0.2, "linewidth": 0}
 _SHORTEST: Final = 0.09
 """Fraction of the time axis that the name of a stage needs."""
-_MILLIMETRE: Final = 1e3
 _NARROW_HEIGHT: Final = 2.4
-_RPM: Final = 30 / math.pi
 _LAG_TOP: Final = 300
 """Lag, deg, above which an angle is a lead."""
 _ACROSS: Final = ("data", "axes fraction")
@@ -56,11 +50,11 @@ def over_time(run: Record, locked: Record, drawn: Record | None = None) -> Drawi
 
     Args: `drawn`: band of drawn devices, `time_s`, `low_m` and `high_m`.
     """
-    pairs = ((locked, _LOCKED), (run, _BALANCED))
+    curves = [(each["time_s"], each["amplitude_m"], look) for each, look in _pairs(run, locked)]
     return draw(
         "eccentric-amplitude",
-        lambda axes: _band(axes, drawn and drawn["time_s"], drawn, 1.0),
-        amplitudes([(each["time_s"], each["amplitude_m"], look) for each, look in pairs], run["limit_m"]),
+        *([] if drawn is None else [_band(drawn["time_s"], drawn["low_m"], drawn["high_m"])]),
+        amplitudes(curves, run["limit_m"]),
         lambda axes: _shade_stages(axes, run),
         x=TIME,
         y=AMPLITUDE,
@@ -71,11 +65,10 @@ def over_time(run: Record, locked: Record, drawn: Record | None = None) -> Drawi
     )
 
 
-def _band(axes: Axes, at: Any, drawn: Record | None, factor: float) -> None:
-    """Where drawn devices lie. Args: `at`: abscissae. `factor`: of the axis, per metre."""
-    if drawn is not None:
-        low, high = (factor * np.asarray(drawn[key]) for key in ("low_m", "high_m"))
-        axes.fill_between(at, low, high, label="drawn devices", **_DRAWN)
+def _band(at: ArrayLike, low: ArrayLike, high: ArrayLike) -> Paint:
+    """Where drawn devices lie."""
+    look: dict[str, Any] = {"color": FOUND, "alpha": 0.2, "linewidth": 0, "label": "drawn devices"}
+    return lambda axes: axes.fill_between(np.asarray(at), np.asarray(low), np.asarray(high), **look)
 
 
 def _shade_stages(axes: Axes, run: Record) -> None:
@@ -89,56 +82,63 @@ def _shade_stages(axes: Axes, run: Record) -> None:
             note(name, (start, 1), (3, -3), xycoords=_ACROSS, va="top")(axes)
 
 
-def run_up(run: Record, locked: Record, rotor: Record, drawn: Record | None = None) -> Drawing:
-    """Bode plot of a run-up: vibration amplitude over speed, balanced and with the masses locked, and below
-    it the lag of the locked rotor behind its unbalance, with the critical speed.
+def run_up(run: Record, locked: Record, rotor: Record, drawn: Record | None = None) -> list[Drawing]:
+    """Bode plot of a run-up: vibration amplitude over speed, balanced and with the masses locked, and the lag
+    of the locked rotor behind its unbalance, with the critical speed.
 
     Args: `rotor`: its `critical_speed_rad_s`, `amplification_factor` (None: none is defined), and
     `locked_phase_rad`, the phase of what the locked masses leave of the unbalance. `drawn`: as
     of `over_time`.
     """
-    speeds = [_RPM * np.asarray(each["speed_rad_s"]) for each in (locked, run)]
     lag = np.degrees((rotor["locked_phase_rad"] - np.asarray(locked["phase_rad"])) % math.tau)
     # What lies a little before the unbalance is drawn there, not a turn later.
     lag = np.where(lag > _LAG_TOP, lag - 360, lag)
-    critical, factor = _RPM * rotor["critical_speed_rad_s"], rotor["amplification_factor"]
-    ends = min(speeds[1].min(), critical), max(speeds[1].max(), critical)
+    critical, factor = rotor["critical_speed_rad_s"], rotor["amplification_factor"]
+    ends = min(*run["speed_rad_s"], critical), max(*run["speed_rad_s"], critical)
+    at_critical = upright(critical, color=INK, linewidth=0.9, linestyle=(0, (6, 2, 1, 2)))
+    text = f"critical speed {shown(critical, 'rad/s', digits=3)}"
+    text += f", amplification factor {number(factor, digits=2)}" if factor else ""
+    # Where the lag is not: it passes 90 degrees at the critical speed.
+    right = critical > sum(ends) / 2
+    place: dict[str, Any] = {"ha": "right", "va": "top"} if right else {"ha": "left", "va": "bottom"}
+    shift, at = ((-4, -4), 1.0) if right else ((4, 4), 0.0)
+    over: dict[str, Any] = {"x": ("speed", "rad/s"), "xlim": ends, "wide": True}
+    curves = [(each["speed_rad_s"], each["amplitude_m"], look) for each, look in _pairs(run, locked)]
+    return [
+        draw(
+            "eccentric-run-up",
+            *([] if drawn is None else [_band(*_while_speed_changes(run, drawn))]),
+            amplitudes(curves, run["limit_m"]),
+            at_critical,
+            y=AMPLITUDE,
+            columns=4,
+            height=2.6,
+            **over,
+        ),
+        draw(
+            "eccentric-lag",
+            curve(locked["speed_rad_s"], lag, **_LOCKED),
+            at_critical,
+            note(text, (critical, at), shift, xycoords=_ACROSS, **place),
+            lambda axes: axes.set_yticks((0, 90, 180)),
+            y=("lag", "°"),
+            ylim=(-30, 210),
+            height=1.8,
+            **over,
+        ),
+    ]
 
-    def paint(axes: Axes) -> None:
-        top, below = panels(axes, (0.09, 0.43, 0.89, 0.47), (0.09, 0.135, 0.89, 0.25))
-        values = [_MILLIMETRE * np.asarray(each["amplitude_m"]) for each in (locked, run)]
-        curves = zip(speeds, values, (_LOCKED, _BALANCED), strict=True)
-        if drawn is not None:
-            _band(top, *_while_speed_changes(run, drawn), _MILLIMETRE)
-        amplitudes(curves, _MILLIMETRE * run["limit_m"])(top)
-        below.plot(speeds[0], lag, **_LOCKED)
-        for panel in (top, below):
-            panel.axvline(critical, color=INK, linewidth=0.9, linestyle=(0, (6, 2, 1, 2)))
-            panel.set_xlim(*ends)
-            panel.xaxis.set_major_formatter(FuncFormatter(plain_number))
-        top.tick_params(labelbottom=False)
-        top.set_ylabel("zero to peak in mm")
-        below.set(ylim=(-30, 210), yticks=(0, 90, 180), ylabel="lag in °", xlabel="speed in rpm")
-        text = f"critical speed {number(critical, digits=3)} rpm"
-        text += f", amplification factor {number(factor, digits=2)}" if factor else ""
-        side = "right" if critical > sum(ends) / 2 else "left"
-        # Where the lag is not: it passes 90 degrees at the critical speed.
-        shift, at = ((-4, -4), 1.0) if side == "right" else ((4, 4), 0.0)
-        up = "top" if side == "right" else "bottom"
-        note(text, (critical, at), shift, xycoords=_ACROSS, ha=side, va=up)(below)
-        for look in (_LOCKED, _BALANCED, _LIMIT):
-            axes.plot([], [], **look)
-        if drawn is not None:
-            axes.fill_between([], [], [], label="drawn devices", **_DRAWN)
 
-    return draw("eccentric-run-up", paint, columns=4, wide=True, height=3.5)
+def _pairs(run: Record, locked: Record) -> tuple[tuple[Record, dict[str, Any]], ...]:
+    return (locked, _LOCKED), (run, _BALANCED)
 
 
-def _while_speed_changes(run: Record, drawn: Record) -> tuple[FloatArray, Record]:
-    """Speeds, rpm, and the band there: at one speed it has one width for each time."""
-    speed: FloatArray = np.asarray(np.interp(drawn["time_s"], run["time_s"], run["speed_rad_s"]))
+def _while_speed_changes(run: Record, drawn: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Speeds and the band there: at one speed it has one width for each time."""
+    speed = np.asarray(np.interp(drawn["time_s"], run["time_s"], run["speed_rad_s"]))
     changing = np.flatnonzero(np.diff(speed)) + 1
-    return _RPM * speed[changing], {key: np.asarray(drawn[key])[changing] for key in ("low_m", "high_m")}
+    low, high = (np.asarray(drawn[key])[changing] for key in ("low_m", "high_m"))
+    return speed[changing], low, high
 
 
 def mass_angles(run: Record) -> Drawing:

@@ -6,7 +6,7 @@ import base64
 import io
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.resources import files
@@ -21,7 +21,8 @@ from PIL import Image
 from ringbalance.reduced_model.calibration_record import UNSTATED
 from ringbalance.reports import summary
 from ringbalance.reports.figure import DARK, LIGHT, Drawing
-from ringbalance.reports.pages.cases import case_view
+from ringbalance.reports.pages.cases import FILTERS as QUANTITY_FILTERS
+from ringbalance.reports.pages.cases import deciding
 from ringbalance.reports.prose import (
     GLYPHS,
     equation_svg,
@@ -34,7 +35,7 @@ from ringbalance.reports.prose import (
     share_glyphs,
 )
 from ringbalance.reports.section import Record
-from ringbalance.reports.sections import PREFIXES, drawings_in, section_views, viewed
+from ringbalance.reports.sections import CASES_VIEW, PREFIXES, drawings_in, numbered, views_of
 from ringbalance.reports.traced import (
     FILTERS,
     finished,
@@ -101,55 +102,45 @@ class _PageContent:
     """Every figure on the page, for files of their own."""
 
 
-def case_views(cases: list[Record]) -> Record:
-    """What the page shows of the cases but the second balancer's, by id."""
-    evidence = {"verification": cases}
-    return {case["id"]: case_view(case) for case in (*summary.claims(evidence), *summary.checks(evidence))}
-
-
 def page_content(
     evidence: Record,
     *,
     pictures: Mapping[str, bytes] | None = None,
-    views_of: Callable[[list[Record]], Record] = case_views,
-    sections_by: Callable[[Record], Mapping[str, Record | None]] = section_views,
+    views: Mapping[str, Record | None] | None = None,
 ) -> _PageContent:
     """Turn the evidence into texts, tables and figures.
 
     Args: `pictures`: PNG bytes by the file names that the evidence lists; a picture that is missing is left
-    out. `views_of`, `sections_by`: what `case_views` and `section_views` answer, perhaps made by another
-    process while this one draws the rest.
+    out. `views`: what `views_of` answers, perhaps made by another process.
     Raises: KeyError: an evidence document that lacks a part.
     """
-    if balancer := evidence.get("balancer"):
-        sections = viewed(evidence, sections_by(evidence))
-        cases = summary.claims(evidence, paper=balancer)
-        claims = [{**case_view(case), "elsewhere": False} for case in cases]
-        context = {**_frame(evidence, sections), "claims": claims}
-        return _PageContent(context=context, drawings=tuple(drawings_in([sections, claims])))
-    sections = viewed(evidence, sections_by(evidence))
-    views = views_of(evidence["verification"])
-    claims = [
-        {**views[case["id"]], "elsewhere": summary.elsewhere(case, evidence)}
-        for case in summary.claims(evidence)
-    ]
-    checks = [views[case["id"]] for case in summary.checks(evidence)]
+    views = views_of(evidence) if views is None else views
+    sections, of_cases = numbered(evidence, views), views[CASES_VIEW] or {}
+    cases = {
+        case["id"]: {
+            **of_cases[case["id"]],
+            "quantities": placed(case.get("quantities") or [], f"{CASES_VIEW}.{case['id']}.quantities"),
+            # Claims on eccentric masses are all judged on a rotor of their own.
+            "elsewhere": case.get("paper") != "eccentric_mass" and summary.elsewhere(case, evidence),
+        }
+        for case in evidence[CASES_VIEW]
+    }
+    claims = summary.claims(evidence)
     context = {
-        **_frame(evidence, sections),
-        "tallies": _tallies(evidence),
-        "causes": summary.common_causes(summary.claims(evidence)),
+        **_frame(evidence),
+        "sections": sections,
+        "claims": [cases[case["id"]] for case in claims],
+        "checks": [cases[case["id"]] for case in summary.checks(evidence)],
+        "tallies": summary.tallies(evidence),
+        "causes": summary.common_causes(claims),
         "equations": _equations(),
         "pictures": _pictures(evidence["pictures"], pictures or {}),
-        "claims": claims,
-        "checks": checks,
     }
-    own = [[case["order_plot"], *case["drawings"]] for case in (*claims, *checks)]
-    drawings = drawings_in([sections, *own])
-    return _PageContent(context=context, drawings=tuple(drawings))
+    return _PageContent(context=context, drawings=tuple(drawings_in([sections, of_cases])))
 
 
-def _frame(evidence: Record, sections: list[Record]) -> Record:
-    """What the page of any scene has."""
+def _frame(evidence: Record) -> Record:
+    """What every template looks at."""
     return {
         "e": placed(evidence),
         "known": partial(known_width, stated=states_uncertainty(evidence)),
@@ -157,7 +148,6 @@ def _frame(evidence: Record, sections: list[Record]) -> Record:
         "unstated": UNSTATED,
         "scene": evidence["scene"],
         "papers": summary.is_papers(evidence),
-        "sections": sections,
         "stamp": _stamp(evidence),
         "running_head": _running_head(evidence),
         "scene_groups": _scene_groups(evidence["scene"]["table"]),
@@ -180,14 +170,6 @@ def _running_head(evidence: Record) -> str:
     return f"{scene['name']}, scene {scene['sha256'][:12]}, {evidence['times']['date']}"
 
 
-def _tallies(evidence: Record) -> Record:
-    return {
-        "lead": summary.lead_sentence(evidence),
-        "claims": summary.verdict_counts(summary.claims(evidence), summary.CLAIM_VERDICTS),
-        "checks": summary.verdict_counts(summary.checks(evidence), summary.CHECK_VERDICTS),
-    }
-
-
 def _equations() -> Record:
     return {
         name: {"svg": equation_svg(item.latex, item.words, f"eq-{name}"), "source": item.source}
@@ -206,7 +188,7 @@ def _data_address(content: bytes) -> str:
 
 def _pictures(record: Record, contents: Mapping[str, bytes]) -> Record:
     """Pictures by name, with their bytes; one that lacks a variant is left out."""
-    shown_pictures: Record = {"text": record["text"], "disc": None, "pressure": None, "tube": None}
+    shown_pictures: Record = {"text": record["text"], "disc": None, "pressure": None}
     for item in record["files"]:
         if item["light"] in contents and item["dark"] in contents:
             variants = {key: _data_address(contents[item[key]]) for key in ("light", "dark")}
@@ -217,20 +199,6 @@ def _pictures(record: Record, contents: Mapping[str, bytes]) -> Record:
 _STYLED: Final = re.compile(r'(<(?:path|g|text|tspan|use|rect|line|polyline|image)\b[^>]*?) style="([^"]*)"')
 _PART_ID: Final = re.compile(r'(<(?:path|g|defs|text)\b[^>]*?)( id="([^"]*)")')
 _CLASSES: Final = "/* classes */"
-_SVG: Final = re.compile(r"<svg\b.*?</svg>", re.DOTALL)
-_PART: Final = re.compile(r"(?<=#)([a-z-]+-[a-z][0-9a-f]{10})(?=[\")])")
-_STEP: Final = re.compile(r" ?\b([CLMQz])\b ?")
-_SPARE: Final = (
-    # The page's style sheet has this rule once, and a line here or an unmarked group means nothing.
-    (re.compile(r'<style type="text/css">.*?</style>', re.DOTALL), ""),
-    (re.compile(r"\s*\n\s*"), " "),
-    (re.compile(r"> <"), "><"),
-    (re.compile(r' transform="rotate\(-0 [^"]*"| version="1.1"| xmlns(?::xlink)?="[^"]*"|(?<= )xlink:'), ""),
-    (re.compile(r'(?<= d=")[^"]*'), lambda match: _STEP.sub(r"\1", match[0])),
-    (re.compile(r"<defs></defs>|<g/>"), ""),
-    *((re.compile(r"<g>((?:(?!</?g\b).)*)</g>"), r"\1"),) * 5,
-)
-"""What drawings lose within a page."""
 
 
 def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> dict[str, str]:
@@ -246,6 +214,13 @@ def render(evidence: Record, *, pictures: Mapping[str, bytes] | None = None) -> 
 def render_pages(content: _PageContent, *, documents: Iterable[str] = tuple(DOCUMENTS)) -> dict[str, str]:
     """Fills the template, once for each document."""
     return {file: _page(content, file) for file in documents}
+
+
+def terminal_lines(evidence: Record) -> list[str]:
+    """What to say of a report in a few sentences, for a terminal."""
+    context = {"e": placed(evidence), "tallies": summary.tallies(evidence)}
+    text = _environment().get_template("terminal.txt").render(context)
+    return [str(Markup(line).striptags()) for line in text.splitlines() if line.strip()]
 
 
 @cache
@@ -269,8 +244,9 @@ def _environment() -> jinja2.Environment:
         "paths_named": paths_named,
         "usual_name": usual_name,
         **FILTERS,
+        **QUANTITY_FILTERS,
     }
-    environment.globals |= {"table_of": table_of, "listing_of": listing_of}
+    environment.globals |= {"table_of": table_of, "listing_of": listing_of, "deciding": deciding}
     environment.tests |= {"verdict": summary.is_verdict}
     return environment
 
@@ -290,7 +266,7 @@ def _page(content: _PageContent, file: str) -> str:
             glyphs=Markup(GLYPHS),
         )
     )
-    return _lean(_share_styles(share_glyphs(page))) + "\n"
+    return _share_styles(share_glyphs(page)) + "\n"
 
 
 class _Numbers:
@@ -321,20 +297,6 @@ def _share_styles(page: str) -> str:
     bare = _STYLED.sub(named, page)
     rules = "".join(f".{name}{{{style}}}" for style, name in names.items())
     return bare.replace(_CLASSES, rules, 1)
-
-
-def _lean(page: str) -> str:
-    """Drawings without what shows nothing, and short names of their parts."""
-    for place, part in enumerate(dict.fromkeys(_PART.findall(page))):
-        page = page.replace(f"#{part}", f"#k{place}").replace(f'id="{part}"', f'id="k{place}"')
-    return _SVG.sub(_spared, page)
-
-
-def _spared(drawing: re.Match[str]) -> str:
-    text = drawing[0]
-    for pattern, short in _SPARE:
-        text = pattern.sub(short, text)
-    return text
 
 
 def _template(name: str) -> str:

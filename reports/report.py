@@ -5,30 +5,26 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
+from functools import lru_cache, partial
 from itertools import product
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from ringbalance.reports.evidence import Progress, collect_evidence, collect_run
-from ringbalance.reports.page import DOCUMENTS, case_views, page_content, render_pages
+from ringbalance.reports.evidence import Progress, collect_evidence
+from ringbalance.reports.page import DOCUMENTS, page_content, render_pages, terminal_lines
 from ringbalance.reports.pages.cases import TABLES, is_long, table_file
 from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.pictures.process import FOLDERS, start_drawing, write_fields
 from ringbalance.reports.saved import saved_cases
-from ringbalance.reports.section import Record
-from ringbalance.reports.sections import section_view, sections_of
-from ringbalance.reports.summary import judged_sentences, lead_sentence
-from ringbalance.reports.traced import untraced
+from ringbalance.reports.section import Record, ring_of
+from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of, views_of
 from ringbalance.results.result import csv_text
-from ringbalance.scene import AnyScene, Scene, liquid_ring_scene
+from ringbalance.scene import AnyScene
 from ringbalance.scene.platform.files import staged
 from ringbalance.scene.platform.garbage import seldom_collected
 from ringbalance.scene.platform.processes import Workers, beside
@@ -37,10 +33,6 @@ from ringbalance.verification.runner import paper_scene
 
 FILES: Final = ("evidence.json", *DOCUMENTS)
 """Of a report, the page last: where it is, all else is."""
-
-
-_WITH_LIQUID: Final = MappingProxyType({"liquid_ring": liquid_ring_scene})
-"""Balancers whose report calibrates, compares laws and has fields and pictures."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,51 +55,33 @@ class Report:
     @property
     def summary(self) -> list[str]:
         """What to say of it in a few sentences, and why it has no pictures where it has none."""
-        pictures, lines = self.evidence["pictures"], judged_sentences(self.evidence)
-        if not self.evidence.get("balancer"):
-            lines.append(lead_sentence(self.evidence))
-        return [untraced(line) for line in lines] + ([] if pictures["drawn"] else [pictures["text"]])
+        pictures = self.evidence["pictures"]
+        return terminal_lines(self.evidence) + ([] if pictures["drawn"] else [pictures["text"]])
 
 
-@dataclass(kw_only=True)
-class _Views:
-    """What the page shows of cases and annex, made by a worker while this process goes on.
+def _views(path: Path, evidence: Record, pool: Workers | None) -> dict[str, Record | None]:
+    """What the pages show, made by a worker, too; what it has not begun, this process makes.
 
-    A section that no worker has begun when this process has nothing else to do, it makes itself.
+    Args: `path`: file of the evidence.
     """
+    if pool is None:
+        return views_of(evidence)
+    names = (CASES_VIEW, *sections_of(evidence["balancer"]))
+    under_way = {name: pool.submit(_view_at, name, path) for name in names}
+    return {
+        name: pool.taken(future, partial(view_of, name, evidence))
+        for name, future in reversed(under_way.items())
+    }
 
-    pool: Workers | None
-    cases: list[Future[Record]] = field(default_factory=list)
-    sections: dict[str, Future[Record | None]] = field(default_factory=dict)
-    _text: str = ""
 
-    def begin_cases(self, cases: list[Record]) -> None:
-        """Called with all cases as soon as they are judged."""
-        if self.pool is not None:
-            # As they read back from the evidence's file.
-            self.cases = [self.pool.submit(case_views, json.loads(json.dumps(cases)))]
+def _view_at(name: str, path: Path) -> Record | None:
+    return view_of(name, _read_at(path))
 
-    def begin_annex(self, evidence: Record, text: str) -> None:
-        """Called with the whole evidence, which `text` is in its file."""
-        self._text = text
-        if self.pool is not None:
-            names = [section.name for section in sections_of(evidence) if section.place == "annex"]
-            self.sections = {name: self.pool.submit(section_view, name, text) for name in names}
 
-    def of_cases(self, cases: list[Record]) -> Record:
-        if self.pool is None or not self.cases:
-            return case_views(cases)
-        return self.pool.result(self.cases[0], partial(case_views, cases))
-
-    def of_sections(self, evidence: Record) -> dict[str, Record | None]:
-        own = [section for section in sections_of(evidence) if section.name not in self.sections]
-        views = {section.name: section.view(evidence) for section in own}
-        for name, begun in reversed(self.sections.items()):
-            views[name] = self._made(begun, partial(section_view, name, self._text))
-        return views
-
-    def _made(self, begun: Future[Record | None], here: Callable[[], Record | None]) -> Record | None:
-        return here() if self.pool is None else self.pool.taken(begun, here)
+@lru_cache(maxsize=1)
+def _read_at(path: Path) -> Record:
+    document: Record = json.loads(path.read_bytes())
+    return document
 
 
 def write_report(
@@ -134,30 +108,31 @@ def write_report(
         seldom_collected(),
         staged(folder, files=FILES, folders=(*FOLDERS, TABLES)) as stage,
         beside(workers, loading=paper_scene) as pool,
+        _pictures(scene, stage, opengl) as pictures,
     ):
-        views = _Views(pool=pool)
-        common: dict[str, Any] = {"level": level, "pool": pool, "progress": progress}
-        common["scene_text"] = scene_text
-        if narrowed := _WITH_LIQUID.get(scene.balancer):
-            ring = narrowed(scene)
-            with _pictures(ring, stage, opengl) as pictures:
-                evidence = collect_evidence(ring, saved=saved, judged=views.begin_cases, **common)
-                _tell(progress, "pictures")
-                evidence["pictures"] = pictures()
-        else:
-            evidence = collect_run(scene, **common)
+        evidence = collect_evidence(
+            scene, level=level, scene_text=scene_text, saved=saved, pool=pool, progress=progress
+        )
+        _tell(progress, "pictures")
+        evidence["pictures"] = pictures()
         _tell(progress, "page")
         evidence["times"]["total_s"] = round(time.perf_counter() - start, 1)
-        evidence = _write_page(evidence, stage, views)
+        evidence = _write_page(evidence, stage, pool)
     return Report(page=folder / "report.html", evidence=evidence)
 
 
 @contextmanager
-def _pictures(scene: Scene, stage: Path, opengl: OpenGL | None) -> Iterator[Callable[[], Record]]:
-    """Draws while the body runs; called, what is given waits for the record of the pictures."""
-    drawing = start_drawing(
-        scene=scene, fields=write_fields(scene=scene, folder=stage), folder=stage, opengl=opengl
-    )
+def _pictures(scene: AnyScene, stage: Path, opengl: OpenGL | None) -> Iterator[Callable[[], Record]]:
+    """Draws while the body runs; called, what is given waits for the record of the pictures.
+
+    Only a liquid ring has fields and pictures.
+    """
+    ring = ring_of(scene)
+    if ring is None:
+        yield lambda: {"drawn": True, "text": "", "files": []}
+        return
+    fields = write_fields(scene=ring, folder=stage)
+    drawing = start_drawing(scene=ring, fields=fields, folder=stage, opengl=opengl)
     try:
         yield drawing.finish
     finally:
@@ -169,17 +144,17 @@ def _tell(progress: Progress | None, stage: str) -> None:
         progress(stage)
 
 
-def _write_page(evidence: Record, stage: Path, views: _Views) -> Record:
+def _write_page(evidence: Record, stage: Path, pool: Workers | None) -> Record:
     """Evidence, figures and page; the page is made of the evidence as it reads back from its file."""
     text = evidence_text(evidence)
     kept: Record = json.loads(text)
-    views.begin_annex(kept, text)
     (stage / "evidence.json").write_text(text, encoding="utf-8")
+    views = _views(stage / "evidence.json", kept, pool)
     figures = stage / "figures"
     figures.mkdir(exist_ok=True)
     names = [item[theme] for item in evidence["pictures"]["files"] for theme in ("light", "dark")]
     pictures = {name: (figures / name).read_bytes() for name in names}
-    content = page_content(kept, pictures=pictures, views_of=views.of_cases, sections_by=views.of_sections)
+    content = page_content(kept, pictures=pictures, views=views)
     for drawing in content.drawings:
         (figures / f"{drawing.name}.svg").write_text(drawing.standalone(), encoding="utf-8")
     (stage / TABLES).mkdir()

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle
+from matplotlib.ticker import FuncFormatter
 
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.eccentric_mass.plant import rotor_record
@@ -20,7 +20,6 @@ from ringbalance.controller.simulation import Simulation
 from ringbalance.reports.figure import (
     AMPLITUDE,
     FOUND,
-    GRID,
     INK,
     MUTED,
     PAPER,
@@ -50,11 +49,8 @@ from ringbalance.reports.section import Record
 from ringbalance.scene.origins import SceneFile
 
 _MICROMETRE: Final = 1e6
-_NUMBERED, _APART, _SEEN = 12, 0.09, 0.02
-"""Samples that are numbered, how far they must stand apart over the picture's half width, and the least lag
-angle that is drawn, rad."""
-_LABEL_ANGLES: Final = (-90, -75, -105, -60, -120, -45, -135)
-"""Where the label of a ring may stand, deg; the first of equals is taken."""
+_NUMBERED, _APART = 12, 0.09
+"""Samples that are numbered, and how far they must stand apart over the picture's half width."""
 
 
 def figures_of(scene: SceneFile, run: Any) -> list[Drawing]:
@@ -73,7 +69,7 @@ def _masses(scene: EccentricScene, run: EccentricRun) -> list[Drawing]:
     document, locked = run.to_dict(), locked_run(scene).to_dict()
     return [
         over_time(document, locked),
-        *([run_up(document, locked, rotor_record(scene))] if run.speed.max() > run.speed.min() else []),
+        *(run_up(document, locked, rotor_record(scene)) if run.speed.max() > run.speed.min() else []),
         mass_angles(document),
         imbalance_estimate(document, scene.imbalance.mass * scene.imbalance.radius),
         friction_estimates(document, scene.masses.friction_arm),
@@ -156,28 +152,34 @@ def residual_polar(run: Record, reach: Record | None = None) -> Drawing:
     Args: `run`: a simulation document. `reach`: of a pair alone, `vibration_m`, and of the first pair,
     `direction_rad` as vibration, minus the lag angle, with the number of `pairs`; None: not shown.
     """
-    vector = np.asarray(run["amplitude_m"]) * np.exp(1j * np.asarray(run["phase_rad"])) * _MICROMETRE
-    limit = run["limit_m"] * _MICROMETRE
-    ends = np.zeros(0, dtype=np.complex128)
+    amplitude, phase = _MICROMETRE * np.asarray(run["amplitude_m"]), np.asarray(run["phase_rad"])
+    limit, ends = run["limit_m"] * _MICROMETRE, np.zeros(0, dtype=np.complex128)
     if reach is not None:
-        ends = _reachable(reach["vibration_m"] * _MICROMETRE, reach["direction_rad"], reach["pairs"])
-    whole, close = 1.15 * float(np.abs([*vector, *ends, limit]).max()), 4 * limit
+        ends = reachable(reach["vibration_m"] * _MICROMETRE, reach["direction_rad"], reach["pairs"])
+    whole = 1.15 * float(max(amplitude.max(), limit, *np.abs(ends), 0.0))
 
     def paint(axes: Axes) -> None:
-        far, near = panels(axes, (0.02, 0.02, 0.42, 0.9), (0.55, 0.02, 0.42, 0.9))
-        for panel, span, title in ((far, whole, "whole run"), (near, close, "near the limit")):
-            _residual(panel, vector, limit, span, ends)
-            panel.set_title(title, loc="left", fontsize="medium", color=INK)
+        boxes = ((0.04, 0.05, 0.4, 0.8), (0.56, 0.05, 0.4, 0.8))
+        far, near = panels(axes, *boxes, projection="polar")
+        for panel, span, title in ((far, whole, "whole run"), (near, 4 * limit, "near the limit")):
+            panel.plot(np.linspace(0, math.tau, 120), np.full(120, limit), color=PAPER)
+            panel.plot(phase, amplitude, color=FOUND, linewidth=1.1)
+            for place, face in ((0, SURFACE), (-1, FOUND)):
+                look: Any = {"color": FOUND, "markerfacecolor": face, "markersize": 6}
+                panel.plot(phase[place], amplitude[place], "o", **look)
+            panel.set_title(f"{title}, radius in µm", loc="left", fontsize="medium", color=INK, pad=16)
+            # The numbers of the rings where the run does not begin.
+            panel.set(ylim=(0, span), rlabel_position=math.degrees(phase[0]) + 195)
+            panel.set_yticks([tick for tick in nice_span(span) if tick > 0])
+            panel.yaxis.set_major_formatter(FuncFormatter(plain_number))
+            panel.set_xticks(np.arange(8) * math.pi / 4, [f"{angle}°" for angle in range(0, 360, 45)])
         _number_samples(far, run, whole)
         if reach is not None:
-            _lag(far, vector[0], -reach["direction_rad"], whole)
-        near.text(-0.98 * close, -0.98 * close, "circle: limit", color=PAPER)
-        if ends.size:
-            closed, corner = np.append(ends, ends[0]), -0.98 * whole
-            far.plot(closed.real, closed.imag, color=THIRD, linestyle=(0, (5, 2)))
-            far.text(corner, corner, "dashed: what the disc can cancel", color=THIRD)
+            _unbalance(far, phase[0], -reach["direction_rad"], whole)
+            closed = np.append(ends, ends[0])
+            far.plot(np.angle(closed), np.abs(closed), color=THIRD, linestyle=(0, (5, 2)))
 
-    return draw("residual-polar", paint, columns=0, wide=True, height=3.7)
+    return draw("residual-polar", paint, columns=0, wide=True, height=3.9)
 
 
 def _number_samples(panel: Axes, run: Record, span: float) -> None:
@@ -185,31 +187,27 @@ def _number_samples(panel: Axes, run: Record, span: float) -> None:
     times = run.get("samples", {"time_s": []})["time_s"][:_NUMBERED]
     if not times:
         return
-    phases = np.unwrap(np.asarray(run["phase_rad"]))
     sizes = _MICROMETRE * np.interp(times, run["time_s"], run["amplitude_m"])
-    places = sizes * np.exp(1j * np.interp(times, run["time_s"], phases))
-    taken: list[complex] = []
-    for place, at in enumerate(places.tolist(), start=1):
-        panel.plot(at.real, at.imag, ".", color=FOUND, markersize=5)
-        if all(abs(at - other) > _APART * span for other in taken):
-            note(str(place), (at.real, at.imag), (5, 3), color=FOUND)(panel)
-            taken.append(at)
+    phases = np.interp(times, run["time_s"], np.unwrap(run["phase_rad"]))
+    places = sizes * np.exp(1j * phases)
+    panel.plot(phases, sizes, ".", color=FOUND, markersize=5)
+    for number, (phase, size) in enumerate(zip(phases, sizes, strict=True)):
+        earlier = np.abs(places[:number] - places[number])
+        if np.all(earlier > _APART * span):
+            note(str(number + 1), (phase, size), (5, 3), color=FOUND)(panel)
 
 
-def _lag(panel: Axes, start: complex, lag: float, span: float) -> None:
-    """The way that the unbalance points, ahead of the vibration by the lag angle, with that angle."""
-    phase = float(np.angle(start))
-    heavy = np.exp(1j * (phase + lag)) * span
-    panel.plot([0, heavy.real], [0, heavy.imag], color=MUTED, linewidth=1, linestyle=(0, (6, 2, 1, 2)))
-    if abs(lag) > _SEEN:
-        arc = 0.3 * span * np.exp(1j * (phase + lag * np.linspace(0, 1, 30)))
-        panel.plot(arc.real, arc.imag, color=MUTED, linewidth=1)
+def _unbalance(panel: Axes, phase: float, lag: float, span: float) -> None:
+    """The way that the unbalance points, ahead of the vibration by the lag angle."""
+    heavy = phase + lag
+    panel.plot([heavy, heavy], [0, span], color=MUTED, linewidth=1, linestyle=(0, (6, 2, 1, 2)))
     text = f"unbalance, lag {plain_number(round(math.degrees(lag), 1))}°"
-    aligned = "right" if heavy.real > 0 else "left"
-    panel.text(0.8 * heavy.real, 0.8 * heavy.imag, text, color=MUTED, ha=aligned, va="bottom")
+    side = "right" if math.cos(heavy) > 0 else "left"
+    ground = {"facecolor": SURFACE, "edgecolor": "none", "pad": 1}
+    note(text, (heavy, 0.85 * span), (0, 3), ha=side, va="bottom", bbox=ground)(panel)
 
 
-def _reachable(length: float, direction: float, pairs: int) -> Any:
+def reachable(length: float, direction: float, pairs: int) -> Any:
     """Corners of what equal pairs give together, each between plus and minus its length, as complex vectors.
 
     The first is the sum of all, l e^(jd) (1 + e^(j pi/n) + ... ) = 2 l e^(jd)/(1 - e^(j pi/n)); each next one
@@ -218,33 +216,3 @@ def _reachable(length: float, direction: float, pairs: int) -> Any:
     """
     step = np.exp(1j * math.pi / pairs)
     return 2 * length * np.exp(1j * direction) / (1 - step) * step ** np.arange(2 * pairs)
-
-
-def _residual(panel: Axes, vector: Any, limit: float, span: float, ends: Any) -> None:
-    """Args: `ends`: corners of what is drawn dashed, for the labels of the rings to keep away from."""
-    panel.set(xlim=(-span, span), ylim=(-span, span), aspect="equal", xticks=[], yticks=[])
-    panel.axhline(0, color=GRID, linewidth=0.8)
-    panel.axvline(0, color=GRID, linewidth=0.8)
-    panel.grid(visible=False)
-    for spine in panel.spines.values():
-        spine.set_visible(False)
-    for ring in (ring for ring in nice_span(span) if ring > 0):
-        panel.add_patch(Circle((0, 0), ring, fill=False, color=GRID, linewidth=0.8))
-        place = _clearest(ring, vector, ends)
-        ground = {"facecolor": SURFACE, "edgecolor": "none", "pad": 1}
-        text = f"{plain_number(ring)} µm"
-        panel.text(place.real, place.imag, text, color=MUTED, ha="center", va="center", bbox=ground)
-    panel.text(span, 0, "0°", color=MUTED, ha="right", va="bottom")
-    panel.text(0, span, "90°", color=MUTED, va="top")
-    panel.add_patch(Circle((0, 0), limit, fill=False, color=PAPER, linewidth=1.6))
-    panel.plot(vector.real, vector.imag, color=FOUND, linewidth=1.1)
-    for end, face in ((vector[0], SURFACE), (vector[-1], FOUND)):
-        panel.plot(end.real, end.imag, "o", color=FOUND, markerfacecolor=face, markersize=6)
-
-
-def _clearest(ring: float, vector: Any, ends: Any) -> complex:
-    """Where on the lower half of a ring a label lies farthest from the run and from the dashed sides."""
-    sides = np.linspace(ends, np.roll(ends, -1), 40).ravel() if ends.size else ends
-    places = ring * np.exp(1j * np.radians(_LABEL_ANGLES))
-    gaps = np.abs(places[:, None] - np.concatenate([vector, sides])).min(axis=1)
-    return complex(places[int(np.argmax(gaps))])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from types import MappingProxyType
+from typing import Any, Final, Literal
 
 from ringbalance.reduced_model.calibration_record import Calibration
-from ringbalance.scene import Scene
+from ringbalance.scene import AnyScene, Scene, liquid_ring_scene
 from ringbalance.verification.evidence import Level
+from ringbalance.verification.loops import calibration_of
 
 Record = dict[str, Any]
 Place = Literal["report", "annex"]
@@ -18,9 +20,27 @@ Place = Literal["report", "annex"]
 class Work:
     """What a section's evidence is collected from."""
 
-    scene: Scene
-    calibration: Calibration
+    scene: AnyScene
     level: Level
+
+    @property
+    def ring(self) -> Scene:
+        """The scene, of a liquid ring. Raises: SceneError: another balancer."""
+        return liquid_ring_scene(self.scene)
+
+    @property
+    def calibration(self) -> Calibration:
+        """Of a liquid ring, made once in a process."""
+        return calibration_of(self.ring)
+
+
+_WITH_LIQUID: Final = MappingProxyType({"liquid_ring": liquid_ring_scene})
+
+
+def ring_of(scene: AnyScene) -> Scene | None:
+    """The scene, of a balancer whose report calibrates and has fields and pictures; else None."""
+    narrowed = _WITH_LIQUID.get(scene.balancer)
+    return None if narrowed is None else narrowed(scene)
 
 
 def _nothing(_work: Work) -> None:

@@ -5,8 +5,7 @@ A new one is a module with its `SECTION`, a template of its name, and a line in 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Future
 from functools import partial
 from itertools import count
@@ -24,18 +23,15 @@ from ringbalance.reports.pages import (
     loop,
     measured,
     operation,
-    paper_figures,
     plain,
     studies,
     tube,
     tube_flow,
 )
+from ringbalance.reports.pages.cases import case_view
 from ringbalance.reports.pages.standing import CASES, CONDITIONS, CREDIBILITY, DOCUMENT
 from ringbalance.reports.section import Place, Record, Section, Work
-from ringbalance.scene import Scene
 from ringbalance.scene.platform.processes import Workers
-from ringbalance.verification.evidence import Level
-from ringbalance.verification.loops import calibration_of
 
 SECTIONS: Final[tuple[Section, ...]] = (
     first_page.SECTION,
@@ -56,10 +52,8 @@ SECTIONS: Final[tuple[Section, ...]] = (
     tube.CREST,
     drag_coefficient.SECTION,
     loop.INJECTIONS,
-    paper_figures.SECTION,
     consequences.SECTION,
     CASES,
-    eccentric.SECOND_BALANCER,
     Section(name="numerics", title="Numerical verification"),
     studies.EXTREMES,
     studies.TRADE,
@@ -71,71 +65,70 @@ _BY_BALANCER: Final[Mapping[str, tuple[Section, ...]]] = MappingProxyType(
     {"liquid_ring": SECTIONS, eccentric.BALANCER: eccentric.SECTIONS}
 )
 """Of those balancers that have pages of their own."""
+CASES_VIEW: Final = "verification"
+"""Among the views of a report, that of all cases."""
 Begun = dict[str, Future[Record | None]]
 PREFIXES: Final[Mapping[Place, str]] = MappingProxyType({"report": "", "annex": "A"})
 """Before the number of every section, figure, table and equation of a document."""
 
 
-def begun(scene: Scene, level: Level, pool: Workers | None) -> Begun:
+def sections_of(balancer: str) -> dict[str, Section]:
+    """The sections of a report on a kind of balancer, in the page's order, by name."""
+    return {section.name: section for section in _BY_BALANCER.get(balancer, plain.SECTIONS)}
+
+
+def begun(work: Work, pool: Workers | None) -> Begun:
     """Have a worker, where there is one, collect the evidence of sections apart."""
-    if pool is None:
-        return {}
-    apart = [section.name for section in SECTIONS if section.apart]
-    return {name: pool.submit(_section_evidence, name, scene, level) for name in apart}
+    apart = [section.name for section in sections_of(work.scene.balancer).values() if section.apart]
+    return {name: pool.submit(collected, name, work) for name in apart} if pool else {}
 
 
-def _section_evidence(name: str, scene: Scene, level: Level) -> Record | None:
+def collected(name: str, work: Work) -> Record | None:
     """What one section collects of a scene."""
-    work = Work(scene=scene, calibration=calibration_of(scene), level=level)
-    return next(section for section in SECTIONS if section.name == name).collect(work)
+    return sections_of(work.scene.balancer)[name].collect(work)
 
 
-def collected(work: Work, *, without: Collection[str]) -> Record:
-    """The evidence of the sections that have some of their own."""
-    found = {section.name: section.collect(work) for section in SECTIONS if section.name not in without}
-    return {name: record for name, record in found.items() if record is not None}
+def collected_beside(work: Work, apart: Begun) -> Record:
+    """The evidence of the sections that no worker has begun."""
+    names = [name for name in sections_of(work.scene.balancer) if name not in apart]
+    return {name: collected(name, work) for name in names}
 
 
-def completed(found: Record, apart: Begun, work: Work, pool: Workers | None) -> Record:
-    """The evidence of all sections in their order: `found`, and that of those `begun` apart."""
+def completed(records: Record, apart: Begun, work: Work, pool: Workers | None) -> Record:
+    """The evidence of all sections that have some, in their order: `records`, and that of those `begun`."""
     if pool is not None:
-        own = partial(_section_evidence, scene=work.scene, level=work.level)
-        found |= {name: pool.taken(one, partial(own, name)) for name, one in reversed(apart.items())}
-    ordered = {section.name: found.get(section.name) for section in SECTIONS}
+        here = {name: partial(collected, name, work) for name in apart}
+        records |= {name: pool.taken(one, here[name]) for name, one in reversed(apart.items())}
+    ordered = {name: records.get(name) for name in sections_of(work.scene.balancer)}
     return {name: record for name, record in ordered.items() if record is not None}
 
 
-def sections_of(evidence: Record) -> tuple[Section, ...]:
-    """The sections of a report on the evidence's kind of balancer."""
-    balancer = evidence.get("balancer", "liquid_ring")
-    return _BY_BALANCER.get(balancer, plain.SECTIONS)
+def view_of(name: str, evidence: Record) -> Record | None:
+    """What a section shows of the whole evidence, or under `CASES_VIEW` what the page shows of each case."""
+    if name == CASES_VIEW:
+        return {case["id"]: case_view(case) for case in evidence[CASES_VIEW]}
+    return sections_of(evidence["balancer"])[name].view(evidence)
 
 
-def section_view(name: str, text: str) -> Record | None:
-    """What one section shows of the evidence, given as its file has it."""
-    evidence = json.loads(text)
-    return next(section for section in sections_of(evidence) if section.name == name).view(evidence)
+def views_of(evidence: Record) -> dict[str, Record | None]:
+    """All that a report's pages show: of each section, None where it has nothing, and of the cases."""
+    return {name: view_of(name, evidence) for name in (*sections_of(evidence["balancer"]), CASES_VIEW)}
 
 
-def section_views(evidence: Record) -> dict[str, Record | None]:
-    """What each section shows, by name; None where it has nothing to show."""
-    return {section.name: section.view(evidence) for section in sections_of(evidence)}
-
-
-def viewed(evidence: Record, views: Mapping[str, Record | None]) -> list[Record]:
-    """The sections that have something to show by `section_views`, in order and numbered."""
+def numbered(evidence: Record, views: Mapping[str, Record | None]) -> list[Record]:
+    """The sections that have something to show, in order and numbered."""
     counts, own = {"report": count(1), "annex": count(1)}, summary.is_papers(evidence)
     return [
         {
-            "name": s.name,
-            "title": s.title,
-            "template": s.file,
-            "place": (place := "annex" if s.of_paper and not own else s.place),
+            "name": name,
+            "title": section.title,
+            "template": section.file,
+            "place": (place := "annex" if section.of_paper and not own else section.place),
             "number": f"{PREFIXES[place]}{next(counts[place])}",
             "view": view,
         }
-        for s in sections_of(evidence)
-        if (view := views[s.name]) is not None
+        for name, section in sections_of(evidence["balancer"]).items()
+        if (view := views[name]) is not None
     ]
 
 
@@ -144,7 +137,6 @@ def drawings_in(content: Any) -> list[Drawing]:
     if isinstance(content, Drawing):
         return [content]
     if isinstance(content, dict):
-        return [drawing for value in content.values() for drawing in drawings_in(value)]
-    if isinstance(content, list | tuple):
-        return [drawing for value in content for drawing in drawings_in(value)]
-    return []
+        content = list(content.values())
+    parts = content if isinstance(content, list | tuple) else ()
+    return [each for part in parts for each in drawings_in(part)]

@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 
 from ringbalance.reports.prose import typeset
 from ringbalance.results import numbers
-from ringbalance.results.numbers import believed, shown
+from ringbalance.results.numbers import believed
 from ringbalance.results.result import Table
 
 Form = Literal["measured", "given", "percent", "change", "fixed"]
@@ -43,45 +43,23 @@ UNITS: Final = MappingProxyType(
 """Units by the endings of the evidence's keys, the longest first."""
 EXACT: Final = 1e-6
 """Relative total below which a number is a closed form of inputs that are taken as exact."""
-_DIGITS: Final = 4
-_OPEN, _MIDDLE, _CLOSE = "\ue000", "\ue001", "\ue002"
 _SYMBOL: Final = re.compile(r"(?<![\w.])([A-Za-zα-ωΑ-Ω])_([A-Za-zΩ]{1,3})(?!\w)")
-_TRACED: Final = re.compile(f"{_OPEN}([^{_MIDDLE}]*){_MIDDLE}([^{_CLOSE}]*){_CLOSE}")
 
 
-def traced(text: str, path: str) -> str:
-    """A value's text, marked with its dotted place in the evidence, such as "operating_point.k".
-
-    The mark is part of the text, so it survives sentences and tables that are made of it.
-    """
-    return f"{_OPEN}{path}{_MIDDLE}{text}{_CLOSE}"
-
-
-def untraced(text: str) -> str:
-    """The text alone, for a terminal."""
-    return _TRACED.sub(r"\2", text) if _OPEN in text else text
+def marked(text: str, value: object) -> str:
+    """A value's text in an element that names the value's dotted place in the evidence, where it has one."""
+    path = getattr(value, "path", "")
+    return Markup('<span data-from="{}">{}</span>').format(path, text) if path else text
 
 
 def marked_up(value: object) -> object:
-    """Text as it goes onto the page: typeset, traced values in elements that name their place.
+    """Text as it goes onto the page: typeset, symbols such as K_B with their index below the line.
 
     Markup, and what is marked `verbatim`, is left as it is.
     """
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
-    if _OPEN not in value:
-        return _lowered(typeset(value))
-    # Between two traces stands prose; every third part, from the first on, is such.
-    parts = _TRACED.split(value)
-    found = [escape(_lowered(typeset(parts[0])))]
-    for path, text, prose in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
-        found.append(Markup('<span data-from="{}">{}</span>').format(path, typeset(text)))
-        found.append(escape(_lowered(typeset(prose))))
-    return Markup("").join(found)
-
-
-def _lowered(text: str) -> str:
-    """Symbols such as K_B with their index below the line; other text as it is."""
+    text = typeset(value)
     return Markup(_SYMBOL.sub(r"\1<sub>\2</sub>", str(escape(text)))) if _SYMBOL.search(text) else text
 
 
@@ -98,21 +76,6 @@ def evidence_at(evidence: Any, path: str) -> Any:
         else:
             evidence = {item.get("id"): item for item in evidence}[key]
     return evidence
-
-
-def found_at(evidence: Any, path: str) -> Any:
-    """The same; None where nothing is there."""
-    try:
-        return evidence_at(evidence, path)
-    except (KeyError, IndexError, TypeError):
-        return None
-
-
-def read(evidence: Any, path: str, unit: str, *, width: float | None = None, digits: int = 3) -> str:
-    """The evidence's value at a place in the unit that suits it, with its half-width (95 %, SI), traced."""
-    value = evidence_at(evidence, path)
-    known = believed(value, width, stated=states_uncertainty(evidence))
-    return traced(shown(value, unit, known, digits=digits if known == width else _DIGITS), path)
 
 
 def states_uncertainty(evidence: Any) -> bool:
@@ -215,13 +178,8 @@ def printed(
     """
     if value is None:
         return numbers.MISSING
-    path = getattr(value, "path", "")
-    text = _text(float(value), width, digits, unit_of(path) if unit is None else unit, form)
-    return _marked(text, path)
-
-
-def _marked(text: str, path: str) -> str:
-    return Markup('<span data-from="{}">{}</span>').format(path, text) if path else text
+    unit = unit_of(getattr(value, "path", "")) if unit is None else unit
+    return marked(_text(float(value), width, digits, unit, form), value)
 
 
 def _text(value: float, width: float | None, digits: int | None, unit: str, form: Form) -> str:
@@ -248,7 +206,7 @@ def column(values: _Items, digits: int = 6) -> Column:
     display = numbers.display_unit(unit_of(numbers_of[0].path), *numbers_of)
     largest = max(abs(value) for value in numbers_of) * display.factor
     decimals = max(digits - 1 - math.floor(math.log10(largest)), 0) if largest else 0
-    texts = [_marked(numbers.fixed(value * display.factor, decimals), value.path) for value in numbers_of]
+    texts = [marked(numbers.fixed(value * display.factor, decimals), value) for value in numbers_of]
     return Column(symbol=display.symbol, texts=texts)
 
 
@@ -261,9 +219,7 @@ def span(ends: Sequence[float] | None, unit: str | None = None, digits: int = 3)
     texts = [numbers.number(end * display.factor, digits=digits) for end in (low, high)]
     if texts[0] == texts[1]:
         return ""
-    least, most = (
-        _marked(text, getattr(end, "path", "")) for text, end in zip(texts, (low, high), strict=True)
-    )
+    least, most = (marked(text, end) for text, end in zip(texts, (low, high), strict=True))
     both = Markup("up to {}").format(most) if low == 0 else Markup("{} to {}").format(least, most)
     return both + escape(numbers.with_unit("", display.symbol))
 
@@ -313,7 +269,7 @@ def _part_of(part: float, budget: Mapping[str, Any], total: float | None) -> str
     if round(part * factor, -place) == 0:
         return f"< {numbers.fixed(10.0**place, decimals)}"
     text = numbers.fixed(round(part * factor, -place), decimals)
-    return _marked(text, getattr(part, "path", ""))
+    return marked(text, part)
 
 
 def _cells(text: str) -> list[tuple[str, str]]:
@@ -326,7 +282,7 @@ def finished(value: object) -> object:
     """What a template prints: text typeset, counts traced; other numbers must have passed the filter."""
     if isinstance(value, float):
         raise TypeError(f"{getattr(value, 'path', value)} is printed without a filter")
-    return _marked(str(value), value.path) if isinstance(value, Count) else marked_up(value)
+    return marked(str(value), value) if isinstance(value, Count) else marked_up(value)
 
 
 _FORMS: Final[tuple[Form, ...]] = ("given", "percent", "change", "fixed")

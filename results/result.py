@@ -34,8 +34,8 @@ _MAIN: Final = 3
 """Quantities in a short text."""
 _MOST: Final = 10
 """In a notebook."""
-_NUMBER: Final = re.compile("(?:<[^>]*>|\ue000[^\ue001]*\ue001)*[(+−-]?\\d")
-"""A text that begins like a number, behind tags and the marks of a trace."""
+_NUMBER: Final = re.compile(r"(?:<[^>]*>)*[(+−-]?\d")
+"""A text that begins like a number, behind tags."""
 
 
 @dataclass(frozen=True, kw_only=True)

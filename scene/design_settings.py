@@ -11,8 +11,9 @@ from ringbalance.scene.keys.fields import (
     PositivePressure,
     ProperFraction,
     Time,
+    each_of,
     quantity,
-    texts,
+    text,
 )
 
 
@@ -63,7 +64,7 @@ class DesignSettings:
     ] = None
     vary: Annotated[
         tuple[str, ...],
-        texts(example='["tube.bore=0.5mm:2mm", "disc.chambers=4,6"]'),
+        each_of(text(), example='["tube.bore=0.5mm:2mm", "disc.chambers=4,6"]'),
         standard([], "further keys with their ranges or lists, as `ringbalance sweep --vary` takes them"),
         Shown("further keys that vary"),
     ] = ()

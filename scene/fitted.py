@@ -13,7 +13,7 @@ import numpy as np
 
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.keys.declaration import UNKNOWN, Listed, Shown, needed, standard
-from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, Bounds, OneLine, number, numbers, quantity
+from ringbalance.scene.keys.fields import NOT_NEGATIVE, POSITIVE, Bounds, OneLine, each_of, number, quantity
 from ringbalance.scene.units import unit_factor
 
 NO_UNIT: Final = "1"
@@ -46,7 +46,9 @@ class FittedQuantity:
     unit: Annotated[OneLine, needed("of the standard deviation; 1 for none")]
     standard_deviation: Annotated[float, number(POSITIVE), needed("of the quantity, in that unit")]
     correlations: Annotated[
-        tuple[float, ...], numbers(), needed("with every quantity of the list, in its order; 1 with itself")
+        tuple[float, ...],
+        each_of(number(Bounds()), example="[1, -0.9]"),
+        needed("with every quantity of the list, in its order; 1 with itself"),
     ]
 
     @property
@@ -127,7 +129,7 @@ ERROR_NAME: Final = re.compile(r"model: ([^,]+)(?:, (even|odd))?")
 """Name of one standard deviation of a cause's even part, where none is named, or of its odd part."""
 LARGEST_ERROR: Final = 2.5
 """Standard deviations that an error is moved to at most: beyond, a head may fall with the velocity."""
-Deviations = Annotated[float, number(Bounds(at_least=-100, at_most=100))]
+_Deviations = Annotated[float, number(Bounds(at_least=-100, at_most=100))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,9 +142,9 @@ class ModelError:
 
     cause: Annotated[ErrorCause, needed("model that is off")]
     even: Annotated[
-        Deviations, standard(0.0, "part n of k's error (U/1.96) (n cos ln Re + m sin ln Re), or the error")
+        _Deviations, standard(0.0, "part n of k's error (U/1.96) (n cos ln Re + m sin ln Re), or the error")
     ] = 0.0
-    odd: Annotated[Deviations, standard(0.0, "part m of k's error")] = 0.0
+    odd: Annotated[_Deviations, standard(0.0, "part m of k's error")] = 0.0
 
     @classmethod
     def named(cls, name: str, size: float) -> ModelError:

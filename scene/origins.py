@@ -14,13 +14,13 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeVar, cast
 
 from ringbalance.scene.fitted import Fitted
 from ringbalance.scene.keys.declaration import Listed, Shown, needed, standard, unused
-from ringbalance.scene.keys.fields import Bounds, OneLine, number, numbers, whole
+from ringbalance.scene.keys.fields import Bounds, OneLine, each_of, number, whole
 from ringbalance.scene.loop_models import RunSettings
 from ringbalance.scene.registry import registered
 from ringbalance.scene.toml import table_text
 
 Number = Annotated[float, number(Bounds())]
-Numbers = Annotated[tuple[float, ...], numbers()]
+Numbers = Annotated[tuple[float, ...], each_of(number(Bounds()), example="[1.4, 1.5, 1.6]")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,7 +208,7 @@ def summary_text(lines: Iterable[str]) -> str:
     return "\n".join([title, *(f"  {line}" for line in others)])
 
 
-SomeScene = TypeVar("SomeScene", bound=SceneFile)
+_SomeScene = TypeVar("_SomeScene", bound=SceneFile)
 _PATH: Final = re.compile(r"(\w+)\.(\w+)(?:\[(\d+)\])?")
 
 
@@ -224,7 +224,7 @@ def raw_value_at(scene: SceneFile, path: str) -> Any:
     return value if entry is None else value[entry]
 
 
-def with_values_at(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
+def with_values_at(scene: _SomeScene, values: Mapping[str, Any]) -> _SomeScene:
     """A copy with values in place of its own, text and whole lists as they are; nothing is checked again."""
     for path, value in values.items():
         if isinstance(value, int | float):
@@ -236,7 +236,7 @@ def with_values_at(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
     return scene
 
 
-def moved_at(scene: SomeScene, path: str, move: Callable[[float], float]) -> SomeScene:
+def moved_at(scene: _SomeScene, path: str, move: Callable[[float], float]) -> _SomeScene:
     """A copy with one value moved; without an entry, as in "masses.friction_arm", every value of a list."""
     table, key, entry = _placed(path)
     record = getattr(scene, table)

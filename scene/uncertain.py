@@ -22,9 +22,9 @@ from ringbalance.scene.models import Scene
 
 NORMAL_95: Final = 1.959963984540054
 """Expanded uncertainty (95 %) of a normal distribution in standard deviations."""
-ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
+_ASSUMED_ROUGHNESS_UNCERTAINTY: Final = 0.5
 """Relative expanded uncertainty (95 %) of a roughness for which the scene states none."""
-ASSUMED_DRAW_DOWN_UNCERTAINTY: Final = 0.3
+_ASSUMED_DRAW_DOWN_UNCERTAINTY: Final = 0.3
 """Relative expanded uncertainty (95 %) of the depth at which gas enters a port, where the scene states none.
 
 The two theories of it differ by up to 18 % where the port is as wide as the liquid is deep, liquid that still
@@ -82,8 +82,8 @@ def half_widths(scene: Scene) -> Mapping[str, float]:
     """
     liquid = scene.liquid
     found = {
-        "roughness": ASSUMED_ROUGHNESS_UNCERTAINTY * scene.tube.roughness,
-        "draw_down_factor": ASSUMED_DRAW_DOWN_UNCERTAINTY * scene.tube.draw_down_factor,
+        "roughness": _ASSUMED_ROUGHNESS_UNCERTAINTY * scene.tube.roughness,
+        "draw_down_factor": _ASSUMED_DRAW_DOWN_UNCERTAINTY * scene.tube.draw_down_factor,
         "density": liquid.density_uncertainty * liquid.density,
         "kinematic_viscosity": liquid.viscosity_uncertainty * liquid.kinematic_viscosity,
     }
@@ -128,7 +128,7 @@ def _table_of(quantity: str) -> str:
 
 FITTED: Final = "fitted"
 """Name of all inputs that were fitted together, where effects are listed by input."""
-DIRECTION: Final = f"{FITTED} "
+_DIRECTION: Final = f"{FITTED} "
 """What the names of directions begin with; a number follows."""
 
 Sides = tuple[Scene, Scene]
@@ -184,7 +184,7 @@ def direction_sides(
     changes = (columns if turned is None else columns @ turned).T.tolist()
     moves = [dict(zip((keys[i] for i in which), change, strict=True)) for change in changes]
     return {
-        f"{DIRECTION}{place + 1}": (
+        f"{_DIRECTION}{place + 1}": (
             moved(scene, {name: -change for name, change in move.items()}),
             moved(scene, move),
         )
@@ -197,8 +197,8 @@ Effect = TypeVar("Effect", float, FloatArray)
 
 def combined(effects: Mapping[str, Effect]) -> dict[str, Effect]:
     """Effects by input with those of all directions as one, "fitted", by the root of their squares' sum."""
-    alone: dict[str, Any] = {name: e for name, e in effects.items() if not name.startswith(DIRECTION)}
-    together = [effect for name, effect in effects.items() if name.startswith(DIRECTION)]
+    alone: dict[str, Any] = {name: e for name, e in effects.items() if not name.startswith(_DIRECTION)}
+    together = [effect for name, effect in effects.items() if name.startswith(_DIRECTION)]
     if not together:
         return alone
     whole: Any = np.sqrt(sum(np.square(effect) for effect in together))

@@ -15,7 +15,7 @@ from ringbalance.results.numbers import MINUS, SCALES
 
 _TRACED: Final = re.compile(r'<span data-from="([^"]+)">(.*?)</span>')
 _NUMBER: Final = re.compile(
-    rf"\(?\+?({MINUS}?\d[\d\u202f]*(?<=\d)(?:\.\d+)?)(?:\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
+    rf"\(?\+?({MINUS}?\d+(?:\u202f\d{{3}})*(?:\.\d+)?)(?:\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
 )
 _OUTER: Final = re.compile("\\)\u202f×\u202f10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
 _RAISED: Final = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
@@ -66,7 +66,7 @@ def printed(text: str) -> tuple[float, float] | None:
 def _idle_zeros(text: str) -> int:
     """Zeros at the end of a whole number that its uncertainty leaves without a meaning: 1 in 920 ± 100."""
     parts = [part.split("\u202f×")[0] for part in text.split("±")]
-    found = [match[0] for part in parts if (match := re.search(r"[\d\u202f.]*\d", part))]
+    found = [match[0] for part in parts if (match := re.search(r"\d+(?:\u202f\d{3})*(?:\.\d+)?", part))]
     if any("." in part for part in found):
         return 0
     bare = [part.replace("\u202f", "") for part in found]

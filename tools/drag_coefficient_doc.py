@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from ringbalance.reduced_model import paper
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reports.pages.drag_coefficient import SECTION
-from ringbalance.reports.pages.drag_map import DragMap
+from ringbalance.reports.pages.drag_map import DragMap, read_by_eq_18
 from ringbalance.reports.section import Record, Work
 from ringbalance.results.numbers import MISSING, given, measured, number, percent, shown
 from ringbalance.scene.arrays import FloatArray
@@ -26,13 +25,13 @@ def document_tables() -> dict[str, str]:
     """The generated parts of the page, for the liquid-ring paper's disc with its assumed tube."""
     scene = paper_scene()
     calibration = calibrate(scene)
-    found = SECTION.collect(Work(scene=scene, calibration=calibration, level="light"))
+    found = SECTION.collect(Work(scene=scene, level="light"))
     assert found is not None
     return {
         "liquids": _liquids_table(found["liquids"]),
         "bores": _bores_table(calibration),
         "rule": rule(calibration),
-        "hidden": _hidden_table(found["apparent"], calibration),
+        "hidden": _hidden_table(found["separated"]["velocity_of_50_m_s"], calibration),
     }
 
 
@@ -74,12 +73,9 @@ def _liquid_cells(record: Record) -> Sequence[str]:
 
 def _bores_table(calibration: Calibration) -> str:
     """The bore at which k is the paper's, and the bores at which it may be, over the viscosity."""
-    found = DragMap.of(calibration=calibration, bore=_BORES, kinematic_viscosity=list(_VISCOSITIES))
-    point = found.point
-    columns = [
-        _crossings(replace(found, point=replace(point, k=point.k + side * point.k_point_uncertainty)))
-        for side in (0.0, -1.0, 1.0)
-    ]
+    drag = DragMap.of(calibration=calibration, bore=_BORES, kinematic_viscosity=list(_VISCOSITIES))
+    k, width = drag.point.k, drag.point.k_point_uncertainty
+    columns = [drag.bores_for(k + side * width) for side in (0.0, -1.0, 1.0)]
     rows = []
     for i, viscosity in enumerate(_VISCOSITIES):
         middle, low, high = (column[i] for column in columns)
@@ -90,8 +86,9 @@ def _bores_table(calibration: Calibration) -> str:
 def rule(calibration: Calibration) -> str:
     """Where k = 50 lies, as one number for laminar flow in this tube."""
     laminar = [nu for nu in _VISCOSITIES if 5e-6 <= nu <= 1e-4]
-    viscosity, bore = DragMap.of(calibration=calibration, bore=_BORES, kinematic_viscosity=laminar).contour()
-    ratio = viscosity / bore**2
+    drag = DragMap.of(calibration=calibration, bore=_BORES, kinematic_viscosity=laminar)
+    bores = drag.bores_for(drag.point.k)
+    ratio = np.array([nu / d**2 for nu, d in zip(laminar, bores, strict=True) if d is not None])
     low, high = (number(float(value), digits=2) for value in (ratio.min(), ratio.max()))
     speed = number(float(_velocity_at_fifty(calibration)), digits=2)
     return (
@@ -108,27 +105,17 @@ def _velocity_at_fifty(calibration: Calibration) -> FloatArray:
     )
 
 
-def _crossings(found: DragMap) -> list[float | None]:
-    viscosity, bore = found.contour()
-    at = {float(nu): float(d) for nu, d in zip(viscosity, bore, strict=True)}
-    return [at.get(float(nu)) for nu in found.kinematic_viscosity]
-
-
 def _bore(value: float | None) -> str:
     return "beyond the map" if value is None else shown(value, "m", digits=3)
 
 
-def _hidden_table(apparent: Record, calibration: Calibration) -> str:
-    """What Eq. 18 reads off a column separated at the crest, over the velocity.
-
-    Args: `apparent`: `apparent` of the section's evidence.
-    """
-    speed, siphon, separated = (np.asarray(apparent[key]) for key in ("velocity_m_s", "siphon", "separated"))
-    density = calibration.flow_law.density
+def _hidden_table(velocity_of_50: float, calibration: Calibration) -> str:
+    """What Eq. 18 reads off a column separated at the crest, over the velocity."""
+    law = calibration.flow_law
+    density, opposite = law.density, law.max_fill_ratio / 2
     rows = []
-    for wanted in (2.0, apparent["velocity_of_50_m_s"], 5.0, 10.0):
-        at: Any = np.log(wanted)
-        own, read = (float(np.exp(np.interp(at, np.log(speed), np.log(k)))) for k in (siphon, separated))
+    for wanted in (2.0, velocity_of_50, 5.0, 10.0):
+        own, read = (float(k) for k in read_by_eq_18(law, wanted, opposite_fill_ratio=opposite))
         pressure = (read + 1) * density * wanted**2 / 2
         error = np.sqrt((read + 1) / (paper.PAPER_DRAG_COEFFICIENT + 1)) - 1
         rows.append(

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
-from ringbalance.verification.evidence import VOCABULARY, Kind, Metric, Role, Verdict
 from ringbalance.verification.standing import SUBJECTS
 from ringbalance.verification.typed_record import Pattern, RecordError, record_from
+from ringbalance.verification.verdicts import VOCABULARY, Kind, Metric, Role, Verdict
 
 Text = Annotated[str, Pattern(r".{3,}", "a text of three characters or more")]
 CAUSES: Final[Mapping[str, str]] = MappingProxyType(

@@ -24,9 +24,10 @@ from ringbalance.verification.catalogue import (
     unknown_case,
 )
 from ringbalance.verification.catalogue import case_ids as program_ids
-from ringbalance.verification.evidence import Level, Verdict
+from ringbalance.verification.evidence import Level
 from ringbalance.verification.result import CaseResult, definition_document, kind_text
 from ringbalance.verification.runner import paper_scene, run_cases, run_definition, scene_of
+from ringbalance.verification.verdicts import Verdict
 
 _DONE: Final = 0
 _FAILED: Final = 1

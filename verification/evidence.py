@@ -1,11 +1,5 @@
 """What a case hands to the framework: numbers with uncertainties, curves and tables.
 
-And verdicts, from limits that stood before the result: first of each quantity, then of the whole case.
-
-An assumed input can only weaken a verdict. A quantity is confirmed or refuted when it is so at every value
-that its assumed inputs may have; where that is not so it is inconclusive, however well the assumed values
-agree.
-
 A found number S is compared with a reference D (ASME V&V 20): the error E = S - D with the validation
 uncertainty u_val = sqrt(u_num^2 + u_input^2 + u_D^2).  All u are standard uncertainties; the half-width
 2 u_val covers 95 %.  An error inside it cannot be distinguished from none; one outside it can.
@@ -17,7 +11,6 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Any, Literal, Protocol, Self, SupportsFloat
 
 import numpy as np
@@ -340,126 +333,3 @@ def _check(*values: float, uncertainties: Sequence[float]) -> None:
         raise ValueError(
             f"evidence must be finite, with uncertainties of zero or more, not {values}, {uncertainties}"
         )
-
-
-Kind = Literal["validation", "code_verification", "solution_verification", "claim"]
-Metric = Literal["validation", "within_uncertainty", "relative", "absolute", "at_most", "at_least"]
-Role = Literal["number", "idea", "reading"]
-"""What a quantity of a claim decides: a number of the paper's, the idea behind it, or one of several
-readings."""
-
-
-class Verdict(StrEnum):
-    """What is said of a quantity or a case."""
-
-    PASSED = "passed"
-    FAILED = "failed"
-    CONFIRMED = "confirmed"
-    CORRECTED = "confirmed with correction"
-    REFUTED = "refuted"
-    INCONCLUSIVE = "inconclusive"
-    NOT_RUN = "not run"
-
-
-_OF_A_CHECK = (Verdict.FAILED, Verdict.INCONCLUSIVE, Verdict.PASSED, Verdict.NOT_RUN)
-_OF_A_MODEL = (Verdict.REFUTED, Verdict.INCONCLUSIVE, Verdict.CONFIRMED, Verdict.NOT_RUN)
-VOCABULARY: dict[Kind, tuple[Verdict, ...]] = {
-    "claim": (*_OF_A_MODEL[:2], Verdict.CORRECTED, *_OF_A_MODEL[2:]),
-    "validation": _OF_A_MODEL,
-    "code_verification": _OF_A_CHECK,
-    "solution_verification": _OF_A_CHECK,
-}
-"""Verdicts of each kind of case, the one that decides the case first."""
-
-
-def judge_quantity(*, kind: Kind, metric: Metric, limit: float, found: Found) -> tuple[Verdict, Comparison]:
-    """Judge one quantity by its metric and limit, compared with its reference, or with the limit as a bound.
-
-    `validation` (claims) and `within_uncertainty`: E = S - D against 2 u_val, without what assumed inputs
-    add. It holds when |E| <= 2 u_val <= limit |D| (limit alone where D is zero) and no assumed input takes
-    |E| beyond limit |D|; it does not when no assumed input brings |E| within 2 u_val.  `relative`,
-    `absolute`: |E| against limit |D| or limit.  `at_most`, `at_least`: S against the limit, inconclusive in a
-    claim when the limit lies inside S's own 95 % interval or within the reach of the assumed inputs.
-    Raises: ValueError: a metric that needs a reference, without one.
-    """
-    bound = metric in ("at_most", "at_least")
-    reference = Reference(value=limit) if bound else found.reference
-    if reference is None:
-        raise ValueError(f'metric "{metric}" needs a reference')
-    comparison = found.compared(reference)
-    if not found.conclusive:
-        return Verdict.INCONCLUSIVE, comparison
-    if bound:
-        verdict = _by_bound(kind, metric, found, comparison)
-    elif metric in ("relative", "absolute"):
-        scale = abs(reference.value) if metric == "relative" else 1.0
-        verdict = _yes_or_no(kind, abs(comparison.error) <= limit * scale)
-    else:
-        verdict = _by_uncertainty(kind, limit, found, reference, comparison)
-    return verdict, comparison
-
-
-def _yes_or_no(kind: Kind, holds: bool) -> Verdict:
-    if kind in ("claim", "validation"):
-        return Verdict.CONFIRMED if holds else Verdict.REFUTED
-    return Verdict.PASSED if holds else Verdict.FAILED
-
-
-def _by_uncertainty(
-    kind: Kind, limit: float, found: Found, reference: Reference, comparison: Comparison
-) -> Verdict:
-    widest = limit * (abs(reference.value) or 1.0)
-    low, high = (comparison.error + reach for reach in found.reach)
-    if comparison.consistent:
-        decided = comparison.half_width <= widest and max(-low, high) <= widest
-        return _yes_or_no(kind, True) if decided else Verdict.INCONCLUSIVE
-    if low <= comparison.half_width and high >= -comparison.half_width:
-        return Verdict.INCONCLUSIVE
-    if kind == "claim" and found.corrected is not None:
-        departure = abs(found.corrected - reference.value)
-        return Verdict.CORRECTED if departure <= comparison.half_width else Verdict.REFUTED
-    return _yes_or_no(kind, False)
-
-
-def _by_bound(kind: Kind, metric: Metric, found: Found, comparison: Comparison) -> Verdict:
-    """By the error against the limit; what is exact may lie on the limit."""
-    low, high = found.reach
-    uncertain = found.numerical > 0 or found.input > 0 or low < 0 or high > 0
-    half_width = comparison.half_width
-    if (
-        kind in ("claim", "validation")
-        and uncertain
-        and low - half_width <= -comparison.error <= high + half_width
-    ):
-        return Verdict.INCONCLUSIVE
-    holds = comparison.error <= 0 if metric == "at_most" else comparison.error >= 0
-    if kind == "claim" and not holds and found.corrected is not None:
-        corrected = found.corrected - found.value + comparison.error
-        explained = corrected <= half_width if metric == "at_most" else corrected >= -half_width
-        return Verdict.CORRECTED if explained else Verdict.REFUTED
-    return _yes_or_no(kind, holds)
-
-
-def combine(*, kind: Kind, verdicts: Sequence[Verdict], roles: Sequence[Role] = ()) -> Verdict:
-    """Verdict of a case: that of its quantity that decides; not run when there are none.
-
-    Readings of one claim count together, as the one that speaks most for it. A number that holds after a
-    correction leaves a claim confirmed with correction where its idea was judged and confirmed; otherwise it
-    is refuted. Args: `roles`: of each verdict, default "number".
-    Raises: ValueError: a verdict that this kind of case does not know.
-    """
-    order = VOCABULARY[kind]
-    strange = [verdict for verdict in verdicts if verdict not in order]
-    if strange:
-        raise ValueError(f'a {kind} case knows no "{strange[0]}"')
-    if not verdicts:
-        return Verdict.NOT_RUN
-    pairs = list(zip(verdicts, roles or ("number",) * len(verdicts), strict=True))
-    counted = [verdict for verdict, role in pairs if role != "reading"]
-    readings = [verdict for verdict, role in pairs if role == "reading"]
-    if readings:
-        counted.append(max(readings, key=order.index))
-    worst = min(counted, key=order.index)
-    if worst is Verdict.CORRECTED and (Verdict.CONFIRMED, "idea") not in pairs:
-        return Verdict.REFUTED
-    return worst

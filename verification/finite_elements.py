@@ -10,6 +10,7 @@ import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
+from typing import Any, Final
 from unittest.mock import patch
 
 import numpy as np
@@ -23,9 +24,11 @@ from ringbalance.physics.pressure.solve import PressureSolution, RotatingLiquid
 from ringbalance.physics.results import Estimate
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Disc, Scene
-from ringbalance.verification.evidence import Convergence, Found, from_half_width
+from ringbalance.verification.evidence import Convergence, Found
 from ringbalance.verification.papers import RING_RADIUS, with_plate
 from ringbalance.verification.reference.chambers import exact_moment
+
+_COMPLEX_STEP: Final = 1e-30
 
 
 def refined_cells(disc: Disc, levels: Sequence[int], *, dimension: int) -> list[tuple[int, ...]]:
@@ -49,6 +52,16 @@ def relative_rms(found: FloatArray, true: FloatArray, weights: FloatArray) -> fl
     return float(np.sqrt(np.sum(weights * (found - true) ** 2) / np.sum(weights * true**2)))
 
 
+def slopes(field: Callable[[Any], FloatArray], places: FloatArray) -> FloatArray:
+    """Derivatives of an analytic field along each coordinate, shape (..., dimension, *places.shape[1:]).
+
+    By a step into the complex plane, exact to rounding. Args: `places`: shape (dimension, ...).
+    """
+    steps = 1j * _COMPLEX_STEP * np.eye(len(places)).reshape(2 * places.shape[:1] + (1,) * (places.ndim - 1))
+    along = [np.asarray(field(places + step)).imag / _COMPLEX_STEP for step in steps]
+    return np.stack(along, axis=along[0].ndim - places.ndim + 1)
+
+
 @lru_cache(maxsize=64)
 def ring_of(scene: Scene, fills: tuple[float, ...], *, density: float | None = None) -> RingQuantities:
     """Finite-element totals of a scene without gravity, with another density, kg/m^3, where one is given."""
@@ -68,9 +81,9 @@ def found_of(quantities: RingQuantities, name: str, index: int) -> Found:
     """
     estimate: Estimate = getattr(quantities, name)
     converges = quantities.convergence[name][index].verdict in (GridVerdict.MONOTONE, GridVerdict.ROUND_OFF)
-    return Found(
-        value=float(estimate.value[index]),
-        numerical=from_half_width(float(estimate.uncertainty[index])),
+    return Found.within(
+        estimate.value[index],
+        estimate.uncertainty[index],
         conclusive=quantities.status.ok and converges,
     )
 

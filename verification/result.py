@@ -18,14 +18,12 @@ from ringbalance.verification.evidence import (
     Comparison,
     Evidence,
     Found,
-    Kind,
     Level,
     Reference,
-    Verdict,
     from_range,
-    judge_quantity,
 )
 from ringbalance.verification.typed_record import plain
+from ringbalance.verification.verdicts import Kind, Verdict, judge_quantity
 
 Document = dict[str, Any]
 _LISTED: Final = {"id", "kind", "about", "paper", "number", "title", "claim", "cost"}

@@ -16,16 +16,10 @@ from ringbalance.scene.platform.processes import Workers, beside
 from ringbalance.verification.assumptions import assumptions_of, overridden, widened
 from ringbalance.verification.case import CaseDefinition, Mutation
 from ringbalance.verification.catalogue import case_code, load_case, load_cases
-from ringbalance.verification.evidence import (
-    CaseCode,
-    Evidence,
-    Level,
-    NotRunError,
-    Verdict,
-    combine,
-)
+from ringbalance.verification.evidence import CaseCode, Evidence, Level, NotRunError
 from ringbalance.verification.papers import driven_scene
 from ringbalance.verification.result import CaseResult, MutationResult, QuantityResult
+from ringbalance.verification.verdicts import Verdict, combine
 
 Progress = Callable[[CaseResult], None]
 PAPER_SCENE = "liquid_ring_paper"

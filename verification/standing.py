@@ -1,14 +1,19 @@
 """What stands behind each predicted quantity: measurements, verification, calibration, or assumption.
 
-A case says in `about` which subjects its result is evidence for; everything else of the table follows.
+A case says in `about` which subjects of `standing.toml` its result is evidence for; everything else of the
+table follows.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from types import MappingProxyType
 from typing import Any, Final, Literal
+
+from ringbalance.verification.typed_record import record_from
 
 HEADS: Final = (
     "Quantity",
@@ -37,72 +42,13 @@ class _Subject:
 
 SUBJECTS: Final[Mapping[str, _Subject]] = MappingProxyType(
     {
-        "ring": _Subject(
-            title="Volume, wall pressure, moment and lever arm",
-            assumed="liquid at rest in the disc; waves counted apart",
-            budgets=("chamber_volume", "wall_pressure", "moment", "lambda", "stall_pressure"),
-        ),
-        "friction": _Subject(
-            title="Friction in a straight tube at rest",
-            assumed="roughness of the wall",
-            budgets=("drag_coefficient", "velocity"),
-        ),
-        "rotation": _Subject(
-            title="Friction in a rotating tube",
-            assumed="turbulent flow: a formula recalled, not read",
-            budgets=("drag_coefficient", "velocity"),
-        ),
-        "fittings": _Subject(
-            title="Entrance, exit, bends and developing flow",
-            calibrated="the bore of each tube measured, to one of its points",
-            assumed="bends one by one, far from each other",
-            budgets=("drag_coefficient", "velocity"),
-        ),
-        "crest": _Subject(
-            title="Flow over the siphon crest, separation",
-            calibrated="the cavity's pressure, with two thresholds of one siphon in view",
-            assumed="cavity between vapour and gas pressure; air leaves at Froude numbers 0.6 to 1.1",
-            budgets=(
-                "velocity",
-                "crest_pressure",
-                "cavitation_margin",
-                "priming_pressure_vented",
-                "priming_pressure_trapped",
-            ),
-        ),
-        "residual": _Subject(
-            title="Residual liquid over the port",
-            assumed="draw-down depth derived, 30 % wide",
-            budgets=("usable_moment", "least_fill_ratio"),
-        ),
-        "gas": _Subject(
-            title="Filling and venting of a chamber with gas",
-            assumed="conductance, critical ratio and lag of a line that the scene does not give",
-        ),
-        "waves": _Subject(
-            title="Waves on the liquid ring",
-            calibrated="6 % of a natural frequency, to tanks that are not judged",
-            assumed="damping; Coriolis force without data",
-        ),
-        "vibration": _Subject(
-            title="Vibration by an unbalance",
-            calibrated="the influence coefficient, to runs with small unbalances",
-            assumed="one plane, away from resonances",
-        ),
-        "loop": _Subject(
-            title="Fills and vibration in closed loop", assumed="noise, control period, start of the run"
-        ),
-        "uncertainty": _Subject(title="Stated uncertainties", assumed="inputs independent of each other"),
-        "range": _Subject(
-            title="Choice of models, limits of validity", assumed="estimates of left-out terms"
-        ),
-        "eccentric": _Subject(
-            title="Eccentric masses: estimation, positioning, run-up",
-            assumed="friction, motor and filter data; vertical shaft",
-            balancer="eccentric_mass",
-        ),
+        name: record_from(_Subject, table)
+        for name, table in tomllib.loads(
+            (files("ringbalance.verification") / "standing.toml").read_text(encoding="utf-8")
+        ).items()
     }
 )
+"""By the names that cases give in `about`."""
 
 
 def standing_rows(

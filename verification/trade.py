@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -40,7 +41,6 @@ from ringbalance.scene.platform.files import check_file, write_whole
 from ringbalance.scene.platform.terminal import activity, print_message
 from ringbalance.scene.uncertain import without_fitted
 from ringbalance.verification.evidence import Level
-from ringbalance.verification.typed_record import plain
 
 Record = dict[str, Any]
 Solve = Callable[[], tuple[FloatArray, ...]]
@@ -54,69 +54,37 @@ _FLOW_SHARES: Final = (0.2, 0.4, 0.5, 0.6, 0.8)
 """Fills of the driven chamber, of max_fill_ratio."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _MeasuredModel:
-    """One model on one quantity."""
-
-    name: str
-    values: tuple[float, ...]
-    """SI, at the points of the quantity."""
-    error: float
-    """Largest difference from the finest model, relative to that one's largest value."""
-    seconds: float
-    """Processor time of all the points, the least of some tries."""
-
-    @property
-    def designs_per_second(self) -> float:
-        """Designs that one processor answers in a second."""
-        return 1 / self.seconds
-
-
-@dataclass(frozen=True, kw_only=True)
-class MeasuredQuantity:
-    """One quantity by every model, the finest last."""
-
-    name: str
-    title: str
-    points: tuple[str, ...]
-    uncertainty: float
-    """Of the finest model, 95 %, relative, without that of the inputs."""
-    status: Status
-    models: tuple[_MeasuredModel, ...]
-
-    def good_enough(self) -> list[_MeasuredModel]:
-        """Models whose error is below what the finest is known to; the finest always is."""
-        return [model for model in self.models if model.error <= self.uncertainty]
-
-
 @dataclass(frozen=True, kw_only=True, repr=False)
 class TradeStudy(Result):
     """Speed against accuracy of one scene."""
 
     scene: Scene
-    quantities: tuple[MeasuredQuantity, ...]
+    quantities: tuple[Record, ...]
+    """Each by every model, the finest last: name and title, points, what the finest model is known to (95 %,
+    relative, without the inputs' part), status; of a model its values at the points, SI, and the largest
+    difference from the finest one, relative to that one's largest value."""
+    times: Mapping[str, Sequence[Record]]
+    """Of each quantity's models: processor time of all points, s, the least of some tries, and how many
+    designs a second one processor answers."""
 
     def rows(self) -> Rows:
         """Of each quantity the fastest model that is no worse than the finest is known, and all models."""
-        document = self.to_dict()
-        fastest = [
-            (quantity, min(quantity.good_enough(), key=lambda model: model.seconds))
-            for quantity in self.quantities
-            if quantity.models
-        ]
         return Rows(
             title=f"Speed against accuracy of {self.scene.name} ({self.scene.source})",
-            quantities=tuple(
-                Quantity(
-                    key=f"{quantity.name}_designs_per_second",
-                    name=f"{quantity.title}, by {model.name}",
-                    value=model.designs_per_second,
-                    unit="designs a second",
-                    digits=2,
-                )
-                for quantity, model in fastest
-            ),
-            tables=tuple(models_table(each, document["times"]) for each in document["quantities"]),
+            quantities=tuple(map(self._fastest, filter(itemgetter("models"), self.quantities))),
+            tables=tuple(models_table(each, self.times) for each in self.quantities),
+        )
+
+    def _fastest(self, quantity: Record) -> Quantity:
+        name, models = quantity["quantity"], quantity["models"]
+        good = {model["model"] for model in models if model["error"] <= quantity["uncertainty"]}
+        best = min((each for each in self.times[name] if each["model"] in good), key=itemgetter("seconds"))
+        return Quantity(
+            key=f"{name}_designs_per_second",
+            name=f"{quantity['title']}, by {best['model']}",
+            value=best["designs_per_second"],
+            unit="designs a second",
+            digits=2,
         )
 
     def to_dict(self) -> Record:
@@ -136,26 +104,9 @@ class TradeStudy(Result):
                 for term, estimate in estimates
             ],
             "models_used": [asdict(used) for used in models_used(scene)],
-            "quantities": [_quantity(quantity) for quantity in self.quantities],
-            "times": {
-                quantity.name: [
-                    _chosen(model, "model", "seconds designs_per_second") for model in quantity.models
-                ]
-                for quantity in self.quantities
-            },
+            "quantities": list(self.quantities),
+            "times": dict(self.times),
         }
-
-
-def _quantity(quantity: MeasuredQuantity) -> Record:
-    return _chosen(quantity, "quantity", "title points uncertainty") | {
-        "status": {"code": str(quantity.status.code), "text": quantity.status.text},
-        "models": [_chosen(model, "model", "values error") for model in quantity.models],
-    }
-
-
-def _chosen(record: MeasuredQuantity | _MeasuredModel, what: str, names: str) -> Record:
-    """Its name under another key, and some of its values under their own."""
-    return {what: record.name, **{name: plain(getattr(record, name)) for name in names.split()}}
 
 
 def models_table(quantity: Record, times: Mapping[str, Sequence[Record]]) -> Table:
@@ -203,24 +154,26 @@ def trade_study(
         float(np.max(_shares(curve.uncertainty, curve.value), where=judged, initial=0.0))
         for curve in (chamber.wall_pressure, chamber.moment)
     ]
-    pressure, moment = _measured(
+    measured = _measured(
         models,
-        (("wall_pressure", "wall pressure, mean over a turn, Pa"), ("moment", "moment of a chamber, kg m")),
-        points=[f"fill ratio {x:.3g}" for x in fills],
+        {"wall_pressure": "wall pressure, mean over a turn, Pa", "moment": "moment of a chamber, kg m"},
+        fills,
         known=known,
         status=chamber_status(scene),
     )
     show("velocity")
     driven = scene.disc.max_fill_ratio * np.array(_FLOW_SHARES)
     flow = law.evaluate(fill_ratio=driven, gas_pressure=scene.gas.pressure)
-    (velocity,) = _measured(
+    measured += _measured(
         _flow_models(scene, driven),
-        (("velocity", "velocity in the tube, m/s"),),
-        points=[f"fill ratio {x:.3g}" for x in driven],
+        {"velocity": "velocity in the tube, m/s"},
+        driven,
         known=[float(np.max(_shares(flow.uncertainty, flow.velocity)))],
         status=Status(),
     )
-    return TradeStudy(scene=scene, quantities=(pressure, moment, velocity))
+    quantities, times = zip(*measured, strict=True)
+    names = [quantity["quantity"] for quantity in quantities]
+    return TradeStudy(scene=scene, quantities=quantities, times=dict(zip(names, times, strict=True)))
 
 
 def _shares(width: FloatArray, value: FloatArray) -> FloatArray:
@@ -229,37 +182,42 @@ def _shares(width: FloatArray, value: FloatArray) -> FloatArray:
 
 def _measured(
     models: dict[str, Solve],
-    quantities: Sequence[tuple[str, str]],
+    titles: Mapping[str, str],
+    fills: FloatArray,
     *,
-    points: Sequence[str],
     known: Sequence[float],
     status: Status,
-) -> list[MeasuredQuantity]:
-    """Every model solved and timed, the last one being the finest."""
+) -> list[tuple[Record, list[Record]]]:
+    """Every model solved and timed, the last one being the finest: each quantity, and its models' times.
+
+    Args: `titles`: by quantity, in the order of the values of a solve.
+    """
     solved = {name: _timed(solve) for name, solve in models.items()}
+    times = [
+        {"model": name, "seconds": seconds, "designs_per_second": 1 / seconds}
+        for name, (_, seconds) in solved.items()
+    ]
     measured = []
-    for place, (name, title) in enumerate(quantities):
+    for place, (name, title) in enumerate(titles.items()):
         values = {model: found[place] for model, (found, _) in solved.items()}
         finest = values[next(reversed(values))] if values else np.zeros(0)
         scale = float(np.max(np.abs(finest), initial=0.0)) or 1.0
-        measured.append(
-            MeasuredQuantity(
-                name=name,
-                title=title,
-                points=tuple(points),
-                uncertainty=known[place],
-                status=status,
-                models=tuple(
-                    _MeasuredModel(
-                        name=model,
-                        values=tuple(map(float, value)),
-                        error=float(np.max(np.abs(value - finest))) / scale,
-                        seconds=solved[model][1],
-                    )
-                    for model, value in values.items()
-                ),
-            )
-        )
+        record = {
+            "quantity": name,
+            "title": title,
+            "points": [f"fill ratio {x:.3g}" for x in fills],
+            "uncertainty": known[place],
+            "status": {"code": str(status.code), "text": status.text},
+            "models": [
+                {
+                    "model": model,
+                    "values": value.tolist(),
+                    "error": float(np.max(np.abs(value - finest))) / scale,
+                }
+                for model, value in values.items()
+            ],
+        }
+        measured.append((record, times))
     return measured
 
 

@@ -19,7 +19,7 @@ from ringbalance.reduced_model.injection.dynamics import EVENTS, WORKSPACE, Even
 from ringbalance.reduced_model.injection.events import command
 from ringbalance.reduced_model.injection.lift import shown
 from ringbalance.reduced_model.injection.march import advance
-from ringbalance.reduced_model.injection.pair import Motion, packed
+from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.scene.arrays import ComplexArray, FloatArray
 from ringbalance.scene.platform.compiled import in_place
 
@@ -123,7 +123,7 @@ class LawBased(BuiltIn):
 
     @cached_property
     def _liquid(self) -> npt.NDArray[np.void]:
-        level = packed(self.plant, fill=self.ring.total / 2, primed=False, motion=Motion())
+        level = at_rest(self.plant, fill=self.ring.total / 2)
         return np.repeat(level, self.ring.chambers // 2 + 1)
 
     def react(self, loop: Record, memory: Memory) -> None:

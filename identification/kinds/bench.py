@@ -29,7 +29,7 @@ _TERMS: Final = 100
 """Up to which odd terms of a series are summed that fall like 1/n^5."""
 _LAMINAR: Final = 100.0
 """Critical Re over the usual one, for flow that is known to be laminar."""
-CONDUCTANCE_UNCERTAINTY: Final = 0.1
+_CONDUCTANCE_UNCERTAINTY: Final = 0.1
 """U (95 %), relative, of a conductance computed from an opening's area: its discharge coefficient."""
 _CRITICAL_RATIO: Final = 0.5
 """b of a sharp opening, where the data do not give one."""
@@ -140,7 +140,7 @@ def _vessel_time(data: Observations) -> Stated:
     limits = np.array([_limits(*(float(value) for value in row)) for row in rows])
     middle = limits.mean(axis=1)
     half = np.abs(limits[:, 1] - limits[:, 0]) / 2
-    return middle, np.hypot(half, CONDUCTANCE_UNCERTAINTY * middle)
+    return middle, np.hypot(half, _CONDUCTANCE_UNCERTAINTY * middle)
 
 
 def _no_duct(_: object, data: Observations) -> str:

@@ -257,11 +257,12 @@ class _GravityShares(NamedTuple):
 
 @lru_cache(maxsize=8)
 def gravity_shares(scene: Scene) -> _GravityShares:
-    """Over `chamber_fills`, or over the whole range where no ring is closed."""
+    """Over `chamber_fills`; all of it where no ring is closed."""
     if scene.environment.gravity == 0:
         return _GravityShares(mean=0.0, swing=0.0)
-    closed = chamber_fills(scene)
-    fills = closed if closed.size else range_fills(scene)
+    fills = chamber_fills(scene)
+    if fills.size == 0:
+        return _GravityShares(mean=1.0, swing=1.0)
     wall, moment, ratio = chamber_closed_forms(scene=scene, fill_ratio=fills)
     ring, (lowest, largest) = TiltedRing.of(scene, fills), amplification(scene, fills)
     changes = (

@@ -2,16 +2,15 @@
 
 Its free surface is the circle |r + g/omega^2| = b (horizontal shaft) or the paraboloid r^2 = c^2 + 2 G z
 (vertical), G = g/omega^2, with b or c from the liquid's volume.  With phi = eta alpha(r) every integral over
-the chamber is smooth in eta, plates and all, so that few Gauss points give all digits.  Where part of the
-outer wall runs dry the surface is cut off there; the integrals have kinks and take more points.  An imported
-chamber is integrated over its walls instead, `mesh.cut`.
+the chamber is smooth in eta, plates and all, so that few Gauss points give all digits, as long as no part of
+the outer wall runs dry.  An imported chamber is integrated over its walls instead, `mesh.chamber_table`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -27,20 +26,13 @@ from ringbalance.mesh.geometry import (
 from ringbalance.scene.arrays import BoolArray, FloatArray
 from ringbalance.scene.describe import scene_fault
 from ringbalance.scene.faults import SceneError
-from ringbalance.scene.loop_models import Shaft
 from ringbalance.scene.models import Disc, Scene
 
 POINTS: Final = 20
 """Gauss points along the angle or the axis."""
 RADIAL_POINTS: Final = 14
-_OPEN_POINTS: Final = 200
-"""The same where part of the wall is dry: about four digits of gravity's effect."""
-_STEPS: Final = (12, 60)
-"""At most, of Newton's method on a closed ring, and within bounds where the wall is dry."""
-_KINKED: Final = 12
-"""Steps after which bounds are halved, should kinks keep Newton's method from arriving."""
-_DRY_ROUND_OFF: Final = 1e-13
-"""Of an area, over R2^2, where the wall is dry."""
+_STEPS: Final = 12
+"""At most, of Newton's method."""
 _TURN: Final = (8, 96)
 """Fewest and most angles of gravity over a turn."""
 _AVERAGING: Final = 1e-12
@@ -72,7 +64,7 @@ class TiltedRing:
     moment_ripple: FloatArray
     """First harmonic over a turn, kg m zero-to-peak."""
     closed: BoolArray
-    """Whether the liquid covers the whole outer wall; where not, values of a sector have four digits."""
+    """Whether the liquid covers the whole outer wall; where not, values of a sector mean nothing."""
 
     @classmethod
     def of(cls, scene: Scene, fill_ratio: FloatArray) -> TiltedRing:
@@ -89,19 +81,12 @@ class TiltedRing:
         """
         disc, density, square = scene.disc, scene.liquid.density, scene.rotor.speed**2
         length, turn, shaft = scene.environment.gravity / square, turn_samples(scene), scene.environment.shaft
-        table = imported_table(disc)
-
-        def turned(fills: FloatArray) -> _Turned:
-            if table is not None:
-                return _imported(disc, table, length, fills, turn if shaft == "horizontal" else 0)
-            return _of_sector(disc, length, fills, turn, shaft, cut=False)
-
-        found = turned(fill_ratio)
-        is_open = ~np.all(found.closed, axis=1)
-        for place in np.flatnonzero(is_open) if table is None else ():
-            part = _over_dry_wall(disc, length, float(fill_ratio[place]), turn, shaft)
-            for name in ("wall_pressure", "surface_square", "moment", "moment_per_volume"):
-                getattr(found, name)[place] = getattr(part, name)[0]
+        if (table := imported_table(disc)) is not None:
+            found = _imported(disc, table, length, fill_ratio, turn if shaft == "horizontal" else 0)
+        elif shaft == "vertical":
+            found = _along(disc, length, fill_ratio)
+        else:
+            found = _across(disc, length, fill_ratio, turn)
         scale = density * square / 2
         return cls(
             wall_pressure=scale * found.wall_pressure.mean(axis=1),
@@ -110,7 +95,7 @@ class TiltedRing:
             moment_per_volume=density * found.moment_per_volume.mean(axis=1),
             wall_pressure_ripple=scale * _first_harmonic(found.wall_pressure),
             moment_ripple=density * disc.axial_width * _first_harmonic(found.moment),
-            closed=~is_open,
+            closed=np.all(found.closed, axis=1),
         )
 
 
@@ -124,20 +109,6 @@ class _Turned:
     moment: FloatArray
     moment_per_volume: FloatArray
     closed: BoolArray
-
-
-def _of_sector(
-    disc: Disc, length: float, fills: FloatArray, turn: int, shaft: Shaft, *, cut: bool
-) -> _Turned:
-    if shaft == "vertical":
-        return _along(disc, length, fills, cut)
-    return _across(disc, length, fills, turn, cut)
-
-
-@lru_cache(maxsize=128)
-def _over_dry_wall(disc: Disc, length: float, fill: float, turn: int, shaft: Shaft) -> _Turned:
-    """At one fill, and once for all who ask for it: each takes a tenth of a second."""
-    return _of_sector(disc, length, np.array([fill]), turn, shaft, cut=True)
 
 
 def turn_samples(scene: Scene) -> int:
@@ -171,109 +142,67 @@ def _first_harmonic(values: FloatArray) -> FloatArray:
     return np.asarray(2 / count * np.abs(values @ turn))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Search:
-    """b^2 or c^2, by Newton's method; where dry parts of the wall make kinks, within bounds that close in."""
-
-    value: FloatArray
-    low: FloatArray
-    high: FloatArray
-    bounded: bool
-
-    def narrowed(self, excess: FloatArray, opening: FloatArray, step: int) -> _Search:
-        """After the liquid's area exceeded its target by `excess`, which falls with b^2 like `opening`."""
-        # No opening: the surface has left the chamber, and the bound is the next place to look.
-        newton = self.value + excess / np.maximum(opening, np.finfo(float).tiny ** 0.5)
-        if not self.bounded:
-            return replace(self, value=np.clip(newton, self.low, self.high))
-        low = np.where(excess > 0, self.value, self.low)
-        high = np.where(excess > 0, self.high, self.value)
-        inside = (newton >= low) & (newton <= high) & (step < _KINKED)
-        return replace(self, value=np.where(inside, newton, (low + high) / 2), low=low, high=high)
-
-    def reached(self, excess: FloatArray, outer: float) -> bool:
-        """Whether nothing but rounding is left."""
-        return bool(np.all(np.abs(excess) <= (_DRY_ROUND_OFF if self.bounded else _ROUND_OFF) * outer**2))
-
-
 def _held(disc: Disc, radius: FloatArray) -> FloatArray:
     """Within what the chamber's formulas take."""
     return np.asarray(np.clip(radius, disc.plate_thickness * 1.001 + 1e-12, disc.outer_radius))
 
 
-def _along(disc: Disc, length: float, fills: FloatArray, cut: bool) -> _Turned:
-    abscissa, weights = _rule(_OPEN_POINTS if cut else POINTS)
+def _along(disc: Disc, length: float, fills: FloatArray) -> _Turned:
+    abscissa, weights = _rule(POINTS)
     outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills) ** 2
     rise, weight = length * disc.axial_width * abscissa[None, :], weights[None, :] / 2
     target = liquid_area(disc=disc, surface_radius=np.sqrt(start))
-    reach = length * disc.axial_width + outer**2 * 1e-12
-    search = _Search(value=start, low=start - reach, high=start + reach, bounded=cut)
-
-    def surface() -> tuple[FloatArray, FloatArray]:
-        """Radius, and half-angle where it is wet."""
-        radius = _held(disc, np.sqrt(np.maximum(search.value[:, None] + rise, 0.0)))
-        return radius, np.where(radius < outer, half_angle(disc=disc, radius=radius), 0.0)
-
-    for step in range(_STEPS[cut]):
-        radius, alpha = surface()
+    reach, square = length * disc.axial_width + outer**2 * 1e-12, start
+    for step in range(_STEPS + 1):
+        radius = _held(disc, np.sqrt(np.maximum(square[:, None] + rise, 0.0)))
+        alpha = half_angle(disc=disc, radius=radius)
         excess = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=1) - target
-        if cut and search.reached(excess, outer):
-            break
-        search = search.narrowed(excess, np.sum(weight * alpha, axis=1), step)
-    radius, alpha = surface()
-    level = search.value[:, None] + rise
+        if step < _STEPS:
+            square = np.clip(square + excess / np.sum(weight * alpha, axis=1), start - reach, start + reach)
+    level = square[:, None] + rise
     moment = np.sum(weight * liquid_first_moment(disc=disc, surface_radius=radius), axis=1)
+    centroid = np.sum(weight * radius * np.sin(alpha), axis=1) / np.sum(weight * alpha, axis=1)
     return _Turned(
-        wall_pressure=np.sum(weight * np.maximum(outer**2 - level, 0.0), axis=1)[:, None],
-        surface_square=search.value[:, None].copy(),
+        wall_pressure=np.sum(weight * (outer**2 - level), axis=1)[:, None],
+        surface_square=square[:, None],
         moment=moment[:, None],
-        moment_per_volume=(np.sum(weight * radius * np.sin(alpha), axis=1) / np.sum(weight * alpha, axis=1))[
-            :, None
-        ],
+        moment_per_volume=centroid[:, None],
         closed=np.all(level < outer**2, axis=1)[:, None],
     )
 
 
-def _across(disc: Disc, length: float, fills: FloatArray, turn: int, cut: bool) -> _Turned:
-    abscissa, weights = _rule(_OPEN_POINTS if cut else POINTS)
-    outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills)
+def _across(disc: Disc, length: float, fills: FloatArray, turn: int) -> _Turned:
+    abscissa, weights = _rule(POINTS)
+    outer, start = disc.outer_radius, surface_radius(disc=disc, fill_ratio=fills)[:, None]
     psi = (2 * np.pi * np.arange(turn) / turn)[None, :, None]
     eta, weight = abscissa[None, None, :], weights[None, None, :] / 2
-    target = liquid_area(disc=disc, surface_radius=start)[:, None]
-    radius = np.broadcast_to(start[:, None, None], (fills.size, turn, weights.size)).copy()
+    target = liquid_area(disc=disc, surface_radius=start)
+    radius = np.broadcast_to(start[..., None], (fills.size, turn, weights.size)).copy()
     # b^2, started from the first order in g/omega^2.
-    alpha = half_angle(disc=disc, radius=start)[:, None]
-    first = (start[:, None] + length * np.sin(alpha) / alpha * np.cos(psi[..., 0])) ** 2
+    alpha = half_angle(disc=disc, radius=start)
+    square = (start + length * np.sin(alpha) / alpha * np.cos(psi[..., 0])) ** 2
     reach = length**2 + 2 * outer * length + outer**2 * 1e-12
-    middle = np.broadcast_to(start[:, None] ** 2, first.shape)
-    search = _Search(value=first, low=middle - reach, high=middle + reach, bounded=cut)
-    for step in range(_STEPS[cut]):
+    for _ in range(_STEPS):
         for _ in range(3):
             level, slope = _level(disc, length, radius, eta, psi)
-            radius = _held(disc, radius - (level - search.value[..., None]) / slope)
-        opening = np.where(radius < outer, 2 * half_angle(disc=disc, radius=radius) * radius / slope, 0.0)
+            radius = _held(disc, radius - (level - square[..., None]) / slope)
+        opening = np.sum(weight * 2 * half_angle(disc=disc, radius=radius) * radius / slope, axis=2)
         excess = np.sum(weight * liquid_area(disc=disc, surface_radius=radius), axis=2) - target
-        if search.reached(excess, outer):
+        if np.all(np.abs(excess) <= _ROUND_OFF * outer**2):
             break
-        search = search.narrowed(excess, np.sum(weight * opening, axis=2), step)
+        square = np.clip(square + excess / opening, start**2 - reach, start**2 + reach)
     _, slope = _level(disc, length, radius, eta, psi)
     half = half_angle(disc=disc, radius=radius)
-    share = np.where(radius < outer, weight * half * radius / slope, 0.0)
+    share = weight * half * radius / slope
     wall = outer**2 + 2 * outer * length * np.cos(eta * half_angle(disc=disc, radius=outer) - psi) + length**2
-    depth = wall - search.value[..., None]
+    depth = wall - square[..., None]
     return _Turned(
-        wall_pressure=np.sum(weight * np.maximum(depth, 0.0), axis=2),
-        surface_square=search.value - length**2,
+        wall_pressure=np.sum(weight * depth, axis=2),
+        surface_square=square - length**2,
         moment=np.sum(weight * _moment_on_rays(disc, radius, eta), axis=2),
-        moment_per_volume=_mean(radius * np.cos(eta * half), share),
+        moment_per_volume=np.sum(share * radius * np.cos(eta * half), axis=2) / np.sum(share, axis=2),
         closed=np.all(depth > 0, axis=2),
     )
-
-
-def _mean(values: FloatArray, share: FloatArray) -> FloatArray:
-    """Weighted by shares of the surface; 0 where none of it is wet."""
-    wet = np.sum(share, axis=2)
-    return np.asarray(np.divide(np.sum(share * values, axis=2), wet, out=np.zeros_like(wet), where=wet > 0))
 
 
 def _level(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -25,7 +26,6 @@ from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.reduced_model.tables import HermiteTable
 from ringbalance.reduced_model.tube.heads import entrance_fraction
 from ringbalance.reduced_model.tube.path import crest_span
-from ringbalance.reduced_model.tube.regime import TubePath
 from ringbalance.scene.arrays import FloatArray, plain
 from ringbalance.scene.models import Scene, Tube
 
@@ -193,84 +193,9 @@ class Lift:
         return cls(straight=plain(straight), entrance=plain(entrance))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Column:
-    """What `column` takes its forces from: a law's own tables."""
-
-    density: float
-    """rho, kg/m^3."""
-    length: float
-    """L, m."""
-    crest_ends: tuple[float, float]
-    """Fraction of the path to the end of the crest's arc, for flow out of chamber 0 and out of chamber 1."""
-    tables: tuple[HermiteTable, ...]
-    """P(x), Pa, over the fill; ln((k + 1) u^2/2) over ln u; with a crest ln((alpha + k_up) u^2/2) for flow
-    out of chamber 0 and out of chamber 1."""
-    path: TubePath | None
-    """None under a law without a path of its own: no crest, and the port always covered."""
-    one_way: bool
-    """Whether liquid leaves only a chamber that has gas, as in the paper's Eq. 19, or a level that passes the
-    crest."""
-    gas_off: float
-    """Gauge, Pa, at or below which a chamber counts as without gas under a one-way law."""
-    return_pressure: float = math.inf
-    """Of a one-way law: hydrostatic pressure of a vented chamber above which liquid leaves it, Pa."""
-    gas_factor: float = 1.0
-    """Gas pressure on the liquid over the one at the place of measurement."""
-    velocities: FlowLaw | None = None
-    """A law that gives velocities and no forces, in place of all these."""
-
-    @classmethod
-    def of(cls, *, law: FlowLaw, tube: Tube, gas_off: float = 0.0) -> Column:
-        """The column that a flow law describes."""
-        if isinstance(law, CalibratedLaw):
-            return _calibrated(law, tube, gas_off)
-        if isinstance(law, PaperLaw):
-            return _paper(law, tube, gas_off)
-        return cls(
-            density=1.0,
-            length=tube.length,
-            crest_ends=(1.0, 1.0),
-            tables=(),
-            path=None,
-            one_way=False,
-            gas_off=gas_off,
-            velocities=law,
-        )
-
-
 def gives_forces(law: FlowLaw) -> bool:
     """Whether a law knows the forces on the column, which terms beyond its velocity need."""
     return isinstance(law, CalibratedLaw | PaperLaw)
-
-
-def _calibrated(law: CalibratedLaw, tube: Tube, gas_off: float) -> Column:
-    ahead, back = law.heads.hump_head, law.heads.return_hump_head
-    to_crest = (ahead, back) if ahead and back else ()
-    return Column(
-        density=law.density,
-        length=tube.length,
-        crest_ends=(crest_span(tube)[1], 1 - crest_span(tube)[0]),
-        tables=(law.hydrostatic_pressure, law.heads.head, *to_crest),
-        path=law.path,
-        one_way=False,
-        gas_off=gas_off,
-        gas_factor=law.gas_factor,
-    )
-
-
-def _paper(law: PaperLaw, tube: Tube, gas_off: float) -> Column:
-    loss = np.log((law.drag_coefficient + 1) / 2)
-    return Column(
-        density=law.density,
-        length=tube.length,
-        crest_ends=(1.0, 1.0),
-        tables=(_straight(0.0, law.pressure_per_fill_difference), _straight(float(loss), 2.0)),
-        path=None,
-        one_way=True,
-        gas_off=gas_off,
-        return_pressure=math.inf if law.return_pressure is None else law.return_pressure,
-    )
 
 
 def _straight(value: float, slope: float) -> HermiteTable:
@@ -296,7 +221,8 @@ _FIRST_STEP: Final = 1e-4
 class Dynamics:
     """What moves the liquid of a pair: its flow law, and the terms that the law does not know."""
 
-    column: Column
+    law: FlowLaw
+    tube: Tube
     inertia: bool
     """Whether the liquid in the tube has mass."""
     line: GasLine | None
@@ -319,6 +245,8 @@ class Dynamics:
     """Fill of a driven chamber that no command goes below."""
     lift: Lift | None = None
     """None: liquid passes the crest as soon as the gas can hold it there."""
+    gas_off: float = 0.0
+    """Gauge, Pa, at or below which a chamber counts as without gas under a one-way law."""
     relative_error: float = RELATIVE_ERROR
     """Of each state, allowed to one step."""
 
@@ -335,9 +263,10 @@ class Dynamics:
         residual: float = 0.0,
     ) -> Dynamics:
         """By the flow law alone, or with terms beyond it; `lifts`: a dry tube fills up to its crest."""
-        gas_off = 0.0 if line is None else VENTED * scene.gas.ambient_pressure
         return cls(
-            column=Column.of(law=model.flow, tube=scene.tube, gas_off=gas_off),
+            law=model.flow,
+            tube=scene.tube,
+            gas_off=0.0 if line is None else VENTED * scene.gas.ambient_pressure,
             inertia=inertia,
             line=line,
             valve_lag=valve_lag,
@@ -377,8 +306,8 @@ class Dynamics:
         return self._plants[total]
 
 
-_OF_COLUMN: Final = ("density", "length", "gas_off", "gas_factor", "one_way")
 _OF_PATH: Final = (
+    "density",
     "port_pressure",
     "column_pressure",
     "vapour_pressure",
@@ -388,6 +317,7 @@ _OF_PATH: Final = (
     "crest",
 )
 _OF_DYNAMICS: Final = (
+    "gas_off",
     "inertia",
     "valve_lag",
     "gas_pressure",
@@ -401,23 +331,52 @@ _OF_DYNAMICS: Final = (
 
 
 def _fill(plant: npt.NDArray[np.void], dynamics: Dynamics, total: float, relative_error: float) -> None:
-    column = dynamics.column
-    for source, names in ((column, _OF_COLUMN), (column.path, _OF_PATH), (dynamics, _OF_DYNAMICS)):
-        for name in names if source is not None else ():
-            plant[name] = getattr(source, name)
-    if not plant["crest"]:
-        plant["column_pressure"] = column.return_pressure
-    plant["hold_up"] = dynamics.tube_area * column.length / dynamics.chamber_volume
+    for name in _OF_DYNAMICS:
+        plant[name] = getattr(dynamics, name)
+    plant["total"], plant["relative_error"], plant["most_steps"] = total, relative_error, MOST_STEPS
+    plant["first_step"] = _FIRST_STEP * (relative_error / RELATIVE_ERROR) ** 0.25
+    law, length = dynamics.law, dynamics.tube.length
+    plant["length"], plant["hold_up"] = length, dynamics.tube_area * length / dynamics.chamber_volume
+    # Without a path of the law's own: no crest, and the port always covered.
+    plant["density"], plant["gas_factor"], plant["column_pressure"] = 1.0, 1.0, math.inf
+    plant["crest_end"], plant["return_crest_end"] = 1.0, 1.0
+    _fill_line(plant, dynamics.line)
+    if isinstance(law, CalibratedLaw):
+        _fill_calibrated(plant, law, dynamics.tube)
+    elif isinstance(law, PaperLaw):
+        _fill_paper(plant, law)
+    else:
+        _fill_velocities(plant, law)
     if dynamics.lift is not None and plant["crest"]:
         plant["lifts"] = True
         plant["lift_straight"], plant["lift_entrance"] = dynamics.lift.straight, dynamics.lift.entrance
-    plant["crest_end"], plant["return_crest_end"] = column.crest_ends
-    plant["total"], plant["relative_error"], plant["most_steps"] = total, relative_error, MOST_STEPS
-    plant["first_step"] = _FIRST_STEP * (relative_error / RELATIVE_ERROR) ** 0.25
-    _fill_line(plant, dynamics.line)
-    if column.velocities is not None:
-        _fill_velocities(plant, column.velocities)
-    for which, table in enumerate(column.tables):
+
+
+def _fill_calibrated(plant: npt.NDArray[np.void], law: CalibratedLaw, tube: Tube) -> None:
+    for name in _OF_PATH:
+        plant[name] = getattr(law.path, name)
+    if not law.path.crest:
+        plant["column_pressure"] = math.inf
+    plant["gas_factor"] = law.gas_factor
+    start, end = crest_span(tube)
+    plant["crest_end"], plant["return_crest_end"] = end, 1 - start
+    ahead, back = law.heads.hump_head, law.heads.return_hump_head
+    to_crest = (ahead, back) if ahead and back else ()
+    _fill_tables(plant, (law.hydrostatic_pressure, law.heads.head, *to_crest))
+
+
+def _fill_paper(plant: npt.NDArray[np.void], law: PaperLaw) -> None:
+    """Liquid leaves only a chamber that has gas, or a level that passes the crest."""
+    plant["density"], plant["one_way"] = law.density, True
+    if law.return_pressure is not None:
+        plant["column_pressure"] = law.return_pressure
+    loss = math.log((law.drag_coefficient + 1) / 2)
+    _fill_tables(plant, (_straight(0.0, law.pressure_per_fill_difference), _straight(loss, 2.0)))
+
+
+def _fill_tables(plant: npt.NDArray[np.void], tables: Sequence[HermiteTable]) -> None:
+    """P(x) and the heads, in the order of their numbers."""
+    for which, table in enumerate(tables):
         pieces = table.coefficients.T
         if len(pieces) > PIECES:
             raise ValueError(f"a table of the law has {len(pieces)} pieces, at most {PIECES} can be compiled")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from itertools import count
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -22,20 +24,21 @@ from ringbalance.reports.figure import (
 )
 from ringbalance.reports.prose import equation_svg, input_name, typeset
 from ringbalance.reports.section import Record
-from ringbalance.reports.traced import traced
+from ringbalance.reports.traced import marked, printed
 from ringbalance.results.numbers import (
     MISSING,
-    PLUS_MINUS,
     THIN_SPACE,
     display_unit,
     given,
+    last_place,
     number,
     short,
-    shown,
     with_unit,
 )
 from ringbalance.results.result import Table
 
+Quantity = Mapping[str, Any]
+"""A judged quantity of a case, whose numbers know their place in the evidence."""
 _NOTHING: Final = 1e-3
 """Fraction of a range below which one of its ends is zero."""
 _TOLD: Final = (
@@ -63,7 +66,6 @@ _CURVES: Final[dict[str, Record]] = {
 """Looks of a curve by its style."""
 _SPARE: Final = (*(line(index) for index in (2, 3, 5)), {"color": INK})
 """Looks of further curves of a style that is taken."""
-_RELATIVE_METRICS: Final = ("relative", "validation", "within_uncertainty")
 
 
 TABLES: Final = "tables"
@@ -88,61 +90,28 @@ def anchor(case: Record) -> str:
     return f"case-{str(case['id']).replace('_', '-')}"
 
 
-def _criterion(quantity: Record) -> str:
-    metric, limit = quantity.get("metric") or "", quantity.get("limit")
-    if limit is None:
-        return MISSING
-    unit = quantity.get("unit") or "1"
-    bound = {"at_most": "at most", "at_least": "at least"}.get(metric)
-    if bound:
-        return f"{bound} {given(limit, unit)}"
-    if metric in _RELATIVE_METRICS:
-        share = f"{short(100 * limit)}{THIN_SPACE}%"
-        return f"within {share}" if metric == "relative" else f"within ±, and ± ≤ {share}"
-    return f"within {given(limit, unit)}"
+def _found(quantity: Quantity) -> str:
+    """What was found, with its uncertainty or, where lopsided, its range; a count without decimals."""
+    unit, value, ends = quantity.get("unit") or "1", quantity.get("value"), _range(quantity)
+    if ends:
+        return printed(value, digits=2, unit=unit, form="given") + f" ({ends})"
+    width = quantity.get("value_uncertainty")
+    return printed(value, quantity.get("uncertainty") if width is None else width, **_form(quantity))
 
 
-def _quantity_row(quantity: Record, path: str) -> Record:
-    """One judged quantity, every number in the unit that suits its size."""
-
-    def marked(key: str, text: str) -> str:
-        return text if text == MISSING else traced(text, f"{path}.{key}")
-
-    unit = quantity.get("unit") or "1"
-    own, ends = quantity.get("value_uncertainty"), _range(quantity)
-    half_width = quantity.get("uncertainty") if own is None else own
-    value = given(quantity.get("value"), unit, digits=2) if ends else _value(quantity, half_width)
-    return {
-        "name": quantity.get("title") or quantity["name"],
-        "why": quantity.get("why") or "",
-        "value": marked("value", value) + (f" ({ends})" if ends else ""),
-        "reference": marked(
-            "reference",
-            shown(quantity.get("reference"), unit, quantity.get("reference_uncertainty"), digits=4),
-        ),
-        "error": marked("error", _error(quantity, unit)),
-        "parts": [
-            shown((quantity.get("validation") or {}).get(part), unit, digits=2)
-            for part in ("u_num", "u_input", "u_D")
-        ],
-        "limit": _criterion(quantity),
-        "verdict": quantity.get("verdict") or "not run",
-    }
+def _form(quantity: Quantity) -> Record:
+    """How a quantity's value is written."""
+    value, count = quantity.get("value"), quantity.get("basis") == "count"
+    if value is None or not count:
+        return {"unit": quantity.get("unit") or "1"}
+    return {"unit": "1", "form": "given", "digits": 6 if float(value).is_integer() else 3}
 
 
-def _error(quantity: Record, unit: str) -> str:
+def _error(quantity: Quantity) -> str:
     """To the second digit of its half-width, or to two digits of its own where those are fewer."""
     error, width = quantity.get("error"), quantity.get("uncertainty")
     fine = error and width and (width < _FINE * abs(error) or _range(quantity))
-    return shown(error, unit, None if fine else width, digits=2)
-
-
-def _value(quantity: Record, half_width: float | None) -> str:
-    """What was found; a count has no digits behind the point."""
-    unit, value = quantity.get("unit") or "1", quantity.get("value")
-    if value is None or quantity.get("basis") != "count":
-        return shown(value, unit, half_width)
-    return short(value, digits=6 if float(value).is_integer() else 3)
+    return printed(error, None if fine else width, digits=2, unit=quantity.get("unit") or "1")
 
 
 def _sequence_label(sequence: Record) -> str:
@@ -176,78 +145,44 @@ def _column(name: str, values: list[Any], unit: str) -> tuple[str, list[str]]:
     return f"{name} in {display.symbol}" if display.symbol else name, texts
 
 
-def _deciding_quantity(case: Record) -> Record | None:
-    """The judged quantity that a case's verdict rests on: the first that has the case's own verdict.
-
-    Returns: The quantity; None when there is none.
-    """
-    quantities = case.get("quantities") or []
-    own = [quantity for quantity in quantities if quantity.get("verdict") == case["verdict"]]
+def deciding(quantities: Sequence[Quantity], verdict: str) -> Quantity | None:
+    """The judged quantity that a case's verdict rests on: the first that has the case's own verdict."""
+    own = [quantity for quantity in quantities if quantity.get("verdict") == verdict]
     return next(iter([*own, *quantities]), None)
 
 
-def _in_brief(case: Record) -> Record:
-    """The deciding quantity in one line: what the paper has, what was found, the comparison's half-width."""
-    quantity, path = _deciding_quantity(case), f"verification.{case['id']}.quantities"
-    if quantity is None:
-        empty = dict.fromkeys(("what", "against", "corrected"), "")
-        return dict.fromkeys(("paper", "found", "half_width"), MISSING) | empty
-    unit, reference = quantity.get("unit") or "1", quantity.get("reference")
-    path = f"{path}.{case['quantities'].index(quantity)}"
-    value_text, corrected = _brief_value(quantity), quantity.get("corrected")
-    paper = MISSING if reference is None else traced(given(reference, unit, digits=4), f"{path}.reference")
-    if reference is None and quantity.get("value") is not None:
-        paper = _criterion(quantity)
-    departs = quantity.get("verdict") == "confirmed with correction" and corrected is not None
-    return {
-        "paper": paper,
-        "against": _unprinted(case, quantity),
-        "corrected": traced(shown(corrected, unit), f"{path}.corrected") if departs else "",
-        "found": value_text if quantity.get("value") is None else traced(value_text, f"{path}.value"),
-        "half_width": _traced_width(quantity, path),
-        "what": quantity.get("title") or "",
-    }
-
-
-def _unprinted(case: Record, quantity: Record) -> str:
-    """What a claim is compared with where the paper does not print it; empty where it does."""
-    kind = (case.get("reference") or {}).get("kind")
-    if quantity.get("against") or kind == "printed number":
-        return str(quantity.get("against") or "")
-    bound = quantity.get("metric") in {"at_most", "at_least"}
-    return "criterion" if bound else {"printed formula": "by its formula"}.get(kind or "", kind or "")
-
-
-def _brief_value(quantity: Record) -> str:
+def _in_brief(quantity: Quantity) -> str:
     """A found number with the digits that the comparison leaves standing, at least two."""
-    value = quantity.get("value")
+    value, unit = quantity.get("value"), quantity.get("unit") or "1"
     width = max(quantity.get("value_uncertainty") or 0.0, quantity.get("uncertainty") or 0.0)
     if value and width > abs(value) / 2:
-        return given(value, quantity.get("unit") or "1", digits=2)
-    if value and 0 < width < _last_place(value) / 2:
-        return shown(value, quantity.get("unit") or "1", digits=_DIGITS)
-    return _without_half_width(_value(quantity, width or None))
+        return printed(value, unit=unit, digits=2, form="given")
+    if value and 0 < width < _last_digit(value) / 2:
+        return printed(value, unit=unit, digits=_DIGITS)
+    if not value or not width or quantity.get("basis") == "count":
+        return printed(value, **_form(quantity))
+    display = display_unit(unit, value, width)
+    shown_value, shown_width = value * display.factor, width * display.factor
+    digits = math.floor(math.log10(abs(shown_value))) - last_place(shown_width) + 1
+    text = number(shown_value, digits=digits)
+    return marked(with_unit(text, display.symbol), value)
 
 
-def _traced_width(quantity: Record, path: str) -> str:
-    text = _width(quantity)
-    plain = text == MISSING or text.startswith("<") or " to " in text
-    return text if plain else traced(text, f"{path}.uncertainty")
-
-
-def _width(quantity: Record) -> str:
+def _width(quantity: Quantity) -> str:
     """Half-width of the comparison; a range where assumed inputs move the number further one way than the
     other."""
     value, half_width = quantity.get("value"), quantity.get("uncertainty")
-    if value and half_width and half_width < (place := _last_place(value)) / 2:
+    if value and half_width and half_width < (place := _last_digit(value)) / 2:
         return f"<{THIN_SPACE}{given(place, quantity.get('unit') or '1', digits=1)}"
+    if ends := _range(quantity):
+        return ends
+    if not half_width:
+        return MISSING
     display = display_unit(quantity.get("unit") or "1", value)
-    return _range(quantity) or with_unit(
-        number(None if not half_width else half_width * display.factor, digits=2), display.symbol
-    )
+    return marked(with_unit(number(half_width * display.factor, digits=2), display.symbol), half_width)
 
 
-def _range(quantity: Record) -> str:
+def _range(quantity: Quantity) -> str:
     """Both ends of a number's interval in its unit; empty where it is about as wide on both sides."""
     value, low, high = (quantity.get(key) for key in ("value", "value_low", "value_high"))
     if value is None or low is None or high is None:
@@ -262,18 +197,9 @@ def _range(quantity: Record) -> str:
     return with_unit(" to ".join(number(end, digits=2) for end in ends), display.symbol)
 
 
-def _last_place(value: float) -> float:
+def _last_digit(value: float) -> float:
     """One unit of the last of the digits that a number in brief has."""
     return float(10.0 ** (math.floor(math.log10(abs(value))) - _DIGITS + 1))
-
-
-def _without_half_width(text: str) -> str:
-    """A value's text with the digits that its own half-width leaves standing, but without that half-width."""
-    value, sign, rest = text.partition(PLUS_MINUS)
-    if not sign:
-        return text
-    unit = rest.partition(")")[2] if text.startswith("(") else ""
-    return f"{value.removeprefix('(')}{unit}"
 
 
 def _rests_on(case: Record) -> list[str]:
@@ -360,17 +286,12 @@ def case_view(case: Record) -> Record:
         "verdict": case["verdict"],
         "claim": case.get("claim") or "",
         "why_not_run": case.get("status") or "" if case["verdict"] == "not run" else "",
-        "brief": _in_brief(case),
         "consequence": case.get("consequence") or "",
         "cause": case.get("cause") or "",
         "rests_on": _rests_on(case),
         "told": {key: case.get(key) for key in _TOLD},
         "mutations": {each["id"]: each for each in case.get("mutations") or []},
         "equations": _equations(case),
-        "rows": [
-            _quantity_row(quantity, f"verification.{case['id']}.quantities.{place}")
-            for place, quantity in enumerate(case.get("quantities") or [])
-        ],
         "order_plot": _order_plot(case, falling),
         # An error that changes its sign from mesh to mesh, or is rounding, falls at no order.
         "orders": [max(s["observed_order"][-1], 0.0) for s in falling if s["observed_order"]],
@@ -382,3 +303,9 @@ def case_view(case: Record) -> Record:
             (table["name"], f"{TABLES}/{table_file(case, table)}") for table in tables if is_long(table)
         ],
     }
+
+
+FILTERS: Final[Mapping[str, Callable[[Quantity], str]]] = MappingProxyType(
+    {"found": _found, "error": _error, "brief": _in_brief, "half_width": _width}
+)
+"""Filters of the templates, for a judged quantity."""

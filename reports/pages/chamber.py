@@ -105,7 +105,7 @@ def _moment(_own: Record, evidence: Record) -> Record:
 
 def _collect(work: Work) -> Record | None:
     """Frequencies and swings over the fills, as plain numbers."""
-    scene = work.scene
+    scene = work.ring
     if scene.environment.shaft == "vertical" or scene.environment.gravity == 0:
         return None
     try:
@@ -145,13 +145,11 @@ def _waves(scene: Scene) -> Record:
         "frequency_uncertainty": FREQUENCY_UNCERTAINTY,
         "largest_wave_over_depth": float(np.max(answer.surface_amplitude_interval[:-1, 1] / depth)),
         "frequency_ratio": ratios.tolist(),
-        "frequency_ratio_uncertainty": modes.frequency_ratio.uncertainty.T.tolist(),
         "amplification": swing.tolist(),
         "amplification_interval": answer.amplification_interval[:-1].tolist(),
         "pressure_amplification": answer.pressure_amplification.value[:-1].tolist(),
         "pressure_amplification_interval": answer.pressure_amplification_interval[:-1].tolist(),
         "surface_amplitude_m": answer.surface_amplitude.value[:-1].tolist(),
-        "largest_surface_amplitude_m": answer.surface_amplitude_interval[:-1, 1].tolist(),
         "depth_m": depth.tolist(),
         "imported": imported,
         "resonant": [{"mode": mode, "fill_ratio": x} for mode, x in met],

@@ -64,8 +64,8 @@ def loop_gain(scene: Scene, model: BalancerModel) -> LoopGain | None:
 
 def _collect(work: Work) -> Record:
     """The paper's law over the devices on which the summary judges the calibrated one."""
-    gains = [loop_gain(work.scene, model) for model in (paper_model(work.scene), work.calibration.model)]
-    paper = judged(balancer_of(work.scene, flow_law="paper"), {})
+    gains = [loop_gain(work.ring, model) for model in (paper_model(work.ring), work.calibration.model)]
+    paper = judged(balancer_of(work.ring, flow_law="paper"), {})
     return {
         "gain": [asdict(each) for each in gains if each is not None],
         "paper": judgement_record(paper),

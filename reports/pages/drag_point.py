@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -122,6 +122,18 @@ class DragPoint:
             flow_state=flow_states(state),
             in_range=np.asarray(~outside),
         )
+
+    def at(self, i: int) -> dict[str, Any]:
+        """One of the points, plain values in SI."""
+        keys = {"velocity": "velocity_m_s", "k_point_uncertainty": "k_uncertainty"}
+        keys |= {name: name for name in ("velocity_uncertainty", "k", "apparent_k", "reynolds")}
+        return {
+            "regime": Regime(int(self.regime[i])).label,
+            "runs": bool(self.runs[i]),
+            "flow_state": str(self.flow_state[i]),
+            "in_range": bool(self.in_range[i]),
+            **{key: float(getattr(self, name)[i]) for name, key in keys.items()},
+        }
 
     def reshaped(self, *shape: int) -> DragPoint:
         """The same with arrays of another shape."""

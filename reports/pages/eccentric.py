@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import PurePath
 from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Rectangle
 
-from ringbalance.controller.balancer import balancer_of
-from ringbalance.controller.compare import compare
 from ringbalance.reports import summary
 from ringbalance.reports.figure import INK, MUTED, Drawing, draw, line, panels
 from ringbalance.reports.mass_figures import (
@@ -25,11 +21,9 @@ from ringbalance.reports.mass_figures import (
     run_up,
 )
 from ringbalance.reports.pages import measured
-from ringbalance.reports.pages.cases import case_view
-from ringbalance.reports.pages.plain import decision_view
+from ringbalance.reports.pages.plain import decision, decision_view
 from ringbalance.reports.pages.standing import CASES, CREDIBILITY, DOCUMENT
-from ringbalance.reports.section import Record, Section, Work
-from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene
+from ringbalance.reports.section import Record, Section
 
 _POLE_ROOM, _NEAR, _WHOLE = 0.75, 0.02, 1.12
 """Half of the poles' magnified picture over their extent, the least extent, and half of the whole picture."""
@@ -40,7 +34,7 @@ def _run(_own: Record, evidence: Record) -> Record:
     varies = max(run["speed_rad_s"]) > min(run["speed_rad_s"])
     ends = np.interp([stage["end_s"] for stage in run["stages"]], run["time_s"], run["amplitude_m"])
     return {
-        "over_speed": run_up(run, locked, evidence["rotor"], evidence["drawn"]) if varies else None,
+        "over_speed": run_up(run, locked, evidence["rotor"], evidence["drawn"]) if varies else [],
         "over_time": over_time(run, locked, evidence["drawn"]),
         "stages": [{"place": place, "amplitude_m": float(end)} for place, end in enumerate(ends)],
     }
@@ -117,12 +111,19 @@ def _sampled_poles(loops: Sequence[Record]) -> Drawing:
 
 
 def _claims(_own: Record, evidence: Record) -> Record:
-    return {"counts": summary.counted(summary.claims(evidence, paper=evidence["balancer"]))}
+    cases = summary.claims(evidence)
+    return {"counts": summary.verdict_counts(cases, summary.CLAIM_VERDICTS)}
 
 
+BALANCER: Final = "eccentric_mass"
 SECTIONS: Final = (
     Section(
-        name="summary", title="Decision", place="report", show=decision_view, template="masses_summary.html"
+        name="summary",
+        title="Decision",
+        place="report",
+        collect=decision,
+        show=decision_view,
+        template="masses_summary.html",
     ),
     Section(name="run", title="Run-up and stages", place="report", show=_run, template="masses_run.html"),
     Section(
@@ -149,43 +150,4 @@ SECTIONS: Final = (
     CASES,
     measured.SECTION,
     Section(name="scene", title="Scene file"),
-)
-
-
-BALANCER: Final = "eccentric_mass"
-RIVAL: Final = "driven_masses_small"
-"""Masses of a size for the liquid-ring paper's rotor."""
-_SPAN: Final = 20.0
-"""s compared at most: either balances the rotor within a few seconds or not at all."""
-
-
-def _shortened(scene: AnyScene) -> AnyScene:
-    return replace(scene, run=replace(scene.run, time_limit=min(scene.run.time_limit, _SPAN)))
-
-
-def _compared(work: Work) -> Record | None:
-    """Both balancers on the scene's rotor, where all is asked for: no scene of a liquid ring requires it."""
-    if work.level == "light":
-        return None
-    rival = _shortened(load_scene(bundled_scene(RIVAL)))
-    try:
-        ring = balancer_of(_shortened(work.scene))
-        found = compare(ring, balancer_of(rival))
-    except SceneError as error:
-        # Without folders: the evidence is the same wherever the files stand.
-        faults = (replace(fault, file=PurePath(fault.file).name) for fault in error.faults)
-        return {"compared": None, "text": "\n".join(map(str, faults))}
-    return {"compared": found.to_dict(), "text": ""}
-
-
-def _second(_own: Record, evidence: Record) -> Record | None:
-    cases = summary.claims(evidence, paper=BALANCER)
-    if not cases:
-        return None
-    views = [{**case_view(case), "elsewhere": False} for case in cases]
-    return {"claims": views, "counts": summary.counted(cases)}
-
-
-SECOND_BALANCER: Final = Section(
-    name="driven", title="The second balancer", collect=_compared, show=_second, always=True
 )

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
 
 from ringbalance.controller.balancer import balancer_of
 from ringbalance.controller.judging.judge import judged
@@ -11,21 +16,19 @@ from ringbalance.controller.liquid_ring.balancer import LiquidRingBalancer
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reports import summary
-from ringbalance.reports.figure import Drawing
+from ringbalance.reports.figure import FOUND, INK, MUTED, PAPER, THIRD, Drawing, draw, figure_of, panels
 from ringbalance.reports.judged import (
     advice_view,
     choice_records,
     judgement_record,
-    settings_rows,
-    settings_text,
+    settings_lines,
     tuning_record,
 )
-from ringbalance.reports.pages.pressure_figure import pressure_figure
-from ringbalance.reports.prose import key_words, named_with_origin, resting
+from ringbalance.reports.prose import resting
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.reports.traced import read, states_uncertainty, traced
-from ringbalance.results.numbers import given, percent
+from ringbalance.results.requirements import MET, OPEN
 from ringbalance.scene import Scene, SceneError, bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.draws import BLOCK
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.runner import paper_scene
@@ -73,12 +76,12 @@ _RUN: Final = (
 )
 _ROTOR: Final = ("rotor.influence_coefficient", "rotor.lag_angle", "rotor.initial_amplitude")
 _DOMINANT: Final = 3
-_SHARES: Final = {True: "{}: {}, merely not known", False: "{}: {}, varies between devices"}
-"""An input and its share, by whether all devices have it in common."""
+_SHADES: Final = {MET: 0.28, OPEN: 0.1}
+"""Opacity of the ground by what is known of the fraction there."""
 
 
 def _collect(work: Work) -> Record:
-    scene, balancer = work.scene, LiquidRingBalancer(work.scene)
+    scene, balancer = work.ring, LiquidRingBalancer(work.ring)
     tuning = tuned(balancer, along=True, remedies=None)
     chosen = liquid_ring_scene(tuning.scene)
     return {
@@ -88,7 +91,7 @@ def _collect(work: Work) -> Record:
         "noise_open": not scene.sensor.amplitude_noise
         and scene.origin_of("sensor.amplitude_noise") == "default",
         "choices": choice_records(balancer.on_scene(tuning.recommended_scene)),
-        "settings": list(settings_rows(chosen, SETTINGS)),
+        "settings": settings_lines(chosen, SETTINGS),
         "gas_pressure_Pa": scene.gas.pressure,
         "recommended_pressure_Pa": chosen.gas.pressure,
         "run": _run_record(chosen, work.calibration.model) if tuning.recommended.settings else None,
@@ -107,17 +110,10 @@ def _run_record(scene: Scene, model: BalancerModel) -> Record:
 
 
 def requirement_record(scene: Scene, *, limit: float) -> Record:
-    """What is required of a scene's balancer, SI; None where nothing is stated.
-
-    Args: `limit`: vibration amplitude that every device is asked to come below, m.
-    """
-    wanted, rotor = scene.requirement, scene.rotor
+    """What the limit of a scene's vibration amplitude, m, means for its rotor; SI, None where not known."""
+    rotor = scene.rotor
     left = limit / rotor.influence_coefficient
     return {
-        "settling_time_s": wanted.settling_time,
-        "residual_m": limit,
-        "grade_m_s": wanted.grade,
-        "correction_moment_kg_m": wanted.correction_moment,
         "rotor_mass_kg": rotor.mass,
         "rotor_speed_rad_s": rotor.speed,
         # G = U omega/m (ISO 21940-11:2016).
@@ -140,28 +136,88 @@ def _other_reading(scene: Scene) -> Record | None:
 
 
 def _view(found: Record, evidence: Record) -> Record:
+    origins = evidence["scene"]["origins"]
+    rows = {row["path"]: row["origin"] for row in evidence["scene"]["table"]}
     return {
         "question": _question(evidence),
-        "settings": settings_text(found.get("settings", ())),
         "rests_on": {code: resting(evidence, *paths) for code, paths in _RESTS.items()},
-        "pressure": _pressure(found),
+        "pressure": _pressure_figure(found),
         **advice_view(found),
-        "alerts": [*_dry(evidence), *_chamber(evidence)],
-        "dominant": _dominant(found, evidence),
-        "rests": [*_bore(found, evidence), *_exact(evidence), *_borrowed(evidence)],
+        # Inputs that decide most of what the drawn devices differ in.
+        "dominant": [
+            place for place, each in enumerate(found["ranking"][:_DOMINANT]) if each["index"] > each["noise"]
+        ],
+        "borrowed": [path for path in _ROTOR if "default" in (rows.get(path), origins.get(path))],
     }
 
 
-def _pressure(found: Record) -> Drawing | None:
-    if not found.get("along"):
+def _pressure_figure(found: Record) -> Drawing | None:
+    """Drawn devices at every gas pressure, each with its best settings; None with fewer than three."""
+    levels = (found.get("along") or {"levels": ()})["levels"]
+    if len(levels) < 3:
         return None
-    return pressure_figure(
-        found["along"]["levels"],
-        asked=(found["recommended"] or found["own"])["asked"],
-        needed=found["needed_moment_kg_m"],
-        own=found["gas_pressure_Pa"],
-        recommended=found["recommended_pressure_Pa"],
-    )
+    pressure = 1e-6 * np.array([each["value"] for each in levels])
+    half = (pressure[1:] + pressure[:-1]) / 2
+    ends = np.concatenate([pressure[:1], half, pressure[-1:]])
+    own, recommended = (1e-6 * found[f"{key}_pressure_Pa"] for key in ("gas", "recommended"))
+
+    def paint(axes: Axes) -> None:
+        three = panels(axes, (0.12, 0.64, 0.85, 0.2), (0.12, 0.385, 0.85, 0.17), (0.12, 0.12, 0.85, 0.17))
+        for panel, fill in zip(three, (_shares, _moments, _times), strict=True):
+            for low, high, each in zip(ends[:-1], ends[1:], levels, strict=True):
+                panel.axvspan(low, high, color=THIRD, alpha=_SHADES.get(each["verdict"], 0.0), linewidth=0)
+            panel.axvline(own, color=INK, linewidth=1, linestyle=":", label="the scene’s pressure")
+            if recommended != own:
+                panel.axvline(recommended, color=INK, linewidth=1.4, label="recommended")
+            fill(panel, pressure, levels, found)
+            panel.set(xlim=(pressure[0], pressure[-1]), ylim=(0, None))
+            panel.tick_params(labelbottom=panel is three[-1])
+        three[-1].set_xlabel("gas pressure in MPa, gauge")
+        handles, labels = three[0].get_legend_handles_labels()
+        grounds = [Patch(color=THIRD, alpha=shade, linewidth=0) for shade in _SHADES.values()]
+        place: Record = {"loc": "upper left", "ncols": 2, "borderaxespad": 0.0, "borderpad": 0.1}
+        figure_of(axes).legend([*handles, *grounds], [*labels, *_SHADES], **place)
+
+    return draw("pressure-choice", paint, columns=0, height=3.5)
+
+
+def _shares(panel: Axes, pressure: FloatArray, levels: Sequence[Record], found: Record) -> None:
+    fractions = [each["fraction"] for each in levels]
+    value, low, high = (100 * np.array([each[key] for each in fractions]) for key in ("value", "low", "high"))
+    _banded(panel, pressure, low, value, high, marker="o", markersize=3)
+    _asked(panel, 100 * (found["recommended"] or found["own"])["asked"], "asked")
+    panel.set_title("devices that settle, in %", loc="left", fontsize="medium", pad=3)
+
+
+def _moments(panel: Axes, pressure: FloatArray, levels: Sequence[Record], found: Record) -> None:
+    moments = [list(each["usable_moment_kg_m"].values()) for each in levels]
+    _banded(panel, pressure, *(1e6 * np.array(moments, dtype=np.float64).T))
+    _asked(panel, 1e6 * found["needed_moment_kg_m"], "unbalance")
+    panel.set_title("moment that can be corrected, in g mm", loc="left", fontsize="medium", pad=3)
+
+
+def _times(panel: Axes, pressure: FloatArray, levels: Sequence[Record], _found: Record) -> None:
+    times = {key: [each["settling_time_s"][key] for each in levels] for key in ("p50", "p90")}
+    for (_, values), colour, marker in zip(times.items(), (FOUND, MUTED), "os", strict=True):
+        panel.plot(pressure, np.array(values, dtype=np.float64), color=colour, marker=marker, markersize=3)
+    panel.set_title("time to settle, in s", loc="left", fontsize="medium", pad=3)
+    if not any(time is not None for time in times["p50"]):
+        panel.set_yticks([])
+        panel.text(0.5, 0.5, "half of the devices nowhere settle", ha="center", transform=panel.transAxes)
+
+
+def _banded(
+    panel: Axes, x: FloatArray, low: FloatArray, middle: FloatArray, high: FloatArray, **look: Any
+) -> None:
+    panel.fill_between(x, low, high, color=FOUND, alpha=0.25, linewidth=0)
+    panel.plot(x, middle, color=FOUND, **look)
+
+
+def _asked(panel: Axes, level: float, text: str) -> None:
+    """A dashed level with its name at its right end, below it."""
+    panel.axhline(level, color=PAPER, linestyle="--", linewidth=1)
+    look: Record = {"color": PAPER, "fontsize": "small", "ha": "right", "va": "top"}
+    panel.annotate(text, (1.0, level), (-3, -2), panel.get_yaxis_transform(), "offset points", **look)
 
 
 def _question(evidence: Record) -> Record:
@@ -170,87 +226,6 @@ def _question(evidence: Record) -> Record:
     if not summary.is_papers(evidence) or not cases.keys() >= set(_QUESTION):
         return {}
     return {name: cases[name]["verdict"] for name in _QUESTION}
-
-
-def _dry(evidence: Record) -> list[str]:
-    run = evidence["closed_loop"].get("calibrated") or {"injections": []}
-    warning = (run.get("gas") or {}).get("warning")
-    dry = [i for i in run["injections"] if i.get("event") == "empty"]
-    if not dry and not warning:
-        return []
-    chambers = " and ".join(sorted({item["chamber"] for item in dry}))
-    if warning:
-        return [_sentence(warning)]
-    many = "1 injection runs its" if len(dry) == 1 else f"{len(dry)} injections run their"
-    return [f"{many} chamber dry ({chambers}): gas then passes through the tube into the opposite one."]
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:].rstrip('.')}."
-
-
-def _chamber(evidence: Record) -> list[str]:
-    status = evidence["calibration"].get("status") or {"code": "ok"}
-    return [] if status["code"] == "ok" else [_sentence(status["text"])]
-
-
-def _dominant(found: Record, evidence: Record) -> list[str]:
-    """The inputs that decide most of what the drawn devices differ in."""
-    return [
-        _SHARES[each["common"]].format(
-            _input(evidence, each), traced(percent(each["index"]), f"summary.ranking.{place}.index")
-        )
-        for place, each in enumerate(found.get("ranking", ())[:_DOMINANT])
-        if each["index"] > each["noise"]
-    ]
-
-
-def _input(evidence: Record, ranked: Record) -> str:
-    path = ranked["path"]
-    label: str = named_with_origin(evidence, path) if path else ranked["name"].removeprefix("model: ")
-    return f"{label[0].upper()}{label[1:]}"
-
-
-def _exact(evidence: Record) -> list[str]:
-    """That results hold for exactly the scene's values, where it states no uncertainty."""
-    if states_uncertainty(evidence):
-        return []
-    return [
-        "The scene states no uncertainty of its inputs: devices differ by what is assumed of them and by the "
-        "models alone, and tolerances of the parts are likely to matter more. [uncertainty] in the scene "
-        "file states them."
-    ]
-
-
-def _borrowed(evidence: Record) -> list[str]:
-    """Values of the paper's rotor that stand in for those of the user's."""
-    origins = evidence["scene"].get("origins") or {}
-    rows = {row.get("path"): row.get("origin") for row in evidence["scene"].get("table") or []}
-    names = [key_words(p) for p in _ROTOR if "default" in (rows.get(p), origins.get(p))]
-    if not names:
-        return []
-    return [
-        f"Not in the scene, so those of the paper’s rotor: {', '.join(names)}. Unbalance, gain and settling "
-        "time hold for that rotor only."
-    ]
-
-
-def _bore(found: Record, evidence: Record) -> list[str]:
-    if not found:
-        return []
-    bore, other = given(found["bore_m"], "m"), found["other_reading"]
-    if other is None:
-        exact = f"The bore of {bore}, on which k and every velocity rest, is taken as exact."
-        return [] if found["bore_uncertainty_stated"] else [exact]
-    k = read(evidence, "operating_point.k", "1", digits=2)
-    place = "summary.other_reading"
-    settled = traced(percent(other["fraction"]["value"]), f"{place}.fraction.value")
-    return [
-        f"The paper gives no bore. This scene assumes {bore}, from Fig. 7 under k = 50, and k is then {k}. "
-        f"Under the calibrated law Fig. 7 gives {read(evidence, f'{place}.bore_m', 'm', digits=3)} and k = "
-        f"{read(evidence, f'{place}.k', '1', digits=2)}; there, with the same gain, {settled} of the devices "
-        "settle. Which of the two the paper’s machine had is not known."
-    ]
 
 
 SECTION: Final = Section(

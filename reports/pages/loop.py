@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Sequence
+from itertools import groupby
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Wedge
+from matplotlib.ticker import FuncFormatter, PercentFormatter
 
 from ringbalance.reports.figure import (
-    AMPLITUDE,
     AS_PAPER,
     FOUND,
+    INK,
+    MAP,
     MUTED,
-    REGIME_COLOURS,
+    SURFACE,
     TIME,
-    Curve,
     Drawing,
     amplitudes,
     draw,
+    panels,
+    plain_number,
 )
-from ringbalance.reports.ring_figures import ring_frames, run_with_injections
+from ringbalance.reports.prose import series
 from ringbalance.reports.run_figures import early_time, fill_ratios, residual_polar
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import is_papers
+from ringbalance.results.numbers import shown
 
 _SETTINGS: Final[dict[str, dict[str, Any]]] = {
     "own": {**AS_PAPER, "label": "the scene’s settings"},
@@ -33,16 +40,21 @@ _LAWS: Final[dict[str, dict[str, Any]]] = {
     "calibrated": {"color": FOUND, "label": "the calibrated law"},
     "paper": {**AS_PAPER, "label": "the paper’s law"},
 }
+_REST: Final = 0.6
+"""Fraction of a run up to which its injections are drawn apart from the rest of it."""
+_LETTERED: Final = 14
+"""Most injections that are lettered."""
+_FRAMES: Final = 7
+"""Rings side by side at the most."""
 
 
 def _reach(work: Work) -> Record:
     """What a pair cancels at the most, as a vibration; where the first pair's lies, by the sensor's phase."""
-    scene, moment = work.scene, work.calibration.residual.usable_pair_moment
+    scene, moment = work.ring, work.calibration.residual.usable_pair_moment
     return {
         "pairs": scene.disc.chambers // 2,
         "vibration_m": moment * scene.rotor.influence_coefficient,
         "direction_rad": -scene.rotor.lag_angle,
-        "time_limit_s": scene.run.time_limit,
     }
 
 
@@ -51,8 +63,8 @@ def _loop(own: Record, evidence: Record) -> Record:
     run = runs.get("calibrated")
     disc = (evidence.get("operation") or {}).get("disc")
     return {
-        "amplitude": run_with_injections(runs, _LAWS, limit) if runs else None,
-        "rings": ring_frames(run, disc) if run and disc else None,
+        "amplitude": _amplitude(runs, limit) if runs else None,
+        "rings": _rings(run, disc) if run and disc else None,
         "laws": list(runs),
         "polar": residual_polar(run, own) if run and own else None,
         "settling": _settling(evidence.get("summary") or {}),
@@ -65,6 +77,105 @@ def _drawn_runs(evidence: Record) -> dict[str, Record]:
     return {law: runs[law] for law in _LAWS if law in runs and (law != "paper" or is_papers(evidence))}
 
 
+def injections_until(run: Record) -> float:
+    """End of the last injection, s; of the run where there is none."""
+    ends = [item["time_s"] + item["duration_s"] for item in run["injections"]]
+    return float(max(ends, default=run["time_s"][-1]))
+
+
+def _amplitude(runs: dict[str, Record], limit: float) -> Drawing:
+    """Vibration amplitude over whole runs, with every injection of the first one.
+
+    Where a long rest follows the injections it has an axis of its own.
+    """
+    end = max(float(run["time_s"][-1]) for run in runs.values())
+    early = 1.15 * max(map(injections_until, runs.values()))
+    parts = {(0.0, end): (0.09, 0.15, 0.89, 0.68)}
+    if 0 < early < _REST * end:
+        parts = {(0.0, early): (0.09, 0.15, 0.6, 0.68), (early, end): (0.72, 0.15, 0.26, 0.68)}
+    curves = [(run["time_s"], 1e6 * np.asarray(run["amplitude_m"]), _LAWS[law]) for law, run in runs.items()]
+
+    def paint(axes: Axes) -> None:
+        first, *others = drawn = panels(axes, *parts.values())
+        for panel, span in zip(drawn, parts, strict=True):
+            amplitudes(curves, 1e6 * limit)(panel)
+            panel.set(xlim=span, xlabel="time in s")
+            panel.xaxis.set_major_formatter(FuncFormatter(plain_number))
+        for panel in others:
+            panel.tick_params(labelleft=False)
+        first.set_ylabel("amplitude, zero to peak, in µm")
+        _mark_injections(first, next(iter(runs.values()))["injections"])
+        for look in (*(_LAWS[law] for law in runs), {"color": MUTED, "linestyle": ":", "label": "limit"}):
+            axes.plot([], [], **look)
+
+    return draw("amplitude", paint, columns=3, wide=True, height=3.6)
+
+
+def _mark_injections(panel: Axes, injections: Sequence[Record]) -> None:
+    """A stroke at the top for the time that each keeps its valve open, and the chambers' letters."""
+    along, groups = panel.get_xaxis_transform(), _together(injections)
+    for start, end, letters in groups:
+        panel.plot((start, end), (1.0, 1.0), color=INK, linewidth=3, transform=along, clip_on=False)
+        panel.axvline(start, color=MUTED, linewidth=0.5, alpha=0.6)
+        if len(groups) <= _LETTERED:
+            panel.text(start, 1.02, "".join(letters), ha="center", va="bottom", transform=along)
+
+
+def _together(injections: Sequence[Record]) -> list[tuple[float, float, list[str]]]:
+    """When valves open together, when the last of them closes, s, and their chambers."""
+    groups = [list(items) for _, items in groupby(injections, key=lambda item: item["time_s"])]
+    return [
+        (
+            float(items[0]["time_s"]),
+            max(float(item["time_s"] + item["duration_s"]) for item in items),
+            sorted(item["chamber"] for item in items),
+        )
+        for items in groups
+    ]
+
+
+def frames_of(run: Record) -> list[tuple[str, float]]:
+    """Titles and times, s, of the start, the first injections and the end."""
+    last = float(run["time_s"][-1])
+    after = [
+        (f"{series(letters)}, {shown(start, 's', digits=2)}", min(end, last))
+        for start, end, letters in _together(run["injections"])[: _FRAMES - 2]
+    ]
+    return [("start", 0.0), *after, ("end", last)]
+
+
+def _rings(run: Record, disc: Record) -> Drawing:
+    """The ring at the start, after the first injections and at the end, as the shaft sees it: each chamber
+    with its liquid, drawn as a sector between the radii that its fill takes."""
+    frames = frames_of(run)
+    width = 1 / len(frames)
+
+    def at(time: float, values: Sequence[float]) -> float:
+        return float(np.interp(time, run["time_s"], values))
+
+    def paint(axes: Axes) -> None:
+        boxes = [(place * width + 0.004, 0.0, width - 0.008, 0.76) for place in range(len(frames))]
+        for panel, (title, time) in zip(panels(axes, *boxes), frames, strict=True):
+            _ring(panel, {letter: at(time, fills) for letter, fills in run["fill_ratio"].items()}, disc)
+            left = shown(at(time, run["amplitude_m"]), "m", digits=2)
+            panel.set_title(f"{title}\n{left}", color=INK, fontsize="small")
+
+    return draw("ring-frames", paint, columns=0, wide=True, height=1.15 + 6.6 / max(len(frames), 4) * 0.9)
+
+
+def _ring(panel: Axes, fills: dict[str, float], disc: Record) -> None:
+    outer, inner, half = disc["outer_radius_m"], disc["inner_radius_m"], 180 / disc["chambers"]
+    for place, (letter, fill) in enumerate(fills.items()):
+        ends = ((2 * place - 1) * half, (2 * place + 1) * half)
+        depth = outer - math.sqrt(outer**2 - fill * (outer**2 - inner**2))
+        for thick, colour in ((outer - inner, SURFACE), (depth, MAP[8])):
+            panel.add_patch(Wedge((0, 0), outer, *ends, width=thick, facecolor=colour, edgecolor=INK))
+        at = 0.55 * inner * np.exp(1j * math.radians(2 * half * place))
+        panel.text(at.real, at.imag, letter, ha="center", va="center", color=MUTED, fontsize="small")
+    panel.set(xlim=(-1.05 * outer, 1.05 * outer), ylim=(-1.05 * outer, 1.05 * outer), aspect="equal")
+    panel.set_axis_off()
+
+
 def _settling(found: Record) -> Drawing | None:
     """Fraction of drawn devices that has settled by a time, with its bounds; None where none settles."""
     judged = {name: found[name]["settled"] for name in _SETTINGS if found.get(name)}
@@ -74,19 +185,12 @@ def _settling(found: Record) -> Drawing | None:
     def paint(axes: Axes) -> None:
         for name, each in judged.items():
             look = _SETTINGS[name]
-            time, low, high = each["time_s"], each["low"], each["high"]
-            axes.step(time, 100 * np.asarray(each["value"]), where="post", **look)
-            axes.fill_between(
-                time,
-                100 * np.asarray(low),
-                100 * np.asarray(high),
-                step="post",
-                color=look["color"],
-                alpha=0.2,
-                linewidth=0,
-            )
+            time, value, low, high = (np.array(each[key]) for key in ("time_s", "value", "low", "high"))
+            axes.step(time, value, where="post", **look)
+            axes.fill_between(time, low, high, step="post", color=look["color"], alpha=0.2, linewidth=0)
         asked = (found["recommended"] or found["own"])["asked"]
-        axes.axhline(100 * asked, color=MUTED, linewidth=1, linestyle=":", label="asked")
+        axes.axhline(asked, color=MUTED, linewidth=1, linestyle=":", label="asked")
+        axes.yaxis.set_major_formatter(PercentFormatter(1, symbol=""))
 
     return draw(
         "settling",
@@ -94,7 +198,7 @@ def _settling(found: Record) -> Drawing | None:
         x=TIME,
         y=("settled devices in %", "1"),
         xlim=(0, None),
-        ylim=(0, 105),
+        ylim=(0, 1.05),
         columns=3,
         wide=True,
     )
@@ -106,74 +210,8 @@ LOOP: Final = Section(
 
 
 def _injections(_own: Record, evidence: Record) -> Record:
-    runs = evidence["closed_loop"]
-    if not (run := runs.get("calibrated")):
-        return {"early": None}
-    until = early_time(next(iter(runs.values())))
-    return {
-        "early": _early_amplitude(runs, evidence["limit_m"], until),
-        "fills": fill_ratios(run, until),
-        "regimes": _regimes(run) if run["injections"] else None,
-    }
-
-
-def _early_amplitude(runs: Mapping[str, Record], limit: float, until: float) -> Drawing:
-    """Vibration amplitude within the first operations, m, liquid flowing, under the laws that were run."""
-
-    def of(run: Record, look: dict[str, Any]) -> Curve:
-        early = np.asarray(run["time_s"]) <= until
-        time, values = (np.asarray(run[key])[early] for key in ("time_s", "amplitude_m"))
-        return time, values, {**look, "linewidth": 1.3}
-
-    return draw(
-        "amplitude-early",
-        amplitudes([of(runs[name], look) for name, look in _LAWS.items() if name in runs], limit),
-        x=TIME,
-        y=AMPLITUDE,
-        xlim=(0, until),
-        columns=3,
-    )
-
-
-def _regimes(run: Record) -> Drawing:
-    """The regime of the tube in every gas operation of a run, by chamber and time."""
-    operations, letters = run["injections"], list(run["fill_ratio"])
-    last = max(item["time_s"] + item["duration_s"] for item in operations)
-    least = 0.006 * last
-    named: set[str] = set()
-
-    def bar(axes: Axes, item: Record, regime: str, share: tuple[float, float]) -> None:
-        width = max(item["duration_s"], least)
-        axes.barh(
-            letters.index(item["chamber"]),
-            width * (share[1] - share[0]),
-            left=item["time_s"] + width * share[0],
-            height=0.55,
-            color=REGIME_COLOURS[regime],
-            linewidth=0,
-            label=None if regime in named else regime,
-        )
-        named.add(regime)
-
-    def paint(axes: Axes) -> None:
-        for item in operations:
-            start, end = item["regime"], item.get("regime_end") or item["regime"]
-            parts = [(start, (0.0, 1.0))] if end == start else [(start, (0.0, 0.5)), (end, (0.5, 1.0))]
-            for regime, share in parts:
-                bar(axes, item, regime, share)
-        axes.set_yticks(range(len(letters)), letters)
-
-    return draw(
-        "loop-regimes",
-        paint,
-        x=TIME,
-        y=("gas into chamber", "1"),
-        xlim=(0, 1.02 * (last + least)),
-        ylim=(len(letters) - 0.5, -0.5),
-        columns=4,
-        wide=True,
-        height=1.5 + 0.2 * len(letters),
-    )
+    run = evidence["closed_loop"].get("calibrated")
+    return {"fills": fill_ratios(run, early_time(run)) if run else None}
 
 
 INJECTIONS: Final = Section(

@@ -75,6 +75,8 @@ _MILLIMETRES: Final = 1e3
 _HEIGHT: Final = 4.1
 _REACH: Final = 1.42
 """Half the height of the picture over the outer radius: room for the dimensions."""
+_AXIS: Final = (0, (6, 2, 1, 2))
+"""Dashes of a line through a middle."""
 _TUBE: Final[dict[str, Any]] = {"color": PAPER, "linewidth": 2.0}
 
 
@@ -91,7 +93,7 @@ def _regimes(law: CalibratedLaw, fill: np.typing.ArrayLike, pressure: np.typing.
 
 
 def _collect(work: Work) -> Record:
-    scene, calibration = work.scene, work.calibration
+    scene, calibration = work.ring, work.calibration
     law, point, rest = calibration.flow_law, calibration.operating_point, calibration.residual
     top = _HIGHEST * max(scene.gas.pressure, point.priming_vented or 0.0)
     fill, pressure = np.linspace(0, law.max_fill_ratio, _FILLS), np.linspace(0, top, _PRESSURES)
@@ -116,7 +118,7 @@ def _crest(work: Work, fill: FloatArray) -> Record | None:
     """Range of the siphon crest's radius, assumed or stated, and the gas pressure that lifts the liquid of
     each fill over either end of it; None without a crest, or where it is known.
     """
-    scene, calibration = work.scene, work.calibration
+    scene, calibration = work.ring, work.calibration
     ends = _crest_range(scene)
     if ends is None:
         return None
@@ -141,7 +143,7 @@ def _crest_range(scene: Scene) -> tuple[float, float] | None:
 
 def _disc(work: Work) -> Record:
     """The disc's dimensions and first fill; of an imported chamber its sections too."""
-    disc, tube = work.scene.disc, work.scene.tube
+    disc, tube = work.ring.disc, work.ring.tube
     imported = {} if disc.geometry is None else {"outlines": _outlines(disc.geometry)}
     return imported | {
         "chambers": disc.chambers,
@@ -155,7 +157,7 @@ def _disc(work: Work) -> Record:
         "crest_radius_m": tube.hump_radius,
         "bore_m": tube.bore,
         "length_m": tube.length,
-        "origins": {key: work.scene.origin_of(f"tube.{key}") for key in ("bore", "length", "hump_radius")},
+        "origins": {key: work.ring.origin_of(f"tube.{key}") for key in ("bore", "length", "hump_radius")},
     }
 
 
@@ -199,13 +201,7 @@ def _operating_map(found: Record) -> Drawing:
     def crest(axes: Axes) -> None:
         if found.get("crest"):
             low, high = found["crest"]["lifting_pressure_Pa"]
-            band: dict[str, Any] = {
-                "facecolor": "none",
-                "edgecolor": PAPER,
-                "hatch": "////",
-                "linewidth": 0.8,
-            }
-            axes.fill_between(fill, high, low, label="start of the flow, crest in its range", **band)
+            axes.fill_between(fill, high, low, label="start of the flow, crest in its range", **_HATCHED)
 
     working: dict[str, Any] = {"color": INK, "marker": "|", "linewidth": 2, "markersize": 9}
     return draw(
@@ -262,36 +258,20 @@ def _disc_section(found: Record) -> Drawing:
 
 def _arc(radius: float, start: float, end: float) -> FloatArray:
     angle = np.linspace(start, end, 2 + round(abs(end - start) / _STEP))
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-
-
-def _arrow(panel: Axes, start: Sequence[float], end: Sequence[float], kind: str, **line: Any) -> None:
-    """A line between two places, with the heads of its kind."""
-    shape = {"arrowstyle": kind, "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, **line}
-    panel.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=shape)
-
-
-def _sector(inner: float, outer: float, middle: float, half: float, strip: float) -> FloatArray:
-    """Outline of what lies between two radii of a chamber, its plates' strips taken off."""
-    ends = [half - math.asin(min(strip / radius, 1.0)) for radius in (outer, inner)]
-    return np.vstack(
-        [
-            _arc(outer, middle - ends[0], middle + ends[0]),
-            _arc(inner, middle + ends[1], middle - ends[1]),
-        ]
-    )
+    return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def _closed_lines(found: Record, size: dict[str, float]) -> tuple[list[FloatArray], list[FloatArray]]:
     """Closed lines around the first chamber's space across the shaft, (x, y), and along it, (z, x)."""
-    drawn = found.get("outlines")
-    if drawn is not None:
+    if drawn := found.get("outlines"):
         across, along = (
             [np.array(loop) * _MILLIMETRES for loop in drawn[plane]] for plane in ("across_m", "along_m")
         )
         return across, [loop[:, ::-1] for loop in along]
     inner, outer, half = size["inner_radius"], size["outer_radius"], size["axial_width"] / 2
-    sector = _sector(inner, outer, 0.0, found["central_angle_rad"] / 2, size["plate_thickness"])
+    strip = size["plate_thickness"]
+    low, high = (found["central_angle_rad"] / 2 - math.asin(min(strip / r, 1.0)) for r in (inner, outer))
+    sector = np.vstack([_arc(outer, -high, high), _arc(inner, low, -low)])
     return [sector], [np.array([[-half, inner], [half, inner], [half, outer], [-half, outer]])]
 
 
@@ -308,54 +288,46 @@ def _area(loops: Sequence[FloatArray]) -> Path:
 
 
 def _filled(panel: Axes, area: Path, liquid: Path) -> None:
-    """A chamber's gas, and its liquid where the place is one of `liquid`."""
-    panel.add_patch(PathPatch(area, facecolor=SURFACE, edgecolor=INK, linewidth=0.6))
-    wet = PathPatch(area, facecolor=MAP[7], edgecolor=INK, linewidth=0.6)
-    panel.add_patch(wet)
-    wet.set_clip_path(liquid, panel.transData)
-    panel.add_patch(PathPatch(area, facecolor="none", edgecolor=INK, linewidth=0.6))
-
-
-def _turned(loops: Sequence[FloatArray], angle: float) -> list[FloatArray]:
-    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-    return [loop @ turn for loop in loops]
+    """A chamber's gas, and its liquid with the surface where the place is one of `liquid`."""
+    edge: dict[str, Any] = {"edgecolor": INK, "linewidth": 0.6}
+    panel.add_patch(PathPatch(area, facecolor=SURFACE, **edge))
+    panel.add_patch(PathPatch(area, facecolor=MAP[7], **edge)).set_clip_path(liquid, panel.transData)
+    panel.add_patch(PathPatch(liquid, facecolor="none", **edge)).set_clip_path(area, panel.transData)
+    panel.add_patch(PathPatch(area, facecolor="none", **edge))
 
 
 def _across(panel: Axes, found: Record, size: dict[str, float]) -> None:
     inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
-    strip, half = size["plate_thickness"], found["central_angle_rad"] / 2
+    half, count = found["central_angle_rad"] / 2, found["chambers"]
     panel.add_patch(Circle((0, 0), outer, facecolor=MAP[3], edgecolor=INK, linewidth=1))
     loops, _ = _closed_lines(found, size)
     ring = _area([_arc(1.1 * outer, 0, 2 * math.pi), _arc(surface, 0, 2 * math.pi)])
-    for index in range(found["chambers"]):
-        middle = 2 * math.pi * index / found["chambers"]
-        area = _area(_turned(loops, middle))
-        _filled(panel, area, ring)
-        level = Circle((0, 0), surface, facecolor="none", edgecolor=INK, linewidth=0.6)
-        panel.add_patch(level).set_clip_path(area, panel.transData)
-        place = _letter_radius(size) * np.exp(1j * (middle + 0.62 * half))
-        panel.text(place.real, place.imag, chr(ord("A") + index), ha="center", va="center", weight="bold")
+    for index, middle in enumerate(2 * math.pi * np.arange(count) / count):
+        turn = np.array([[math.cos(middle), math.sin(middle)], [-math.sin(middle), math.cos(middle)]])
+        _filled(panel, _area([loop @ turn for loop in loops]), ring)
+        x, y = _polar(letter_radius(size), middle + 0.62 * half)
+        panel.text(x, y, chr(ord("A") + index), ha="center", va="center", weight="bold")
     panel.plot(0, 0, "+", color=INK, markersize=9)
     _tube(panel, size)
-    _radius(panel, outer, -0.5, f"R₂ {number(outer, digits=4)}", share=1.34)
-    _radius(panel, inner, -2.1, f"R₁ {number(inner, digits=4)}")
-    _radius(panel, surface, -2.62, f"R₁′ {number(surface, digits=4)}")
-    arc = 1.1 * outer
-    low, high = ([arc * math.cos(half), sign * arc * math.sin(half)] for sign in (-1, 1))
-    _arrow(panel, low, high, "<->", connectionstyle=f"arc3,rad={math.tan(half / 2):.3f}")
-    for sign in (-1, 1):
-        edge = np.outer([0, 1.14 * outer], [math.cos(half), sign * math.sin(half)])
-        panel.plot(*edge.T, color=MUTED, linewidth=0.7, linestyle=(0, (6, 2, 1, 2)))
-    panel.text(1.13 * outer, 0.12 * outer, f"θ {number(math.degrees(found['central_angle_rad']), digits=3)}°")
-    if "outlines" in found:
-        return
-    wall = 0.9 * outer * np.exp(1j * (half - strip / outer / 2))
-    _note(
-        panel, f"t {number(strip, digits=3)} each side", (wall.real, wall.imag), (0.72 * outer, 1.25 * outer)
-    )
+    for name, radius, angle in (("R₂", outer, -0.5), ("R₁", inner, -2.1), ("R₁′", surface, -2.62)):
+        _line(panel, (0, 0), _polar(radius, angle), "-|>")
+        _note(panel, f"{name} {number(radius, digits=4)}", _polar(radius, angle), _polar(1.3 * outer, angle))
+    low, high = (_polar(1.1 * outer, angle) for angle in (-half, half))
+    _line(panel, low, high, "<->", connectionstyle=f"arc3,rad={math.tan(half / 2):.3f}")
+    for x, y in (_polar(1.14 * outer, angle) for angle in (-half, half)):
+        panel.plot([0, x], [0, y], color=MUTED, linewidth=0.7, linestyle=_AXIS)
+    panel.text(1.13 * outer, 0.12 * outer, f"θ {number(math.degrees(2 * half), digits=3)}°")
+    if "outlines" not in found:
+        strip = size["plate_thickness"]
+        wall, place = _polar(0.9 * outer, half - strip / outer / 2), (0.72 * outer, 1.25 * outer)
+        _note(panel, f"t {number(strip, digits=3)} each side", wall, place, ha="left")
 
 
-def _letter_radius(size: dict[str, float]) -> float:
+def _polar(radius: float, angle: float) -> tuple[float, float]:
+    return radius * math.cos(angle), radius * math.sin(angle)
+
+
+def letter_radius(size: dict[str, float]) -> float:
     """In the gas, in the wider of the gaps that the tube's way round leaves."""
     inner, surface = size["inner_radius"], size["free_surface_radius"]
     crest = min(max(size.get("crest_radius", inner), inner), surface)
@@ -368,77 +340,54 @@ def _tube(panel: Axes, size: dict[str, float]) -> None:
     if crest is None:
         panel.plot([port, -port], [0, 0], **_TUBE)
         return
-    arc = _arc(crest, 0, math.pi)
-    path = np.vstack([[[port, 0]], arc, [[-port, 0]]])
-    panel.plot(*path.T, **_TUBE)
+    panel.plot(*np.vstack([[[port, 0]], _arc(crest, 0, math.pi), [[-port, 0]]]).T, **_TUBE)
     panel.plot([port, -port], [0, 0], "o", color=PAPER, markersize=5)
-    _note(
-        panel,
-        f"tube, bore {number(size['bore'], digits=3)}, length {number(size['length'], digits=4)}",
-        (float(arc[34, 0]), float(arc[34, 1])),
-        (-1.4 * port, 1.3 * port),
-    )
-    _radius(panel, crest, math.pi / 2 + 0.12, f"rₘ {number(crest, digits=3)}", share=0.75)
-    _note(panel, f"port {number(port, digits=3)}", (-port, 0), (-1.43 * port, -0.28 * port))
+    text = f"tube, bore {number(size['bore'], digits=3)}, length {number(size['length'], digits=4)}"
+    _note(panel, text, _polar(crest, 1.76), (-1.4 * port, 1.3 * port), ha="left")
+    _note(panel, f"port {number(port, digits=3)}", (-port, 0), (-1.43 * port, -0.28 * port), ha="left")
+    top = _polar(crest, math.pi / 2 + 0.12)
+    _line(panel, (0, 0), top, "-|>")
+    panel.text(0.75 * top[0] + 0.05 * port, 0.75 * top[1], f"rₘ {number(crest, digits=3)}", va="center")
 
 
-def _radius(panel: Axes, radius: float, angle: float, text: str, *, share: float = 1.22) -> None:
-    """An arrow from the shaft to a radius; its label beyond the rim, or on the way."""
-    tip = [radius * math.cos(angle), radius * math.sin(angle)]
-    _arrow(panel, (0, 0), tip, "-|>")
-    rim = panel.get_ylim()[1] / _REACH
-    place = (share * rim if share > 1 else share * radius) * np.array([math.cos(angle), math.sin(angle)])
-    if share < 1:
-        place[0] += 0.05 * rim
-    else:
-        panel.plot(*np.array([tip, 0.95 * place]).T, color=MUTED, linewidth=0.7)
-    panel.text(place[0], place[1], text, ha="center" if share > 1 else "left", va="center", color=INK)
+def _line(panel: Axes, start: Sequence[float], end: Sequence[float], kind: str, **line: Any) -> None:
+    """A line between two places, with the heads of its kind."""
+    shape = {"arrowstyle": kind, "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, **line}
+    panel.annotate("", (end[0], end[1]), (start[0], start[1]), arrowprops=shape)
 
 
-def _note(panel: Axes, text: str, at: tuple[float, float], place: tuple[float, float]) -> None:
-    panel.annotate(
-        text,
-        at,
-        place,
-        color=INK,
-        va="center",
-        arrowprops={"arrowstyle": "-", "color": MUTED, "linewidth": 0.7},
-    )
+def _note(
+    panel: Axes, text: str, at: tuple[float, float], place: tuple[float, float], ha: str = "center"
+) -> None:
+    """A text, and a thin line from it to a place."""
+    thin = {"arrowstyle": "-", "color": MUTED, "linewidth": 0.7}
+    panel.annotate(text, at, place, color=INK, ha=ha, va="center", arrowprops=thin)
 
 
 def _along(panel: Axes, found: Record, size: dict[str, float]) -> None:
     inner, outer, surface = size["inner_radius"], size["outer_radius"], size["free_surface_radius"]
-    half = size["axial_width"] / 2
-    wall = 0.06 * outer
+    half, port, crest = size["axial_width"] / 2, 0.985 * size["port_radius"], size.get("crest_radius", 0.0)
+    wall = half + 0.06 * outer
     _, loops = _closed_lines(found, size)
-    reach = 1.1 * np.array([half, outer])
     for sign in (-1, 1):
-        level = sign * surface
-        liquid = np.array([[-1, level], [1, level], [1, sign * reach[1]], [-1, sign * reach[1]]])
-        liquid[:, 0] *= reach[0]
-        _filled(panel, _area([loop * [1, sign] for loop in loops]), Path(liquid))
-        panel.plot([-half, half], [level, level], color=INK, linewidth=0.6)
-        panel.plot([half, half + wall], [sign * size["port_radius"] * 0.985] * 2, **_TUBE)
-    crest = size.get("crest_radius", 0.0)
-    panel.plot([half + wall] * 3, [0.985 * size["port_radius"], crest, -0.985 * size["port_radius"]], **_TUBE)
-    panel.plot([-1.35 * half, 1.5 * half], [0, 0], color=MUTED, linewidth=0.8, linestyle=(0, (8, 2, 1, 2)))
-    _span(panel, (-half, half), -1.14 * outer, f"B {number(2 * half, digits=4)}")
+        corners = 1.1 * half * np.array([[-1, 0], [1, 0], [1, 0], [-1, 0]])
+        heights = sign * np.array([surface, surface, 1.1 * outer, 1.1 * outer])
+        liquid = Path(np.vstack([corners + np.outer(heights, (0, 1)), corners[:1]]), closed=True)
+        _filled(panel, _area([loop * (1, sign) for loop in loops]), liquid)
+    panel.plot([half, wall, wall, wall, half], [port, port, crest, -port, -port], **_TUBE)
+    panel.plot([-1.35 * half, 1.5 * half], [0, 0], color=MUTED, linewidth=0.8, linestyle=_AXIS)
+    level = -1.14 * outer
+    _line(panel, (-half, level), (half, level), "<->")
+    panel.plot([[-half, half]] * 2, [[0.9 * level] * 2, [1.04 * level] * 2], color=MUTED, linewidth=0.7)
+    panel.text(0, 1.03 * level, f"B {number(2 * half, digits=4)}", ha="center", va="top")
+    gas = 0.5 * (inner + surface)
+    _line(panel, (-half - 0.35 * outer, gas), (-half, gas), "-|>", color=THIRD, linewidth=1.4)
     panel.text(-half - 0.1 * outer, 0.62 * (inner + outer), "valve side:\ngas line", ha="right", va="center")
-    level = 0.5 * (inner + surface)
-    _arrow(panel, (-half - 0.35 * outer, level), (-half, level), "-|>", color=THIRD, linewidth=1.4)
-    panel.text(half + 2 * wall, 0.72 * outer, "tube", color=PAPER, va="center")
+    panel.text(wall + 0.06 * outer, 0.72 * outer, "tube", color=PAPER, va="center")
     panel.text(0, (surface + outer) / 2, "liquid", ha="center", va="center")
     # Beside the middle, where a gas tube may stand.
-    panel.text(-half / 2, (surface + inner) / 2, "gas", ha="center", va="center")
+    panel.text(-half / 2, gas, "gas", ha="center", va="center")
     panel.text(1.5 * half, 0.04 * outer, "shaft", ha="right", va="bottom", color=MUTED)
-
-
-def _span(panel: Axes, ends: tuple[float, float], level: float, text: str) -> None:
-    """A dimension line with its value below."""
-    _arrow(panel, (ends[0], level), (ends[1], level), "<->")
-    for end in ends:
-        panel.plot([end, end], [level * 0.9, level * 1.04], color=MUTED, linewidth=0.7)
-    panel.text(sum(ends) / 2, level * 1.03, text, ha="center", va="top")
 
 
 SECTION: Final = Section(

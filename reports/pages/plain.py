@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from typing import Final
 
-from ringbalance.controller.balancer import Balancer
-from ringbalance.reports.judged import advice_view, own_record, settings_rows, settings_text
+from ringbalance.controller.balancer import Balancer, balancer_of
+from ringbalance.reports.judged import advice_view, own_record, settings_lines
 from ringbalance.reports.pages.standing import DOCUMENT
 from ringbalance.reports.run_figures import run_amplitude
-from ringbalance.reports.section import Record, Section
+from ringbalance.reports.section import Record, Section, Work
 from ringbalance.scene.faults import SceneError
 
 _DRAWN: Final = {"time_s", "amplitude_m", "limit_m"}
@@ -18,15 +18,15 @@ _FEWEST, _MOST = 16, 64
 """Devices that are drawn of a balancer whose runs take long."""
 
 
-def decision(balancer: Balancer) -> Record:
+def decision(work: Work) -> Record:
     """What the first page of any balancer rests on."""
-    scene = balancer.scene
+    balancer = balancer_of(work.scene)
     paths = (each.path for each in balancer.settings() if "[" not in each.path)
     return {
         "limit_m": _limit(balancer),
         **own_record(balancer, first=_FEWEST, most=_MOST),
         "recommended": None,
-        "settings": list(settings_rows(scene, paths)),
+        "settings": settings_lines(work.scene, paths),
     }
 
 
@@ -40,7 +40,6 @@ def _limit(balancer: Balancer) -> float | None:
 def decision_view(found: Record, evidence: Record) -> Record:
     """What the first page of any balancer shows of it."""
     return {
-        "settings": settings_text(found["settings"]),
         **advice_view(found),
         "origins": Counter(row["origin"] for row in evidence["scene"]["table"]).most_common(),
     }
@@ -55,7 +54,14 @@ def _summary(found: Record, evidence: Record) -> Record:
 
 
 SECTIONS: Final = (
-    Section(name="summary", title="Decision", place="report", show=_summary, template="plain_summary.html"),
+    Section(
+        name="summary",
+        title="Decision",
+        place="report",
+        collect=decision,
+        show=_summary,
+        template="plain_summary.html",
+    ),
     Section(name="parameters", title="Parameters and their origin", place="report"),
     DOCUMENT,
     Section(name="scene", title="Scene file"),

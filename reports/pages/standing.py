@@ -112,7 +112,7 @@ def _credibility(_own: Record, evidence: Record) -> Record:
 
 
 def _standing(evidence: Record, heads: Sequence[str] = HEADS) -> Table:
-    rows = standing_rows(summary.checks(evidence), balancer=evidence.get("balancer", "liquid_ring"))
+    rows = standing_rows(summary.checks(evidence), balancer=evidence["balancer"])
     return Table(
         caption="What stands behind each predicted quantity. Measurements are those of others on parts like "
         "the device’s; “within” is the share of the judged points that lie within both 95 % intervals, bias "
@@ -156,7 +156,7 @@ def evidence_text(evidence: Record) -> str:
 
 def _document(_own: Record, evidence: Record) -> Record:
     listed = symbols_and_sources()
-    balancer = listed.get(evidence.get("balancer", "liquid_ring"), {"symbols": [], "sources": []})
+    balancer = listed.get(evidence["balancer"], {"symbols": [], "sources": []})
     return {
         "evidence_sha256": hashlib.sha256(evidence_text(evidence).encode()).hexdigest(),
         "kept": [case for case in evidence["verification"] if case.get("date")],

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Final
 
-from ringbalance.reports.figure import FOUND, PAPER, Drawing, curve, draw, level, logarithmic
 from ringbalance.reports.section import Record, Section, Work
 from ringbalance.results.result import Table
 from ringbalance.scene.models import Scene
@@ -39,13 +38,9 @@ EXTREMES: Final = Section(name="extremes", title="At the extremes", show=_extrem
 """Shown also where it was not run, to say how it is."""
 
 
-_LEAST: Final = 1e-12
-"""Error at which a model that equals the finest is drawn."""
-
-
 def _collect(work: Work) -> Record | None:
     """The trade of the scene, light: without meshes in three dimensions."""
-    return _study(work.scene).to_dict()
+    return _study(work.ring).to_dict()
 
 
 @lru_cache(maxsize=4)
@@ -70,32 +65,8 @@ def _trade(trade: Record, evidence: Record) -> Record:
 
 def _quantity(quantity: Record, times: Record) -> Record:
     table = models_table(quantity, times)
-    speed = {each["model"]: each["designs_per_second"] for each in times.get(quantity["quantity"], ())}
     title = quantity["title"][0].upper() + quantity["title"][1:]
-    return {
-        "title": title,
-        "status": table.note,
-        "models": table,
-        "figure": _figure(quantity, speed),
-    }
-
-
-def _figure(quantity: Record, speed: Record) -> Drawing:
-    """Error against designs a second of every model that was timed."""
-    models = [model for model in quantity["models"] if model["model"] in speed]
-    rates = [speed[model["model"]] for model in models]
-    errors = [max(model["error"], _LEAST) for model in models]
-    return draw(
-        f"trade-{quantity['quantity'].replace('_', '-')}",
-        curve(rates, errors, "models", color=FOUND, linestyle="", marker="o", markersize=5),
-        level(max(quantity["uncertainty"], _LEAST), "known to", color=PAPER, linewidth=1, linestyle=":"),
-        logarithmic("x"),
-        logarithmic("y"),
-        x=("designs a second", "1"),
-        y=("error against the finest", "1"),
-        columns=4,
-        height=2.9,
-    )
+    return {"title": title, "status": table.note, "models": table}
 
 
 TRADE: Final = Section(name="trade", title="Speed against accuracy", collect=_collect, show=_trade)

@@ -27,13 +27,12 @@ from ringbalance.reports.figure import (
     decade,
     draw,
     level,
-    line,
     logarithmic,
     note,
     upright,
 )
 from ringbalance.reports.section import Record, Section, Work
-from ringbalance.results.numbers import given, shown
+from ringbalance.results.numbers import given
 from ringbalance.scene.arrays import stretches
 from ringbalance.scene.models import Scene
 
@@ -46,15 +45,12 @@ _REGIME_LINES: Final[dict[str, Record]] = {
     "reverse": {"linestyle": "-."},
     "undecided": {"linestyle": "-", "marker": "x", "markersize": 3.2, "markevery": 5},
 }
-_FAINT: Final = 1e-3
-"""Of the largest term of k, up to which a term is not drawn."""
 
 
 def _tube(_own: Record, evidence: Record) -> Record:
     tube, point = evidence["calibration"]["tube"], evidence["operating_point"]
     return {
         "drag": _drag(tube, point, evidence["paper"]["drag_coefficient"]),
-        "terms": _terms(tube),
         "at": _nearest(tube, point["k_at_velocity_m_s"]),
     }
 
@@ -115,27 +111,6 @@ def _reynolds_axis(per_velocity: float) -> Paint:
     return paint
 
 
-def _terms(tube: Record) -> Drawing:
-    """What k is made of, term by term, over velocity."""
-    velocity = tube["velocity_m_s"]
-    terms = {name: np.asarray(values) for name, values in tube["terms"].items()}
-    least = _FAINT * max(np.abs(values).max() for values in terms.values())
-    seen = {name: values for name, values in terms.items() if np.abs(values).max() > least}
-    return draw(
-        "drag-terms",
-        logarithmic("x", ticks=_VELOCITY_TICKS),
-        *(
-            curve(velocity, np.where(values > 0, values, np.nan), name.replace("_", " "), **line(index))
-            for index, (name, values) in enumerate(seen.items())
-        ),
-        logarithmic("y"),
-        x=_VELOCITY,
-        y=("contribution to k", "1"),
-        xlim=(velocity[0], velocity[-1]),
-        columns=3,
-    )
-
-
 def _law(_own: Record, evidence: Record) -> Record:
     law = evidence["flow_law"]
     return {"laws": [_flow_law(law, row) for row in range(len(law["gas_pressure_Pa"]))]}
@@ -150,9 +125,7 @@ def _flow_law(law: Record, row: int) -> Drawing:
     return draw(
         f"flow-law-{row}",
         curve(fill, law["velocity_paper_m_s"][row], "Eq. 19", **AS_PAPER),
-        lambda axes: axes.fill_between(
-            fill, np.maximum(velocity - width, 0), velocity + width, color=FOUND, alpha=0.2, linewidth=0
-        ),
+        curve(fill, velocity, band=width, color=FOUND, linewidth=0),
         *(
             curve(
                 fill[part],
@@ -181,11 +154,11 @@ _ORDER: Final = (Regime.SIPHON, Regime.SEPARATED, Regime.BLOCKED, Regime.REVERSE
 def _collect(work: Work) -> Record | None:
     """One operating state of every regime that this tube can be in, with its pressures along the path."""
     law = work.calibration.flow_law
-    if work.scene.tube.hump_radius is None:
+    if work.ring.tube.hump_radius is None:
         return None
-    found = [(regime, _state_in(regime, work.scene, law)) for regime in _ORDER]
+    found = [(regime, _state_in(regime, work.ring, law)) for regime in _ORDER]
     return {
-        "hump_radius_m": work.scene.tube.hump_radius,
+        "hump_radius_m": work.ring.tube.hump_radius,
         "states": [_record(work.calibration.scene, law, *state) for _, state in found if state is not None],
         "absent": [regime.label for regime, state in found if state is None],
     }
@@ -249,7 +222,6 @@ def _path_figure(states: list[Record]) -> Drawing:
         *(part for state in states for part in _path(state)),
         level(cavity, "cavity pressure", color=MUTED, linewidth=1, linestyle=(0, (5, 2))),
         upright(crest, color=MUTED, linewidth=0.8, linestyle=":"),
-        *_margin(states, crest),
         note("siphon crest", (crest, top), (5, -9)),
         x=("path along the tube from the driven chamber", "m"),
         y=("gauge pressure", "Pa"),
@@ -270,32 +242,6 @@ def _path(state: Record) -> list[Paint]:
         parts.append(curve(path[part], pressure[part], label if full else None, **look))
         label = None if full else label
     return parts
-
-
-def _margin(states: list[Record], crest: float) -> list[Paint]:
-    """The first siphon's margin at the crest, as an arrow with its size."""
-    siphons = [s for s in states if s["regime"] == "siphon" and s["margin_Pa"] is not None]
-    return [
-        paint
-        for state in siphons[:1]
-        for paint in (
-            note(
-                f"margin {shown(state['margin_Pa'], 'Pa', digits=2)}",
-                (crest, state["hump_pressure_Pa"]),
-                (10, 26),
-                color=FOUND,
-                arrowprops={"arrowstyle": "-", "color": FOUND, "linewidth": 0.7},
-            ),
-            curve(
-                [crest] * 2,
-                [state["cavity_pressure_Pa"], state["hump_pressure_Pa"]],
-                color=FOUND,
-                linewidth=3,
-                alpha=0.6,
-                solid_capstyle="butt",
-            ),
-        )
-    ]
 
 
 TUBE: Final = Section(name="tube", title="The connecting tube", show=_tube)

@@ -13,11 +13,8 @@ from typing import Any, Final
 
 from ringbalance.controller.rotor import chamber_letters
 from ringbalance.mesh.export import write_cells
-from ringbalance.reports.pictures.fields import shown_field, shown_fill, tube_field
+from ringbalance.reports.pictures.fields import chamber_field, shown_fill
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
-from ringbalance.reports.pictures.style import PICTURE
-from ringbalance.results.numbers import given, shown
-from ringbalance.results.rows import Finding, Value
 from ringbalance.scene import Scene
 
 Record = dict[str, Any]
@@ -29,6 +26,10 @@ FOLDERS: Final = (_FIGURES, _FIELDS)
 """Of the files, in an output folder."""
 _WHOLE: Final = "chamber"
 """Among the fields of a job: the space of an imported chamber, on which there is no field."""
+_SIZE: Final = (1200, 800)
+"""Of a picture, pixels, as it is drawn; what draws it is not loaded here."""
+NAMES: Final = ("disc", "pressure")
+"""Of the pictures; their captions are in templates."""
 _JOB: Final = "drawing.json"
 _LOG: Final = "drawing.txt"
 
@@ -40,8 +41,8 @@ class _Drawing3D:
     process: subprocess.Popen[bytes] | None
     text: str
     folder: Path
-    captions: Mapping[str, tuple[str, str]]
-    """Alternative text and caption by picture."""
+    shown: Record
+    """What the captions name, SI."""
 
     def finish(self) -> Record:
         """Wait for the pictures and list them for the evidence."""
@@ -57,14 +58,12 @@ class _Drawing3D:
                 "name": name,
                 "light": f"{name}-light.png",
                 "dark": f"{name}-dark.png",
-                "width": PICTURE[0],
-                "height": PICTURE[1],
-                "alt": alt,
-                "caption": caption,
+                "width": _SIZE[0],
+                "height": _SIZE[1],
             }
-            for name, (alt, caption) in self.captions.items()
+            for name in NAMES
         ]
-        return {"drawn": True, "text": self.text, "files": files}
+        return {"drawn": True, "text": self.text, "files": files, "shown": self.shown}
 
     def stop(self) -> None:
         """End a drawing that nobody waits for any more."""
@@ -82,7 +81,7 @@ def write_fields(*, scene: Scene, folder: Path) -> dict[str, Path]:
     fills = {"pressure": scene.disc.max_fill_ratio, "disc": shown_fill(scene)}
     names = {"pressure": "chamber_largest_fill.vtu", "disc": "chamber_at_start.vtu"}
     written = {
-        key: shown_field(scene, fill_ratio=fill).write(path=folder / _FIELDS / names[key])
+        key: chamber_field(scene, fill_ratio=fill).write(path=folder / _FIELDS / names[key])
         for key, fill in fills.items()
     }
     geometry = scene.disc.geometry
@@ -103,12 +102,17 @@ def start_drawing(
     found = find_opengl() if opengl is None else opengl
     figures = folder / _FIGURES
     figures.mkdir(parents=True, exist_ok=True)
-    tube = tube_field(scene)
-    captions = _captions(scene, tube)
+    shown = {
+        "chambers": scene.disc.chambers,
+        "fill_ratio": shown_fill(scene),
+        "largest_fill_ratio": scene.disc.max_fill_ratio,
+        "crest_radius_m": scene.tube.hump_radius,
+        "speed_rad_s": scene.rotor.speed,
+    }
     if not found.available:
-        return _Drawing3D(process=None, text=found.text, folder=figures, captions=captions)
+        return _Drawing3D(process=None, text=found.text, folder=figures, shown=shown)
     job = folder / _JOB
-    job.write_text(json.dumps({**_job(scene, fields, figures), "tube": tube}), encoding="utf-8")
+    job.write_text(json.dumps(_job(scene, fields, figures)), encoding="utf-8")
     with open(folder / _LOG, "wb") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", "ringbalance.reports.pictures.draw", str(job)],
@@ -118,7 +122,7 @@ def start_drawing(
             stdout=subprocess.DEVNULL,
             stderr=log,
         )
-    return _Drawing3D(process=process, text=found.text, folder=figures, captions=captions)
+    return _Drawing3D(process=process, text=found.text, folder=figures, shown=shown)
 
 
 def _fault(process: subprocess.Popen[bytes], log: Path) -> str:
@@ -152,28 +156,3 @@ def _job(scene: Scene, fields: Mapping[str, Path], folder: Path) -> Record:
             "hump_radius": tube.hump_radius,
         },
     }
-
-
-def _captions(scene: Scene, tube: Record | None) -> dict[str, tuple[str, str]]:
-    letters = chamber_letters(scene.disc.chambers)
-    fill, most = given(shown_fill(scene), "1"), given(scene.disc.max_fill_ratio, "1")
-    speed = shown(scene.rotor.speed, "rad/s", digits=5)
-    hump = scene.tube.hump_radius
-    path = _sentence("tube_straight") if hump is None else _sentence("tube_over_crest", radius=hump)
-    of_tube = {} if tube is None else {"tube": _tube_caption(tube)}
-    return of_tube | {
-        "disc": (
-            _sentence("disc_shown", first=letters[0], last=letters[-1], path=path),
-            _sentence("disc_caption", fill=fill, path=path),
-        ),
-        "pressure": (_sentence("pressure_shown"), _sentence("pressure_caption", fill=most, speed=speed)),
-    }
-
-
-def _tube_caption(tube: Record) -> tuple[str, str]:
-    answer = tube["text"]
-    return _sentence("tube_shown", answer=answer), _sentence("tube_caption", gas=tube["gas"], answer=answer)
-
-
-def _sentence(code: str, **values: Value) -> str:
-    return Finding(code=code, values=values).sentence()

@@ -20,7 +20,7 @@ if sys.platform != "win32":
 
 _MEMORY: Final = 4 * 2**30
 _SAME: Final = 1e-6
-Entity = tuple[int, int]
+_Entity = tuple[int, int]
 
 
 def _mesh_step(source: str, target: str, share: float) -> None:
@@ -63,13 +63,13 @@ def _start() -> None:
     gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
 
 
-def _name(face: Entity) -> str:
+def _name(face: _Entity) -> str:
     """The last part of a label such as "Shapes/Body/outer_wall", where it is a name of a boundary."""
     label = str(gmsh.model.getEntityName(*face)).rsplit("/", 1)[-1].strip()
     return label if label in KNOWN_NAMES else ""
 
 
-def _placed(faces: list[Entity]) -> Iterator[tuple[Entity, str]]:
+def _placed(faces: list[_Entity]) -> Iterator[tuple[_Entity, str]]:
     """Names that follow from where faces lie about the z axis."""
     places = {face: _nodes(face) for face in faces}
     radii = [radius for each in places.values() for radius, _ in each]
@@ -86,7 +86,7 @@ def _placed(faces: list[Entity]) -> Iterator[tuple[Entity, str]]:
                 yield face, name
 
 
-def _nodes(face: Entity) -> list[tuple[float, float]]:
+def _nodes(face: _Entity) -> list[tuple[float, float]]:
     """Radius and height of the nodes on a face and its edges."""
     _, xyz, _ = gmsh.model.mesh.getNodes(*face, includeBoundary=True)
     return [(math.hypot(x, y), z) for x, y, z in zip(xyz[::3], xyz[1::3], xyz[2::3], strict=True)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, get_args
 
 from ringbalance.scene.faults import did_you_mean
@@ -89,7 +89,7 @@ def quantity(dimension: str, bounds: Bounds | None = None) -> Reader:
     return Reader(read=read, allowed=allowed, summary=f"{kind.name}{interval}", dimension=dimension)
 
 
-def balance_grade() -> Reader:
+def _balance_grade() -> Reader:
     """Reader of a balance quality grade of ISO 21940-11, m/s: "G 2.5", or the velocity it stands for."""
     plain = quantity("velocity", POSITIVE)
     allowed = f'a grade such as "G 2.5", or {plain.allowed}'
@@ -195,13 +195,14 @@ def whole(lowest: int, highest: int, *, highest_text: str = "") -> Reader:
     return Reader(read=read, allowed=allowed, summary=allowed)
 
 
-def each_of(reader: Reader, *, count: int, example: str) -> Reader:
-    """Reader of a list of a fixed number of values of one sort; its values are tuples."""
-    allowed = f"a list of {count} such as {example}; each {reader.allowed}"
+def each_of(reader: Reader, *, example: str, count: int = 0) -> Reader:
+    """Reader of a list of values of one sort, as many as `count` unless it is zero; its values are tuples."""
+    size = f"a list of {count}" if count else "a list"
+    allowed = f"{size} such as {example}; each {reader.allowed}"
 
     def read(value: object) -> tuple[Any, ...]:
-        if not isinstance(value, list) or len(value) != count:
-            raise FieldError(f"it is not a list of {count}", allowed)
+        if not isinstance(value, list) or count not in (0, len(value)):
+            raise FieldError(f"it is not {size}", allowed)
         return tuple(_entry(item, place) for place, item in enumerate(value, start=1))
 
     def _entry(item: object, place: int) -> Any:
@@ -210,36 +211,24 @@ def each_of(reader: Reader, *, count: int, example: str) -> Reader:
         except FieldError as error:
             raise FieldError(f"entry {place}: {error.problem}", error.allowed) from error
 
-    summary = f"a list of {count}, each {reader.summary}"
+    summary = f"{size}, each {reader.summary}"
     return Reader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)
-
-
-def numbers() -> Reader:
-    """Reader of a list of bare numbers; its values are tuples."""
-    one = number(Bounds())
-    allowed = "a list of bare numbers, such as [1.4, 1.5, 1.6]"
-
-    def read(value: object) -> tuple[float, ...]:
-        if not isinstance(value, list):
-            raise FieldError("it is not a list", allowed)
-        values: tuple[float, ...] = each_of(one, count=len(value), example="[1.4, 1.5]").read(value)
-        return values
-
-    return Reader(read=read, allowed=allowed, summary="a list of bare numbers")
 
 
 def _one_or_each(reader: Reader, *, example: str) -> Reader:
-    """Reader of one value, or of a list of values of its sort; its values are tuples."""
-    allowed = f"{reader.allowed}; or a list of one for each chamber, such as {example}"
+    """Reader of one value, or of a list of one for each chamber; its values are tuples."""
+    listed, more = each_of(reader, example=example), "or a list of one for each chamber"
 
     def read(value: object) -> tuple[Any, ...]:
-        if not isinstance(value, list):
-            return (reader.read(value),)
-        values: tuple[Any, ...] = each_of(reader, count=len(value), example=example).read(value)
+        values: tuple[Any, ...] = listed.read(value) if isinstance(value, list) else (reader.read(value),)
         return values
 
-    summary = f"{reader.summary}, or a list of one for each chamber"
-    return Reader(read=read, allowed=allowed, summary=summary, dimension=reader.dimension)
+    return replace(
+        listed,
+        read=read,
+        allowed=f"{reader.allowed}; {more}, such as {example}",
+        summary=f"{reader.summary}, {more}",
+    )
 
 
 def choice(words: Any) -> Reader:
@@ -276,19 +265,6 @@ def text() -> Reader:
         return value
 
     return Reader(read=read, allowed=allowed, summary=allowed)
-
-
-def texts(*, example: str) -> Reader:
-    """Reader of a list of texts; its values are tuples."""
-    one, allowed = text(), f"a list of texts, such as {example}"
-
-    def read(value: object) -> tuple[str, ...]:
-        if not isinstance(value, list):
-            raise FieldError("it is not a list", allowed)
-        values: tuple[str, ...] = each_of(one, count=len(value), example=example).read(value)
-        return values
-
-    return Reader(read=read, allowed=allowed, summary="a list of texts")
 
 
 def chamber_letters() -> Reader:
@@ -351,7 +327,7 @@ Mass = Annotated[float, quantity("mass", NOT_NEGATIVE)]
 Stiffness = Annotated[float, quantity("stiffness", POSITIVE)]
 Damping = Annotated[float, quantity("damping", NOT_NEGATIVE)]
 PositiveVelocity = Annotated[float, quantity("velocity", POSITIVE)]
-BalanceGrade = Annotated[float, balance_grade()]
+BalanceGrade = Annotated[float, _balance_grade()]
 Velocity = Annotated[float, quantity("velocity", NOT_NEGATIVE)]
 PositiveUnbalance = Annotated[float, quantity("unbalance", POSITIVE)]
 Unbalance = Annotated[float, quantity("unbalance", NOT_NEGATIVE)]

@@ -20,9 +20,9 @@ import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
-from numba.core import caching, serialize
+from numba.core import compiler, serialize
 
 from ringbalance.scene.platform.files import cache_folder, write_whole
 
@@ -46,9 +46,7 @@ _MOST_KEPT: Final = 5e8
 _SIZE: Final = hashlib.sha256().digest_size
 
 _dumps: Any = serialize.dumps
-# Private parts of numba: without them everything is compiled in every process.
-_NumbaCache: Any = getattr(caching, "FunctionCache", object)
-_NumbaFormat: Any = getattr(caching, "CompileResultCacheImpl", object)
+_rebuild: Any = compiler.CompileResult._rebuild
 
 
 def code_root() -> Path:
@@ -126,96 +124,26 @@ def _may_be_changed_by_others(path: Path) -> bool:
     return status.st_uid not in {os.geteuid(), 0} or bool(status.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
 
 
-class _Files:
-    """The files of one function, in the place of numba's index and data."""
+class KeptCode:
+    """The kept code of one function, in the place of numba's own cache of it.
+
+    Args: `digest`: of all sources whose code the function's may hold.
+    Raises: TypeError: a function made in another one, whose code depends on what it was made with.
+    """
 
     def __init__(self, function: Callable[..., Any], digest: str) -> None:
+        if function.__closure__:
+            raise TypeError(f"{function.__qualname__} is made in another function")
         source, line = inspect.getfile(function), function.__code__.co_firstlineno
+        code = hashlib.sha256(function.__code__.co_code).hexdigest()
         self._name = f"{Path(source).stem}.{function.__name__}-{line}"
-        self._known = f"{source}:{line}:{function.__qualname__}:{digest}"
-
-    def load(self, key: object) -> object:
-        """What was saved under a key, or None."""
-        path = self._path(key)
-        try:
-            known, data = pickle.loads(checked_content(path))
-        except FileNotFoundError:
-            return None
-        except Exception:
-            # A checksum holds nobody to a format: what an older library has written may raise anything.
-            discard(path)
-            return None
-        if known == (self._known, key):
-            return data
-        discard(path)
-        return None
-
-    def save(self, key: object, data: object) -> None:
-        """Keep an entry; OSError when that cannot be done."""
-        write_checked(self._path(key), _dumps(((self._known, key), data)))
-
-    def _path(self, key: object) -> Path:
-        digest = hashlib.sha256(f"{self._known}{key}".encode()).hexdigest()[:16]
-        return code_root() / f"{self._name}.{digest}{CODE}"
-
-    def turn(self) -> int | None:
-        """A descriptor that no other process has until it is closed; None where it cannot be had in time."""
-        if fcntl is None:
-            return None
-        try:
-            _make_private(code_root())
-            held = os.open(code_root() / f"{self._name}{_TURN}", os.O_RDWR | os.O_CREAT, 0o600)
-        except OSError:
-            return None
-        start = time.monotonic()
-        while time.monotonic() < start + _LONGEST_TURN:
-            try:
-                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                time.sleep(0.05)
-            except OSError:
-                break
-            else:
-                return held
-        os.close(held)
-        return None
-
-
-class KeptCode(_NumbaCache):  # type: ignore[misc]
-    """Numba's cache of one function, in the files described above."""
-
-    def __init__(self, function: Callable[..., Any], digest: str) -> None:
-        """Args: `digest`: of all sources whose code the function's may hold."""
-
-        class Place:
-            """Numba asks where its files belong; these go elsewhere."""
-
-            _py_file = function.__code__.co_filename
-            """Named in its warning of code that cannot be kept, as without optimisation."""
-
-            @staticmethod
-            def from_function(*_: object) -> Any:
-                return Place
-
-            @staticmethod
-            def get_cache_path() -> str:
-                return str(code_root())
-
-            get_source_stamp = get_disambiguator = get_cache_path
-
-            @staticmethod
-            def ensure_cache_path() -> None:
-                """Made when something is kept."""
-
-        class Format(_NumbaFormat):  # type: ignore[misc]
-            """What numba writes for a compiled function."""
-
-            _locator_classes: ClassVar = [Place]
-
-        self._impl_class = Format
-        super().__init__(function)
-        self._cache_file = _Files(function, digest)
+        self._known = f"{source}:{line}:{function.__qualname__}:{digest}:{code}"
         self._turn: int | None = None
+
+    @property
+    def cache_path(self) -> str:
+        """As numba shows it."""
+        return str(code_root())
 
     @contextlib.contextmanager
     def in_turn(self) -> Iterator[None]:
@@ -227,31 +155,69 @@ class KeptCode(_NumbaCache):  # type: ignore[misc]
                 os.close(self._turn)
                 self._turn = None
 
-    def load_overload(self, sig: object, target_context: object) -> object:
+    def load_overload(self, sig: object, target_context: Any) -> object:
         """The compiled code of a signature, or None: it is then compiled."""
         if not trusted(code_root()):
             return None
-        kept = self._load(sig, target_context)
+        target_context.refresh()
+        key = (sig, target_context.codegen().magic_tuple())
+        kept = self._load(key, target_context)
         if kept is None and self._turn is None:
-            self._turn = self._cache_file.turn()
-            kept = self._load(sig, target_context)
+            self._turn = _turn(code_root() / f"{self._name}{_TURN}")
+            kept = self._load(key, target_context)
         return kept
 
-    def _load(self, sig: object, target_context: object) -> object:
+    def _load(self, key: object, target_context: object) -> object:
+        path = self._path(key)
         try:
-            return super().load_overload(sig, target_context)
-        except Exception:
-            # Code that was kept by another release of a library: it is only worth the time to compile it.
+            known, data = pickle.loads(checked_content(path))
+            if known == (self._known, key):
+                return _rebuild(target_context, *data)
+        except FileNotFoundError:
             return None
+        except Exception:
+            # A checksum holds nobody to a format: what another release of a library wrote may raise anything.
+            pass
+        discard(path)
+        return None
 
-    def save_overload(self, sig: object, data: object) -> None:
+    def save_overload(self, sig: object, data: Any) -> None:
         """Keep the compiled code of a signature, where that can be done."""
-        if not trusted(code_root()):
+        bound_to_process = data.library.has_dynamic_globals or any(not each.can_cache for each in data.lifted)
+        if bound_to_process or not trusted(code_root()):
             return
+        key = (sig, data.codegen.magic_tuple())
         try:
-            super().save_overload(sig, data)
+            write_checked(self._path(key), _dumps(((self._known, key), data._reduce())))
         except OSError as error:
             _note_unwritable(code_root(), error.strerror or str(error))
+
+    def _path(self, key: object) -> Path:
+        digest = hashlib.sha256(f"{self._known}{key}".encode()).hexdigest()[:16]
+        return code_root() / f"{self._name}.{digest}{CODE}"
+
+
+def _turn(path: Path) -> int | None:
+    """A descriptor that no other process has until it is closed; None where it cannot be had in time."""
+    if fcntl is None:
+        return None
+    try:
+        _make_private(path.parent)
+        held = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError:
+        return None
+    start = time.monotonic()
+    while time.monotonic() < start + _LONGEST_TURN:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(0.05)
+        except OSError:
+            break
+        else:
+            return held
+    os.close(held)
+    return None
 
 
 @cache

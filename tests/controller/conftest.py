@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from pairs import Motion, PairState, Passage, Switch, pass_time
 from transfers import Drive
 
 from ringbalance.controller.liquid_ring.plant import LiquidRing
@@ -17,7 +18,6 @@ from ringbalance.controller.terms import dynamics_of
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection import column
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage, Switch, pass_time
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Flow, Regime
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.scene import loop_models, models

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pairs import Motion, PairState, Passage, pass_time
 from scipy.integrate import quad
 
 from ringbalance.physics.gas import GasLine, flow_shape
@@ -17,11 +18,9 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection import column
 from ringbalance.reduced_model.injection.column import line_rates
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.pair import Motion, PairState, Passage, pass_time
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
-from ringbalance.reduced_model.tube.regime import TubePath
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.models import Scene
 
@@ -34,9 +33,9 @@ PIPED = {"conductance": 1e-8, "critical_ratio": 0.3}
 
 def blocked(dynamics: Dynamics) -> Dynamics:
     """The same with a crest that no gas lifts liquid over."""
-    path = dynamics.column.path
-    assert path is not None
-    return replace(dynamics, column=replace(dynamics.column, path=replace(path, hump_pressure=1e9)))
+    law = dynamics.law
+    assert isinstance(law, CalibratedLaw)
+    return replace(dynamics, law=replace(law, path=replace(law.path, hump_pressure=1e9)))
 
 
 # --- the column ---
@@ -151,17 +150,9 @@ def test_a_column_without_drive_slows_down_by_its_loss(
     # du/dt = -(k + 1) u^2/(2 L): u = u0/(1 + t/tau), so the distance grows like a logarithm.
     assert isinstance(model.flow, PaperLaw)
     level = replace(model, flow=replace(model.flow, angular_velocity=1e-6))
-    path = TubePath(
-        density=1e3,
-        port_pressure=-1.0,
-        hump_pressure=None,
-        trapped=False,
-        vapour_pressure=0.0,
-        released=0.0,
-        froude_velocity=0.0,
-    )
-    coasting = replace(plant(level, "tube inertia").column, one_way=False, path=path, gas_off=-1.0)
-    dynamics = replace(plant(level, "tube inertia"), column=coasting)
+    dynamics = plant(level, "tube inertia")
+    coasting = dynamics.kept_plant(total=0.5)
+    coasting["one_way"], coasting["port_pressure"] = False, -1.0
     t = np.array([1e-3, 10e-3, 0.1])
     found = pulse(dynamics, 0.0, t, motion=Motion(velocity=5.0))
     tau = 2 * 0.12 / (51 * 5.0)
@@ -177,11 +168,9 @@ def test_liquid_swings_in_a_full_tube_with_the_peaks_of_its_energy(
     assert isinstance(model.flow, PaperLaw)
     easy = replace(model, flow=replace(model.flow, drag_coefficient=0.2))
     dynamics = plant(easy, "tube inertia")
-    free = replace(dynamics.column, one_way=False, gas_off=-1.0)
+    dynamics.kept_plant(total=0.5)["one_way"] = False
     t = np.linspace(1e-3, 2.0, 2000)
-    found = pass_time(
-        replace(dynamics, column=free), PairState(fill=0.251, total=0.5, primed=True), instants=t
-    )
+    found = pass_time(dynamics, PairState(fill=0.251, total=0.5, primed=True), instants=t)
     rate, c = dynamics.tube_area / dynamics.chamber_volume, 1.2 / 0.12
     turns = np.flatnonzero(np.diff(np.sign(np.diff(found.fills))) != 0) + 1
     peaks = [0.001 / rate, *(abs(found.fills[turns] - 0.25) / rate)]

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pairs import PairState, Passage, pass_time
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from ringbalance.controller.loop import simulate
 from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
-from ringbalance.reduced_model.injection.pair import PairState, Passage, pass_time
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel, Regime
 from ringbalance.scene.arrays import FloatArray

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pairs import Passage
 
 from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
@@ -20,7 +21,7 @@ from ringbalance.reduced_model.gas_line import (
     line_text,
 )
 from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
-from ringbalance.reduced_model.injection.pair import Injections, Passage
+from ringbalance.reduced_model.injection.pair import Injections
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_span
 from ringbalance.scene.models import Scene

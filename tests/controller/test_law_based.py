@@ -29,7 +29,7 @@ from ringbalance.controller.loop_records import LOOP, MOMENT_NODES, RUN
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.simulation import Outcome
 from ringbalance.reduced_model.injection.dynamics import WORKSPACE
-from ringbalance.reduced_model.injection.pair import Motion, packed
+from ringbalance.reduced_model.injection.pair import at_rest
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import PaperMoment, paper_model
 from ringbalance.scene.models import Scene
@@ -66,7 +66,7 @@ def gas_time_of(ring: LiquidRing, *, side: int, wanted: float, longest: float) -
     """Valve-open time that brings a level pair to a fill of its positive chamber, s; zero: nothing flows."""
     plant, loop = ring.dynamics.kept_plant(total=0.5), np.zeros(1, dtype=LOOP)
     loop["maximum_gas_time"] = longest
-    liquid = np.repeat(packed(plant, fill=0.25, primed=False, motion=Motion()), 2)
+    liquid = np.repeat(at_rest(plant, fill=0.25), 2)
     room = np.zeros((2, 1)), np.zeros(WORKSPACE)
     return float(_gas_time(loop[0], plant[0], liquid, 0, side, wanted, *room))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from pairs import Motion, Passage, packed
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -17,7 +18,6 @@ from ringbalance.reduced_model.gas_line import line_ends
 from ringbalance.reduced_model.injection.column import ends
 from ringbalance.reduced_model.injection.dynamics import Dynamics
 from ringbalance.reduced_model.injection.lift import crest_start, crest_stop, lift_rates, shown
-from ringbalance.reduced_model.injection.pair import Motion, Passage, packed
 from ringbalance.reduced_model.law.calibrated_law import CalibratedLaw
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.tube.path import crest_span

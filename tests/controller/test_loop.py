@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pairs import Passage
 
 from ringbalance.controller.algorithms.algorithm import Command, Measurement, ValveCommand
 from ringbalance.controller.algorithms.by_name import controller_of
@@ -18,7 +19,6 @@ from ringbalance.controller.document import simulation_document
 from ringbalance.controller.loop import simulate
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
 from ringbalance.reduced_model.injection.dynamics import Dynamics
-from ringbalance.reduced_model.injection.pair import Passage
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_law, paper_model
 from ringbalance.scene.faults import SceneError

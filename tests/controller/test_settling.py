@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pairs import Motion, PairState, opened, pass_time
 
 from ringbalance.controller.algorithms.by_name import controller_of
 from ringbalance.controller.document import simulation_document
@@ -22,7 +23,6 @@ from ringbalance.controller.loop import simulate
 from ringbalance.controller.rotor import disc_unbalance
 from ringbalance.controller.simulation import Outcome, RunVerdict, Simulation
 from ringbalance.controller.terms import dynamics_of
-from ringbalance.reduced_model.injection.pair import Motion, PairState, opened, pass_time
 from ringbalance.reduced_model.law.flow_law import BalancerModel
 from ringbalance.reduced_model.law.paper_law import paper_model
 from ringbalance.reduced_model.residual_liquid import residual_fill_ratio

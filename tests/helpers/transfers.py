@@ -15,10 +15,10 @@ from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
+from pairs import Motion, PairState, opened, pass_time
 from scipy.integrate import solve_ivp
 
-from ringbalance.reduced_model.injection.dynamics import Column, Dynamics, Event
-from ringbalance.reduced_model.injection.pair import Motion, PairState, opened, pass_time
+from ringbalance.reduced_model.injection.dynamics import Dynamics, Event
 from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw, Regime
 from ringbalance.reduced_model.law.paper_law import PaperLaw
 from ringbalance.scene.arrays import FloatArray, clipped
@@ -224,7 +224,8 @@ def marched(tube: Tube) -> Integrator:
 
     def integrate(drive: Drive, t: FloatArray) -> Transfer:
         dynamics = Dynamics(
-            column=Column.of(law=drive.law, tube=tube),
+            law=drive.law,
+            tube=tube,
             inertia=False,
             line=None,
             valve_lag=0.0,

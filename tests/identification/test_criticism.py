@@ -42,6 +42,7 @@ def linear_fit(measured: FloatArray, design: FloatArray, *, known: bool) -> Line
         derivatives=rows,
         block=np.where(data, "transfer mass", ""),
         known_noise=data if known else np.zeros_like(data),
+        turn=np.eye(measured.size),
     )
 
 
@@ -99,6 +100,7 @@ def test_few_rows_are_not_judged() -> None:
         derivatives=np.ones((3, 1)),
         block=np.array(["flow flow_rate"] * 3),
         known_noise=np.ones(3, dtype=np.bool_),
+        turn=np.eye(3),
     )
     found = Criticism.of(few)
     assert found.describes
@@ -129,6 +131,7 @@ def _comparison(true: FloatArray, noise: float) -> Any:
         derivatives=own[:, None] / noise,
         block=np.array(["flow flow_rate"] * 24),
         known_noise=np.ones(24, dtype=np.bool_),
+        turn=np.eye(24),
     )
     return LawComparison.of(fit, other="laminar flow", residuals=(measured - factor * other) / noise)
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from pairs import PairState, opened, pass_time
 from synthetic_rigs import READINGS, observations
 
 from ringbalance.controller.rotor import disc_unbalance
@@ -18,7 +19,6 @@ from ringbalance.identification.reading import KINDS
 from ringbalance.mesh.geometry import chamber_volume, surface_radius
 from ringbalance.physics.tube.loss import tube_loss
 from ringbalance.reduced_model.calibration import calibrated_model
-from ringbalance.reduced_model.injection.pair import PairState, opened, pass_time
 from ringbalance.reduced_model.terms import HELD, INERTIA
 from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
 from ringbalance.scene.arrays import FloatArray

@@ -143,10 +143,8 @@ def test_weak_parameters_are_asked_for_first(found: FitResult) -> None:
 def test_the_saved_scene_is_the_fitted_one(found: FitResult, tmp_path: Path) -> None:
     target = tmp_path / "fitted.toml"
     data = [b.observations for b in found.optimum.residuals.problem.blocks]
-    text = bundled_scene("liquid_ring_paper").read_text(encoding="utf-8")
-    save_result(
-        target, text=text, result=found, data=data, folder=target.parent, said=Review.of(found).sentences
-    )
+    paper = load_scene(bundled_scene("liquid_ring_paper"))
+    save_result(target, scene=paper, result=found, data=data, said=Review.of(found).sentences)
     scene = liquid_ring_scene(load_scene(target))
     assert scene.tube.bore == pytest.approx(found.parameter("bore").value, rel=1e-8)
     widths = {each.quantity: each.half_width for each in scene.uncertainty}

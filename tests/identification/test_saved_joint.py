@@ -24,7 +24,7 @@ from ringbalance.mesh.geometry import chamber_volume
 from ringbalance.physics.tube.loss import MODEL_CAUSES
 from ringbalance.reduced_model.calibration import calibrated_model
 from ringbalance.reduced_model.chamber.values import measured_closed_forms
-from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene
+from ringbalance.scene import bundled_scene, liquid_ring_scene, load_scene, scene_from
 from ringbalance.scene.arrays import FloatArray
 from ringbalance.scene.fitted import CAVITY_ERROR, CLEARING_ERROR, START_ERROR, ModelError
 from ringbalance.scene.models import Scene
@@ -45,10 +45,9 @@ def saved(made: Rig, result: FitResult, folder: Path) -> Scene:
     document["gas"]["pressure"] = f"{made.scene.gas.pressure!r} Pa"
     path = save_result(
         folder / "fitted.toml",
-        text=toml_bytes(document).decode(),
+        scene=scene_from(content=toml_bytes(document), file=str(source)),
         result=result,
         data=[replace(each, sha256="0") for each in made.data],
-        folder=source.parent,
     )
     return liquid_ring_scene(load_scene(path))
 

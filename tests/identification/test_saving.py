@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,10 @@ from ringbalance.controller.eccentric_mass.scene_records import eccentric_scene
 from ringbalance.identification.fitting import FittedParameter
 from ringbalance.identification.identifiability import Identified
 from ringbalance.identification.intervals import Profile
-from ringbalance.identification.saving import _fitted_scene, _found_from, _save_fitted
-from ringbalance.scene import SceneError, bundled_scene, load_scene
+from ringbalance.identification.saving import fitted_scene
+from ringbalance.scene import AnyScene, SceneError, bundled_scene, load_scene, scene_from
+from ringbalance.scene.changes import document_of, file_text
 from ringbalance.scene.describe import scene_table
-from ringbalance.scene.loader import scene_from
 from ringbalance.scene.narrowing import liquid_ring_scene
 from ringbalance.scene.origins import MeasuredFile, MeasuredFinding
 
@@ -42,23 +41,30 @@ def fitted(path: str, value: float, width: float, **more: Any) -> FittedParamete
     return FittedParameter(**told | more)
 
 
-def text_of(name: str) -> str:
-    return bundled_scene(name).read_text(encoding="utf-8")
+def read_again(scene: AnyScene) -> AnyScene:
+    return scene_from(content=file_text(scene, to=Path.cwd()), file="a.toml")
+
+
+def saved(name: str, *parameters: FittedParameter) -> AnyScene:
+    """A bundled scene with fitted values, written and read again."""
+    scene = load_scene(bundled_scene(name))
+    return read_again(fitted_scene(scene, fitted=parameters, files=[FILE]))
 
 
 BORE = fitted("tube.bore", 1.4e-3, 0.02e-3)
 FACTOR = fitted("disc.lambda_factor", 0.97, 0.01, before=1.0, before_interval=None)
 
 
-def test_values_uncertainties_and_origins(tmp_path: Path) -> None:
-    target = tmp_path / "fitted.toml"
+def test_values_uncertainties_and_origins() -> None:
     lag = fitted("rotor.lag_angle", -0.01, 0.05)
     loss = fitted("tube.extra_loss", 2.0, 0.5, verdict=Identified.PRACTICALLY)
-    _save_fitted(
-        target, text=text_of("liquid_ring_paper"), fitted=[BORE, FACTOR, lag, loss], files=[FILE],
+    result = fitted_scene(
+        load_scene(bundled_scene("liquid_ring_paper")),
+        fitted=[BORE, FACTOR, lag, loss],
+        files=[FILE],
         findings=[MeasuredFinding(about="combination", text="lambda^2/(k + 1)")],
-    )  # fmt: skip
-    scene = liquid_ring_scene(load_scene(target))
+    )
+    scene = liquid_ring_scene(read_again(result))
     assert scene.tube.bore == pytest.approx(1.4e-3, rel=1e-9)
     assert scene.disc.moment_factor == pytest.approx(0.97, rel=1e-9)
     assert scene.rotor.lag_angle == pytest.approx(-0.01, rel=1e-8)
@@ -81,21 +87,19 @@ def test_values_uncertainties_and_origins(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_every_key_stays(name: str) -> None:
     """Without fitted values the saved scene is the same one but for what it says of its measurements."""
-    text = text_of(name)
-    content = _fitted_scene(text, fitted=[], files=[FILE])
-    document = tomllib.loads(content.decode())
+    before = load_scene(bundled_scene(name))
+    scene = saved(name)
+    document = dict(document_of(scene))
     assert document.pop("measured")["files"] == [
         {"file": "run.csv", "kind": "injection", "rows": 40, "sha256": "ab" * 32}
     ]
-    assert document == tomllib.loads(text)
-    saved = scene_from(content=content, file="a.toml")
-    assert saved.values_sha256 == scene_from(content=text.encode(), file="a.toml").values_sha256
+    assert document == document_of(before)
+    assert scene.values_sha256 == before.values_sha256
 
 
 def test_entries_of_a_list_share_the_larger_uncertainty() -> None:
     arms = [fitted("masses.friction_arm[1]", 0.012, 0.002), fitted("masses.friction_arm[0]", 0.01, 0.001)]
-    content = _fitted_scene(text_of("eccentric_mass_paper"), fitted=arms, files=[FILE])
-    scene = eccentric_scene(scene_from(content=content, file="a.toml"))
+    scene = eccentric_scene(saved("eccentric_mass_paper", *arms))
     assert scene.masses.friction_arm == pytest.approx((0.01, 0.012), rel=1e-9)
     widths = {each.quantity: each.half_width for each in scene.uncertainty}
     assert widths["masses.friction_arm"] == pytest.approx(0.002, rel=1e-8)
@@ -105,53 +109,40 @@ def test_entries_of_a_list_share_the_larger_uncertainty() -> None:
 def test_an_entry_fitted_alone_leaves_the_uncertainty_of_both() -> None:
     """The key stands for both masses, and nothing was learnt of the other one."""
     arm = fitted("masses.friction_arm[0]", 0.012, 0.001)
-    content = _fitted_scene(text_of("eccentric_mass_paper"), fitted=[arm], files=[FILE])
-    scene = eccentric_scene(scene_from(content=content, file="a.toml"))
+    scene = eccentric_scene(saved("eccentric_mass_paper", arm))
     assert scene.masses.friction_arm == pytest.approx((0.012, 0.01), rel=1e-9)
-    assert tomllib.loads(content.decode())["uncertainty"]["masses"]["friction_arm"] == "25 %"
+    assert document_of(scene)["uncertainty"]["masses"]["friction_arm"] == "25 %"
     assert "friction_arm[0] was fitted alone" in scene.measured.findings[0].text
 
 
 def test_an_interval_that_a_scene_cannot_state_is_said() -> None:
     wide = fitted("tube.extra_loss", 0.2, 0.1, interval=(0.01, 0.9))
-    scene = scene_from(
-        content=_fitted_scene(text_of("six_chamber"), fitted=[wide], files=[FILE]), file="a.toml"
-    )
+    scene = saved("six_chamber", wide)
     assert {each.quantity: each.half_width for each in scene.uncertainty}["extra_loss"] == pytest.approx(0.2)
     assert "tube.extra_loss" in scene.measured.findings[0].text
 
 
-def test_values_that_make_no_scene_leave_no_file(tmp_path: Path) -> None:
-    target = tmp_path / "fitted.toml"
-    outside = fitted("tube.hump_radius", 0.09, 0.001)
+def test_values_that_make_no_scene_are_refused() -> None:
     with pytest.raises(SceneError, match="hump_radius"):
-        _save_fitted(target, text=text_of("liquid_ring_paper"), fitted=[outside], files=[FILE])
-    assert not list(tmp_path.iterdir())
+        saved("liquid_ring_paper", fitted("tube.hump_radius", 0.09, 0.001))
 
 
 @pytest.mark.parametrize("path", ["tube.colour", "nothing.bore", "colour", "masses.mass"])
 def test_a_path_that_no_scene_has_is_refused(path: str) -> None:
     with pytest.raises(ValueError, match="no value"):
-        _fitted_scene(text_of("six_chamber"), fitted=[fitted(path, 1.0, 0.1)], files=[FILE])
+        saved("six_chamber", fitted(path, 1.0, 0.1))
 
 
 @given(value=st.floats(1.01e-3, 2e-3), share=st.floats(1e-6, 0.9))
 def test_saving_loses_nothing_that_matters(value: float, share: float) -> None:
-    content = _fitted_scene(
-        text_of("liquid_ring_paper"), fitted=[fitted("tube.bore", value, share * value)], files=[FILE]
-    )
-    scene = liquid_ring_scene(scene_from(content=content, file="a.toml"))
+    scene = liquid_ring_scene(saved("liquid_ring_paper", fitted("tube.bore", value, share * value)))
     assert scene.tube.bore == pytest.approx(value, rel=1e-8)
     width = {each.quantity: each.half_width for each in scene.uncertainty}["bore"]
     assert width == pytest.approx(share * value, rel=1e-7)
 
 
 def test_a_mesh_is_found_from_another_folder(tmp_path: Path) -> None:
-    text = text_of("imported_chamber")
-    folder = bundled_scene("imported_chamber").parent
-    assert _found_from(text, folder=folder, to=folder) == text
-    (tmp_path / "disc.toml").write_text(_found_from(text, folder=folder, to=tmp_path), encoding="utf-8")
-    there = load_scene(tmp_path / "disc.toml")
-    assert there.values_sha256 == load_scene(folder / "imported_chamber.toml").values_sha256
-    plain = text_of("six_chamber")
-    assert _found_from(plain, folder=folder, to=tmp_path) == plain
+    before = load_scene(bundled_scene("imported_chamber"))
+    content = file_text(fitted_scene(before, fitted=[], files=[FILE]), to=tmp_path)
+    (tmp_path / "disc.toml").write_bytes(content)
+    assert load_scene(tmp_path / "disc.toml").values_sha256 == before.values_sha256

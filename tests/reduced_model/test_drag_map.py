@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from ringbalance.reduced_model.calibration import calibrate
 from ringbalance.reduced_model.calibration_record import Calibration
 from ringbalance.reduced_model.law.flow_law import Regime
 from ringbalance.reduced_model.tube.heads import TubeHeads
-from ringbalance.reports.pages.drag_map import DragMap, LiquidVerdicts
+from ringbalance.reports.pages.drag_map import DragMap, liquids_in_tube, velocity_paper
 from ringbalance.scene.liquids import liquid_at
 from ringbalance.scene.models import Scene
 from ringbalance.scene.origins import InputUncertainty
@@ -87,20 +88,27 @@ def test_stated_inputs_spread_k_as_they_do_in_tube_loss(calibration: Calibration
 
 
 def test_the_contour_is_really_at_fifty(calibration: Calibration) -> None:
-    nu, bore = DragMap.of(calibration=calibration).contour()
-    assert nu.size > 20
-    for one, d in zip(nu[::7], bore[::7], strict=True):
-        point = DragMap.of(calibration=calibration, bore=[d], kinematic_viscosity=[one]).point
+    drag = DragMap.of(calibration=calibration)
+    pairs = [
+        (nu, d)
+        for nu, d in zip(drag.kinematic_viscosity, drag.bores_for(drag.point.k), strict=True)
+        if d is not None
+    ]
+    assert len(pairs) > 20
+    for nu, d in pairs[::7]:
+        point = DragMap.of(calibration=calibration, bore=[d], kinematic_viscosity=[nu]).point
         assert point.k[0, 0] == pytest.approx(50, rel=2e-3)
 
 
 def test_where_the_apparent_k_is_fifty_eq_19_has_the_velocity(calibration: Calibration) -> None:
-    found = DragMap.of(calibration=calibration)
-    nu, bore = found.contour(apparent=True)
-    one = DragMap.of(calibration=calibration, bore=[bore[10]], kinematic_viscosity=[nu[10]])
-    assert one.velocity_paper / one.point.velocity[0, 0] == pytest.approx(1, abs=2e-3)
+    drag = DragMap.of(calibration=calibration)
+    nu, bore = drag.kinematic_viscosity[25], drag.bores_for(drag.point.apparent_k)[25]
+    assert bore is not None
+    one = DragMap.of(calibration=calibration, bore=[bore], kinematic_viscosity=[nu])
+    printed = velocity_paper(calibration.scene.liquid.density, calibration.scene.gas.pressure)
+    assert printed / one.point.velocity[0, 0] == pytest.approx(1, abs=2e-3)
     np.testing.assert_allclose(
-        found.velocity_paper / found.point.velocity, np.sqrt((found.point.apparent_k + 1) / 51), rtol=1e-10
+        printed / drag.point.velocity, np.sqrt((drag.point.apparent_k + 1) / 51), rtol=1e-10
     )
 
 
@@ -147,57 +155,43 @@ def test_a_gas_that_drives_nothing_maps_nothing(calibration: Calibration) -> Non
     assert not np.any(found.point.runs)
     assert np.all(found.point.regime == Regime.BLOCKED)
     assert np.all(found.point.k == 0)
-    assert found.contour()[0].size == 0
-
-
-BAD = [
-    ({"bore": [0.0, 1e-3]}, "bore must be a row of positive"),
-    ({"bore": []}, "bore must be a row of positive"),
-    ({"bore": [2e-3, 1e-3]}, "bore must rise"),
-    ({"kinematic_viscosity": [-1e-6]}, "kinematic_viscosity must be a row of positive"),
-]
-
-
-@pytest.mark.parametrize(("given", "told"), BAD)
-def test_bad_axes_are_refused(calibration: Calibration, given: dict[str, object], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
-        DragMap.of(calibration=calibration, **given)  # type: ignore[arg-type]
+    assert not any(found.bores_for(found.point.k))
 
 
 @pytest.fixture(scope="module")
-def verdicts(calibration: Calibration) -> LiquidVerdicts:
-    return LiquidVerdicts.of(calibration=calibration)
+def liquids(calibration: Calibration) -> dict[str, dict[str, Any]]:
+    return {record["name"]: record for record in liquids_in_tube(calibration)}
 
 
 def test_the_scenes_liquid_comes_first_and_agrees_with_the_calibration(
-    calibration: Calibration, verdicts: LiquidVerdicts
+    calibration: Calibration, liquids: dict[str, dict[str, Any]]
 ) -> None:
-    point = calibration.operating_point
-    assert verdicts.liquids[0] == calibration.scene.liquid
-    assert point.k is not None
-    assert verdicts.at_scene.velocity[0] == pytest.approx(point.velocity, rel=1e-8)
-    assert verdicts.at_scene.k[0] == pytest.approx(point.k, rel=1e-8)
-    assert verdicts.at_scene.k_uncertainty[0] == pytest.approx(point.k_uncertainty, rel=1e-8)
-    assert verdicts.at_scene.velocity_uncertainty[0] == pytest.approx(point.velocity_uncertainty, rel=1e-4)
+    point, first = calibration.operating_point, next(iter(liquids.values()))
+    assert first["name"] == calibration.scene.liquid.name
+    assert first["velocity_m_s"] == pytest.approx(point.velocity, rel=1e-8)
+    assert first["k"] == pytest.approx(point.k, rel=1e-8)
+    assert first["velocity_uncertainty"] == pytest.approx(point.velocity_uncertainty, rel=1e-4)
 
 
 def test_a_dense_liquid_starts_at_just_its_starting_pressure(
-    calibration: Calibration, verdicts: LiquidVerdicts
+    calibration: Calibration, liquids: dict[str, dict[str, Any]]
 ) -> None:
     gallium = liquid_at(name="gallium", temperature=303.15)
-    index = [liquid.name for liquid in verdicts.liquids].index("gallium")
-    start = float(verdicts.starting_pressure[index])
-    assert verdicts.at_scene.regime[index] == Regime.BLOCKED
+    start = liquids["gallium"]["starting_pressure_Pa"]
+    assert not liquids["gallium"]["starts_at_scene_pressure"]
+    equal = calibration.scene.gas.pressure * gallium.density / calibration.scene.liquid.density
+    assert liquids["gallium"]["gas_pressure_Pa"] == pytest.approx(equal)
     for factor, flows in ((0.999, False), (1.001, True)):
         gas = replace(calibration.scene.gas, pressure=factor * start)
         asked = with_scene(calibration, replace(calibration.scene, gas=gas))
-        found = LiquidVerdicts.of(calibration=asked, liquids=[gallium])
-        assert bool(found.at_scene.regime[1] != Regime.BLOCKED) is flows
+        assert liquids_in_tube(asked, [gallium])[1]["starts_at_scene_pressure"] is flows
 
 
-def test_the_bore_for_fifty_has_fifty(calibration: Calibration, verdicts: LiquidVerdicts) -> None:
-    index = [liquid.name for liquid in verdicts.liquids].index("silicone oil 50 cSt")
-    tube = replace(calibration.scene.tube, bore=float(verdicts.bore_for_paper[index]))
-    asked = with_scene(calibration, replace(calibration.scene, tube=tube))
-    found = LiquidVerdicts.of(calibration=asked, liquids=[verdicts.liquids[index]])
-    assert found.at_equal_head.k[1] == pytest.approx(50, rel=2e-3)
+def test_the_bore_for_fifty_has_fifty(calibration: Calibration, liquids: dict[str, dict[str, Any]]) -> None:
+    oil = liquid_at(name="silicone oil 50 cSt", temperature=298.15)
+    tube = replace(calibration.scene.tube, bore=liquids[oil.name]["bore_for_paper_m"])
+    # At equal head: the bore is for the same p/rho.
+    head = calibration.scene.gas.pressure / calibration.scene.liquid.density
+    gas = replace(calibration.scene.gas, pressure=head * oil.density)
+    asked = with_scene(calibration, replace(calibration.scene, tube=tube, gas=gas))
+    assert liquids_in_tube(asked, [oil])[1]["k"] == pytest.approx(50, rel=2e-3)

@@ -147,39 +147,3 @@ def test_the_quadrature_meets_the_series(table_1_scene: Scene, shaft: Shaft) -> 
             np.testing.assert_allclose(getattr(found, name), getattr(series, name), rtol=4e-3, atol=1e-8)
     assert np.all(errors[0] < 4e-3)
     assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.1)
-
-
-@pytest.mark.parametrize("shaft", ["horizontal", "vertical"])
-def test_an_open_ring_against_a_grid(table_1_scene: Scene, shaft: Shaft) -> None:
-    """Midpoints over angle or axis with radial plates of no thickness, the surface cut at the wall."""
-    scene, fill = turning(table_1_scene, 45.0, shaft, plates=0.0), 0.05
-    disc, delta, n = scene.disc, 9.80665 / 45.0**2, 4000
-    outer, alpha = disc.outer_radius, disc.central_angle / 2
-    middle = (2 * np.arange(n) + 1) / n - 1
-    depth = outer**2 - float(surface_radius(disc=disc, fill_ratio=fill)) ** 2
-    pressures, moments = [], []
-    for psi in 2 * np.pi * np.arange(48) / 48 if shaft == "horizontal" else (0.0,):
-        angle = alpha * middle - psi
-        rise = delta * disc.axial_width * middle
-        wall = (
-            outer**2 - rise
-            if shaft == "vertical"
-            else outer**2 + delta**2 + 2 * outer * delta * np.cos(angle)
-        )
-        low, high = 0.0, 2 * outer**2
-        for _ in range(60):
-            level = (low + high) / 2
-            surface = level + rise
-            if shaft == "horizontal":
-                surface = (np.sqrt(level - (delta * np.sin(angle)) ** 2) - delta * np.cos(angle)) ** 2
-            surface = np.clip(surface, 0.0, outer**2)
-            low, high = (level, high) if np.mean(outer**2 - surface) > depth else (low, level)
-        pressures.append(np.mean(np.maximum(wall - level, 0.0)))
-        cosine = np.cos(alpha * middle) if shaft == "horizontal" else np.sin(alpha) / alpha
-        moments.append(np.mean((outer**3 - surface**1.5) * cosine))
-    found = TiltedRing.of(scene, np.array([fill]))
-    assert not found.closed[0]
-    assert found.wall_pressure[0] == pytest.approx(1000 * 45.0**2 / 2 * np.mean(pressures), rel=1e-3)
-    assert found.moment[0] == pytest.approx(
-        1000 * disc.axial_width * 2 * alpha / 3 * np.mean(moments), rel=1e-4
-    )

@@ -12,7 +12,7 @@ from golden_pages import page_text
 from matplotlib.figure import Figure
 
 from ringbalance.reports.page import page_content, render, render_pages
-from ringbalance.reports.sections import sections_of
+from ringbalance.reports.sections import CASES_VIEW, sections_of, view_of
 
 
 @pytest.fixture
@@ -31,8 +31,9 @@ def said(request: pytest.FixtureRequest) -> Callable[[dict[str, Any], str], str]
     request.getfixturevalue("unwritten")
 
     def text(evidence: dict[str, Any], name: str) -> str:
-        views = {s.name: s.view(evidence) if s.name == name else None for s in sections_of(evidence)}
-        content = page_content(evidence, sections_by=lambda _: views)
+        views = dict.fromkeys(sections_of(evidence["balancer"]))
+        shown = {each: view_of(each, evidence) for each in (name, CASES_VIEW)}
+        content = page_content(evidence, views={**views, **shown})
         file = f"{content.context['sections'][0]['place']}.html"
         return page_text(render_pages(content, documents=(file,))[file])
 

@@ -48,9 +48,10 @@ def test_claims_judged_on_another_disc_are_distinguished(evidence: Record) -> No
     changed = copy.deepcopy(evidence)
     for case in changed["verification"]:
         case["scene_sha256"] = changed["scene"]["values_sha256"]
-    assert "judged on it, not on this one" not in summary.lead_sentence(changed)
+    assert summary.tallies(changed)["claims_elsewhere"] == 0
     marked = summary.claims(changed)[0]
     marked["scene_sha256"] = "0" * 64
     assert summary.elsewhere(marked, changed)
-    assert "1 of them" in summary.lead_sentence(changed)
+    assert summary.tallies(changed)["claims_elsewhere"] == 1
+    assert "1 of them hold for the paper’s own disc alone" in "".join(render(changed).values())
     assert "Judged on the paper’s disc" in render(changed)["annex.html"]

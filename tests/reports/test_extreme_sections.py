@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_the_fill_at_which_the_swing_doubles_is_found() -> None:
 
 
 def test_no_gravity_no_waves(vertical_scene: Scene) -> None:
-    work = Work(scene=vertical_scene, calibration=cast(Any, None), level="light")
+    work = Work(scene=vertical_scene, level="light")
     assert chamber.WAVES.collect(work) is None
     assert chamber.WAVES.view({}) is None
 

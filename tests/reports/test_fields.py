@@ -57,7 +57,7 @@ def test_the_file_holds_the_field(tmp_path: Path, paper_scene: Scene, field: Cha
 
 
 def test_the_mesh_is_reported(field: ChamberField) -> None:
-    record = field.record()
+    record = field.record
     assert record["unknowns"] == math.prod(2 * count + 1 for count in record["cells"])
     assert 0.5 < record["minimum_scaled_jacobian"] <= 1
     assert record["status"] == "solved"

@@ -8,10 +8,9 @@ from typing import Any
 
 import pytest
 
-from ringbalance.reports.judged import settings_rows, settings_text
+from ringbalance.reports.judged import settings_lines
+from ringbalance.reports.page import terminal_lines
 from ringbalance.reports.pages.first_page import SECTION, SETTINGS, requirement_record
-from ringbalance.reports.summary import judged_sentences
-from ringbalance.reports.traced import untraced
 from ringbalance.scene import Scene
 from ringbalance.scene.toml import read_toml
 
@@ -29,8 +28,8 @@ def recommended(evidence: Record) -> Record:
     """With other settings under which every drawn device settles."""
     own = evidence["summary"]["own"]
     every = {"value": 1.0, "low": 0.94, "high": 1.0, "count": 64, "of": 64}
-    demands = [{**each, "fraction": every, "verdict": "met"} for each in own["demands"]]
-    better = {**own, "fraction": every, "verdict": "met", "demands": demands}
+    required = [{**each, "fraction": every, "verdict": "met"} for each in own["required"]]
+    better = {**own, "fraction": every, "verdict": "met", "required": required}
     return {**evidence, "summary": {**evidence["summary"], "recommended": better}}
 
 
@@ -38,8 +37,9 @@ def test_the_fraction_of_devices_stands_first(evidence: Record, said: Said) -> N
     page = said(evidence, "summary")
     assert "107 of 128 drawn devices" in page
     assert "an ideal valve" in page
-    told = judged_sentences(recommended(evidence))
-    assert [sentence.rpartition(": ")[2] for sentence in told] == ["not met.", "met."]
+    lines = terminal_lines(recommended(evidence))
+    assert [line.rpartition(": ")[2] for line in lines[:2]] == ["not met.", "met."]
+    assert lines[0].startswith("With the scene’s settings 84 % of 128 drawn devices")
     assert "64 of 64 drawn devices" in said(recommended(evidence), "summary")
 
 
@@ -67,9 +67,8 @@ def test_the_gas_pressure_is_drawn_where_it_was_tried(evidence: Record) -> None:
     level = {
         "fraction": fraction,
         "verdict": "not met",
-        "half_s": [3.0, 3.1],
-        "most_s": None,
-        "usable_moment_kg_m": [7e-4, 9e-4, 1.1e-3],
+        "settling_time_s": {"p50": 3.0, "p90": None},
+        "usable_moment_kg_m": {"p10": 7e-4, "p50": 9e-4, "p90": 1.1e-3},
     }
     assert view(evidence)["pressure"] is None
     levels = [{**level, "value": pressure} for pressure in (5e5, 6e5, 7e5)]
@@ -80,7 +79,8 @@ def test_the_gas_pressure_is_drawn_where_it_was_tried(evidence: Record) -> None:
 
 
 def test_the_settings_are_a_block_of_the_scene_file(paper_scene: Scene) -> None:
-    block = read_toml(settings_text(settings_rows(paper_scene, SETTINGS)))
+    lines = [[f"[{each['table']}]", *each["lines"]] for each in settings_lines(paper_scene, SETTINGS)]
+    block = read_toml("\n".join(line for table in lines for line in table))
     assert block["gas"] == {"pressure": "0.7 MPa"}
     assert block["controller"]["proportional"] == "0.08 s/um"
     settings = {f"{table}.{key}": value for table, of in block.items() for key, value in of.items()}
@@ -88,18 +88,16 @@ def test_the_settings_are_a_block_of_the_scene_file(paper_scene: Scene) -> None:
 
 
 def test_a_chamber_that_runs_dry_is_a_warning(evidence: Record, said: Said) -> None:
-    assert view(evidence)["alerts"] == []
+    assert "chamber dry" not in said(evidence, "summary")
     evidence["closed_loop"]["calibrated"]["injections"][0]["event"] = "empty"
-    (warning,) = view(evidence)["alerts"]
-    assert warning.startswith("1 injection runs its chamber dry (A)")
+    assert "One injection runs its chamber dry (A)" in said(evidence, "summary")
     evidence["closed_loop"]["calibrated"]["gas"] = {
         "warning": "3 injections ran their chamber dry: up to 2 normal litres",
         "normal_litres": 12.3,
         "compression_energy_J": 1234.0,
         "injections_run_dry": 3,
     }
-    found = view(evidence)
-    assert "up to 2 normal litres" in found["alerts"][0]
+    assert "up to 2 normal litres." in said(evidence, "summary")
     page = said(evidence, "loop")
     assert "Gas consumed, normal litres | 12 |" in page
     assert "Injections that run a chamber dry | 3 |" in page
@@ -119,40 +117,47 @@ def test_what_rests_on_assumptions_says_so(evidence: Record) -> None:
     assert "assumed: bore" in view(evidence)["rests_on"]["settling_time"]
 
 
-def test_the_inputs_that_decide_most_come_first(evidence: Record) -> None:
+def test_the_inputs_that_decide_most_come_first(evidence: Record, said: Said) -> None:
     rows = [("tube.bore", 0.3, False), ("", 0.2, True), ("rotor.lag_angle", 0.02, False)]
     evidence["summary"]["ranking"] = [
-        {"path": path, "name": "model: loss", "index": index, "noise": 0.05, "common": common}
+        {
+            "path": path,
+            "name": "model: loss",
+            "index": index,
+            "noise": 0.05,
+            "common": common,
+            "outcome": "settling_time",
+        }
         for path, index, common in rows
     ]
-    first, second = map(untraced, view(evidence)["dominant"])
-    assert first == "Bore of the tube (assumed): 30\u202f%, varies between devices"
-    assert second == "Loss: 20\u202f%, merely not known"
+    text = said(evidence, "summary")
+    first, second = "Bore of the tube (assumed): 30 %, varies between devices", "Loss: 20 %, merely not known"
+    assert f"how fast a device settles. {first}. {second}." in text
 
 
-def test_the_bore_and_the_other_reading_are_named(evidence: Record) -> None:
-    assert "bore of 1.5\u202fmm" in view(evidence)["rests"][0]
+def test_the_bore_and_the_other_reading_are_named(evidence: Record, said: Said) -> None:
+    assert "The bore of 1.5 mm, on which" in said(evidence, "summary")
     evidence["summary"]["other_reading"] = {
         "bore_m": 0.896e-3,
         "k": 5.7,
         "fraction": {"value": 0.98},
     }
-    told = untraced(view(evidence)["rests"][0])
-    assert "assumes 1.5\u202fmm" in told
-    assert "0.896\u202fmm" in told
-    assert "98\u202f% of the devices settle" in told
+    text = said(evidence, "summary")
+    assert "assumes 1.5 mm" in text
+    assert "0.896 mm" in text
+    assert "98 % of the devices settle" in text
     evidence["summary"].update(other_reading=None, bore_uncertainty_stated=True)
-    assert "bore" not in " ".join(view(evidence)["rests"])
+    assert "on which k and every velocity rest" not in said(evidence, "summary")
 
 
-def test_what_the_scene_leaves_to_the_paper_s_rotor_is_named(evidence: Record) -> None:
-    assert not any("paper’s rotor" in text for text in view(evidence)["rests"])
+def test_what_the_scene_leaves_to_the_paper_s_rotor_is_named(evidence: Record, said: Said) -> None:
+    assert "so those of the paper’s rotor" not in said(evidence, "summary")
     evidence["scene"]["origins"]["rotor.influence_coefficient"] = "default"
-    told = view(evidence)["rests"][-1]
-    assert told.startswith("Not in the scene, so those of the paper’s rotor: influence coefficient.")
+    named = "Not in the scene, so those of the paper’s rotor: influence coefficient."
+    assert named in said(evidence, "summary")
 
 
-def test_a_scene_without_uncertainties_says_so(evidence: Record) -> None:
-    assert not any("states no uncertainty" in text for text in view(evidence)["rests"])
+def test_a_scene_without_uncertainties_says_so(evidence: Record, said: Said) -> None:
+    assert "states no uncertainty" not in said(evidence, "summary")
     evidence["scene"]["states_uncertainty"] = False
-    assert any("states no uncertainty" in text for text in view(evidence)["rests"])
+    assert "states no uncertainty" in said(evidence, "summary")

@@ -11,7 +11,7 @@ import pyvista
 from block_discs import imported
 
 from ringbalance.mesh.geometry import chamber_volume
-from ringbalance.reports.pictures.fields import ImportedField, shown_field
+from ringbalance.reports.pictures.fields import ChamberField, chamber_field
 from ringbalance.scene.models import Scene
 
 _FILL = 0.4
@@ -23,15 +23,11 @@ def scene(paper_scene: Scene) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def field(scene: Scene) -> ImportedField:
-    found = shown_field(scene, fill_ratio=_FILL)
-    assert isinstance(found, ImportedField)
-    return found
+def field(scene: Scene) -> ChamberField:
+    return chamber_field(scene, fill_ratio=_FILL)
 
 
-def test_its_profile_is_the_exact_one_from_the_surface_to_the_wall(
-    scene: Scene, field: ImportedField
-) -> None:
+def test_its_profile_is_the_exact_one_from_the_surface_to_the_wall(scene: Scene, field: ChamberField) -> None:
     shown = field.pressure_profile(scene=scene)
     radius, scale = np.array(shown["radius_m"]), scene.liquid.density * scene.rotor.speed**2 / 2
     assert radius[[0, -1]] == pytest.approx([field.surface_radius, scene.disc.outer_radius], rel=1e-5)
@@ -43,7 +39,7 @@ def test_its_profile_is_the_exact_one_from_the_surface_to_the_wall(
     assert shown["pressure_Pa"] == pytest.approx(exact, abs=1e-3 * exact[-1])
 
 
-def test_its_file_holds_the_liquid(scene: Scene, field: ImportedField, tmp_path: Path) -> None:
+def test_its_file_holds_the_liquid(scene: Scene, field: ChamberField, tmp_path: Path) -> None:
     volume = _FILL * chamber_volume(disc=scene.disc)
     grid = pyvista.read(field.write(path=tmp_path / "field.vtu"))
     # VTK and drawings take straight edges for curved ones: 16 cells along 84 degrees, 1 % of the depth.

@@ -16,7 +16,6 @@ from PIL import Image
 
 from ringbalance.reports.figure import DARK, LIGHT
 from ringbalance.reports.page import render
-from ringbalance.reports.pictures.style import THEMES
 
 Record = dict[str, Any]
 VOID = {"meta", "link", "img", "br", "source", "col", "input", "hr"}
@@ -124,15 +123,14 @@ def pictures() -> tuple[Record, dict[str, bytes]]:
             "dark": f"{name}-dark.png",
             "width": 3,
             "height": 2,
-            "alt": "A disc.",
-            "caption": "The disc.",
         }
         for name in names
     ]
     png = io.BytesIO()
     Image.new("RGB", (3, 2)).save(png, format="PNG")
     contents = {f"{name}-{theme}.png": png.getvalue() for name in names for theme in ("light", "dark")}
-    return {"drawn": True, "text": "", "files": listed}, contents
+    shown = {"chambers": 4, "fill_ratio": 0.25, "largest_fill_ratio": 0.5, "crest_radius_m": 0.0315}
+    return {"drawn": True, "text": "", "files": listed, "shown": shown | {"speed_rad_s": 1047.2}}, contents
 
 
 @pytest.mark.usefixtures("unwritten")
@@ -141,7 +139,12 @@ def test_pictures_come_in_both_schemes_and_can_be_read_aloud(evidence: Record) -
     page = render(evidence, pictures=contents)["annex.html"]
     assert page.count('<source media="screen and (prefers-color-scheme: dark)"') == 2
     assert page.count("data:image/webp;base64,") == 4
-    assert all(attributes.get("alt") for tag, attributes in read(page).tags if tag == "img")
+    alts = [str(attributes.get("alt")) for tag, attributes in read(page).tags if tag == "img"]
+    assert "chambers A to D" in alts[0]
+    assert len(alts) == 2
+    assert "over its siphon crest at a radius of 31.5 mm" in words(page).replace("\u202f", " ")
+    evidence["pictures"]["shown"]["crest_radius_m"] = None
+    assert "drawn schematically, straight across" in words(render(evidence, pictures=contents)["annex.html"])
 
 
 @pytest.mark.parametrize("name", ["report.html", "annex.html"])
@@ -343,4 +346,4 @@ def test_lines_are_told_apart_by_every_eye(palette: dict[str, str], eyes: str) -
 
 
 def test_pictures_have_the_ground_of_the_page() -> None:
-    assert [theme.background for theme in THEMES] == [scheme["--bg"] for scheme in schemes()]
+    assert [colours["--fig-surface"] for colours in (LIGHT, DARK)] == [scheme["--bg"] for scheme in schemes()]

@@ -11,10 +11,9 @@ import pytest
 from PIL import Image
 
 from ringbalance.reports.cli import plot
-from ringbalance.reports.pictures.fields import tube_field
+from ringbalance.reports.pictures.draw import PICTURE, THEMES
 from ringbalance.reports.pictures.opengl import OpenGL, find_opengl
 from ringbalance.reports.pictures.process import start_drawing, write_fields
-from ringbalance.reports.pictures.style import PICTURE, THEMES
 from ringbalance.scene import Scene, bundled_scene
 
 NO_OPENGL = OpenGL(available=False, window="", text="The 3-D pictures were left out: no OpenGL here.")
@@ -38,7 +37,7 @@ def pixels(path: Path) -> Any:
 def test_files_are_there_and_of_moderate_size(drawn: Path) -> None:
     names = {path.relative_to(drawn).as_posix() for path in drawn.rglob("*") if path.is_file()}
     assert names == {
-        *(f"figures/{name}-{theme.name}.png" for name in ("disc", "pressure", "tube") for theme in THEMES),
+        *(f"figures/{name}-{theme.name}.png" for name in ("disc", "pressure") for theme in THEMES),
         "fields/chamber_at_start.vtu",
         "fields/chamber_largest_fill.vtu",
     }
@@ -47,11 +46,11 @@ def test_files_are_there_and_of_moderate_size(drawn: Path) -> None:
 
 @needs_opengl
 @pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
-@pytest.mark.parametrize("name", ["disc", "pressure", "tube"])
+@pytest.mark.parametrize("name", ["disc", "pressure"])
 def test_a_picture_shows_something_on_the_ground_of_its_page(drawn: Path, name: str, theme: Any) -> None:
     image = pixels(drawn / "figures" / f"{name}-{theme.name}.png")
     assert image.shape == (PICTURE[1], PICTURE[0], 3)
-    ground = np.array([int(theme.background[i : i + 2], 16) for i in (1, 3, 5)])
+    ground = np.array([int(theme.ground[i : i + 2], 16) for i in (1, 3, 5)])
     assert (image[:20, :20] == ground).all()
     share = (np.abs(image - ground).sum(axis=2) > 12).mean()
     assert 0.15 < share < 0.8
@@ -84,16 +83,6 @@ def test_without_opengl_nothing_is_started(tmp_path: Path, paper_scene: Scene) -
     drawing.stop()
 
 
-def test_captions_follow_the_scene(tmp_path: Path, paper_scene: Scene) -> None:
-    plain = dataclasses.replace(paper_scene, tube=dataclasses.replace(paper_scene.tube, hump_radius=None))
-    for scene, said in ((paper_scene, "radius of 31.5\u202fmm"), (plain, "straight across")):
-        drawing = start_drawing(scene=scene, fields={}, folder=tmp_path, opengl=NO_OPENGL)
-        alt, caption = drawing.captions["disc"]
-        assert said in alt
-        assert said in caption
-        assert "A to D" in alt
-
-
 def test_plot_without_opengl_writes_the_fields(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -107,24 +96,3 @@ def test_plot_without_opengl_writes_the_fields(
 def test_fields_are_written_at_two_fills(tmp_path: Path, paper_scene: Scene) -> None:
     empty = dataclasses.replace(paper_scene, disc=dataclasses.replace(paper_scene.disc, initial_fill=0.0))
     assert set(write_fields(scene=empty, folder=tmp_path)) == {"pressure", "disc"}
-
-
-def test_the_tube_is_coloured_by_its_own_pressures(paper_scene: Scene) -> None:
-    field = tube_field(paper_scene)
-    assert field is not None
-    points, pressure = np.array(field["points"]), np.array(field["pressure"])
-    radius = np.hypot(points[:, 0], points[:, 1])
-    assert radius[0] == pytest.approx(paper_scene.tube.port_radius)
-    assert radius[field["hump"]] == pytest.approx(paper_scene.tube.hump_radius)
-    np.testing.assert_allclose(points[0, :2], -points[-1, :2], atol=1e-12)
-    assert np.all(np.linalg.norm(np.diff(points, axis=0), axis=1) > 0)
-    # The tube follows the circle of the crest, with friction: the lowest pressure begins where the arc ends.
-    arc_end = np.flatnonzero(np.isclose(radius, radius.min()))[-1]
-    assert pressure[field["hump"]] > pressure[arc_end]
-    assert pressure[arc_end] == pytest.approx(pressure.min(), abs=0.01 * np.ptp(pressure))
-    assert not all(field["full"])
-
-
-def test_a_straight_tube_has_no_such_picture(paper_scene: Scene) -> None:
-    plain = dataclasses.replace(paper_scene, tube=dataclasses.replace(paper_scene.tube, hump_radius=None))
-    assert tube_field(plain) is None

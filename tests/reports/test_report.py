@@ -20,13 +20,12 @@ from ringbalance.reports import cli
 from ringbalance.reports import evidence as evidence_module
 from ringbalance.reports import report as report_module
 from ringbalance.reports import saved as saved_module
-from ringbalance.reports.page import case_views, render
+from ringbalance.reports.page import render
 from ringbalance.reports.pages import consequences, first_page
-from ringbalance.reports.pages.standing import evidence_text
 from ringbalance.reports.pictures.opengl import OpenGL
 from ringbalance.reports.report import Report, write_report
 from ringbalance.reports.saved import heavy_cases
-from ringbalance.reports.sections import section_views
+from ringbalance.reports.sections import CASES_VIEW, views_of
 from ringbalance.scene import Scene, SceneError, bundled_scene
 from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification.case import CaseDefinition
@@ -297,18 +296,9 @@ def test_a_broken_scene_writes_nothing(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_worker_makes_the_same_views_of_the_cases(first: Report) -> None:
-    cases = first.evidence["verification"]
+def test_a_worker_makes_the_same_views(first: Report) -> None:
+    path = first.page.parent / "evidence.json"
     with Workers(1) as pool:
-        views = report_module._Views(pool=pool)
-        views.begin_cases(cases)
-        assert views.of_cases([]) == case_views(cases) != {}
-
-
-def test_a_worker_makes_the_same_views_of_the_annex(first: Report) -> None:
-    with Workers(1) as pool:
-        views = report_module._Views(pool=pool)
-        views.begin_annex(first.evidence, evidence_text(first.evidence))
-        assert set(views.sections) > {"trade", "inside"}
-        views.sections["disc"].result()
-        assert views.of_sections(first.evidence) == section_views(first.evidence)
+        views = report_module._views(path, first.evidence, pool)
+    assert set(views) > {"trade", "inside", CASES_VIEW}
+    assert views == views_of(first.evidence)

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+from ringbalance.reports.page import terminal_lines
 from ringbalance.reports.summary import (
     CHECK_VERDICTS,
     CLAIM_VERDICTS,
     checks,
     claims,
     common_causes,
-    lead_sentence,
     tone,
     verdict_counts,
 )
-from ringbalance.verification.evidence import VOCABULARY
+from ringbalance.verification.verdicts import VOCABULARY
 
 Record = dict[str, Any]
 
@@ -38,11 +38,13 @@ def test_counts_add_up(evidence: Record) -> None:
 
 
 def test_the_lead_is_counted(evidence: Record) -> None:
-    told = lead_sentence(evidence)
-    assert "Of 6 claims of the liquid-ring paper 1 is confirmed" in told
-    assert "2 are refuted" in told
+    *_, lead = terminal_lines(evidence)
+    assert (
+        "Of 6 claims of the liquid-ring paper 1 is confirmed, 1 is confirmed with correction, 2 are" in lead
+    )
+    assert "refuted, 1 is inconclusive and 1 is not run." in lead
     evidence["verification"][6]["verdict"] = "failed"
-    assert "1 checks of this program itself that were run, 0 passed." in lead_sentence(evidence)
+    assert "1 checks of this program itself that were run, 0 passed." in terminal_lines(evidence)[-1]
 
 
 def test_claims_stand_in_the_papers_order(evidence: Record) -> None:
@@ -63,4 +65,7 @@ def test_claims_are_grouped_by_what_they_have_in_common() -> None:
         claim(5, "not run", ""),
     ]
     more = [claim(number, "refuted", "the settings") for number in (6, 7, 8)]
-    assert common_causes([*cases, *more]) == ["the settings: claims 6, 7, 8", "plates left out: claims 3, 4"]
+    assert common_causes([*cases, *more]) == [
+        {"cause": "the settings", "numbers": [6, 7, 8]},
+        {"cause": "plates left out", "numbers": [3, 4]},
+    ]

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from check_traces import SAME, agrees, apart, printed, traces
 
-from ringbalance.reports.traced import evidence_at, marked_up, read, traced, untraced
+from ringbalance.reports.traced import evidence_at, known_width, marked, marked_up, placed
+from ringbalance.reports.traced import printed as traced
 
 Record = dict[str, Any]
 
@@ -55,25 +56,15 @@ def test_two_values_of_one_quantity_are_found(evidence: Record) -> None:
     assert [held for held in apart(evidence) if "operating_point.velocity_m_s" in held]
 
 
-def test_a_trace_survives_a_sentence_and_markup_does_not() -> None:
-    told = f"At {traced('3 um', 'a.0.b')} & <b> the {traced('lambda', 'c')}."
-    assert untraced(told) == "At 3 um & <b> the lambda."
-    page = marked_up(told)
-    assert page == (
-        'At <span data-from="a.0.b">3 µm</span> &amp; &lt;b&gt; the <span data-from="c">λ</span>.'
-    )
+def test_a_number_is_printed_with_its_place_and_markup_is_not_obeyed() -> None:
+    value = placed({"a": [{"b_m": 2.5e-6}]})["a"][0]["b_m"]
+    assert traced(value, 1e-7) == '<span data-from="a.0.b_m">(2.50\u00a0±\u00a00.10)\u202fµm</span>'
+    assert marked("<3", value) == '<span data-from="a.0.b_m">&lt;3</span>'
+    assert marked_up("3 um & <b> lambda") == "3 µm & <b> λ"
 
 
-def test_reading_takes_the_unit_that_suits() -> None:
-    assert untraced(
-        read({"a": [{"b": 2.5e-6}]}, "a.0.b", "m", width=1e-7)
-    ) == "(2.50\u202f±\u202f0.10)\u202fµm".replace("\u202f±\u202f", "\u00a0±\u00a0")
-
-
-def test_a_number_is_not_finer_than_inputs_of_which_nothing_is_said(evidence: Record) -> None:
-    stated = {**evidence, "length_m": 0.123456}
-    bare = {**stated, "scene": {**evidence["scene"], "states_uncertainty": False}}
-    assert untraced(read(stated, "length_m", "m", width=1e-5)) == "(123.456\u00a0±\u00a00.010)\u202fmm"
-    assert untraced(read(bare, "length_m", "m", width=1e-5)) == "123.5\u202fmm"
-    wide = (untraced(read(each, "length_m", "m", width=1e-3)) for each in (bare, stated))
-    assert len(set(wide)) == 1
+def test_a_number_is_not_finer_than_inputs_of_which_nothing_is_said() -> None:
+    fine, wide = 1e-5, 1e-3
+    assert known_width(0.123456, fine, stated=True) == fine
+    assert known_width(0.123456, fine, stated=False) is None
+    assert known_width(0.123456, wide, stated=False) == wide

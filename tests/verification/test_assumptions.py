@@ -13,16 +13,9 @@ from ringbalance.scene.origins import InputUncertainty
 from ringbalance.verification.assumptions import assumptions_of
 from ringbalance.verification.case import CaseDefinition, RestsOn
 from ringbalance.verification.catalogue import case_code, load_case
-from ringbalance.verification.evidence import (
-    Evidence,
-    Found,
-    Level,
-    Metric,
-    Reference,
-    Verdict,
-    judge_quantity,
-)
+from ringbalance.verification.evidence import Evidence, Found, Level, Reference
 from ringbalance.verification.runner import run_definition
+from ringbalance.verification.verdicts import Metric, Verdict, judge_quantity
 
 BORE = RestsOn(path="tube.bore")
 

@@ -8,7 +8,7 @@ import pytest
 
 from ringbalance.verification.case import CaseDefinition, CaseError
 from ringbalance.verification.catalogue import load_cases
-from ringbalance.verification.evidence import Verdict
+from ringbalance.verification.verdicts import Verdict
 
 
 def test_a_whole_case_is_read(claim: CaseDefinition, verification: CaseDefinition) -> None:

@@ -21,10 +21,10 @@ from ringbalance.scene import liquid_at
 from ringbalance.scene.models import Scene
 from ringbalance.verification.case import placeholders
 from ringbalance.verification.catalogue import case_code, load_cases
-from ringbalance.verification.evidence import Verdict, combine, judge_quantity
 from ringbalance.verification.loops import calibration_of
 from ringbalance.verification.result import CaseResult
 from ringbalance.verification.runner import run_cases
+from ringbalance.verification.verdicts import Verdict, combine, judge_quantity
 
 FOLDER = Path(__file__).resolve().parents[2] / "verification" / "cases"
 CASES = {definition.id: definition for definition in load_cases()}

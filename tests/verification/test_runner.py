@@ -16,8 +16,9 @@ from ringbalance.scene.platform.processes import Workers
 from ringbalance.verification import runner
 from ringbalance.verification.assumptions import overridden
 from ringbalance.verification.case import CaseDefinition
-from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError, Verdict
+from ringbalance.verification.evidence import Evidence, Found, Level, NotRunError
 from ringbalance.verification.runner import run_case, run_cases, run_definition
+from ringbalance.verification.verdicts import Verdict
 
 QUICK = ("gci_celik2008", "claim_02_ring_radius", "claim_12_correction_mass")
 

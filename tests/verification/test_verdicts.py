@@ -4,16 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from ringbalance.verification.evidence import (
-    Found,
-    Kind,
-    Metric,
-    Reference,
-    Role,
-    Verdict,
-    combine,
-    judge_quantity,
-)
+from ringbalance.verification.evidence import Found, Reference
+from ringbalance.verification.verdicts import Kind, Metric, Role, Verdict, combine, judge_quantity
 
 
 def verdict(kind: Kind, metric: Metric, limit: float, found: Found, reference: Reference | None) -> Verdict:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-from scipy.integrate import quad
+from scipy.integrate import quad_vec
 from scipy.optimize import brentq, minimize_scalar
 
 from ringbalance.mesh.geometry import (
@@ -37,7 +37,6 @@ from ringbalance.verification.evidence import (
     Series,
     as_found,
     figure,
-    from_half_width,
 )
 
 _GRIDS: Final = ((30, 45, 4), (60, 90, 8))
@@ -94,9 +93,8 @@ def gas_hole(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     ring = float(surface_radius(disc=disc, fill_ratio=disc.max_fill_ratio))
     return Evidence(
         found={
-            f"margin_{state}": Found(
-                value=safe[state] - disc.max_fill_ratio,
-                numerical=from_half_width(abs(safe[state] - rough[state])),
+            f"margin_{state}": Found.within(
+                safe[state] - disc.max_fill_ratio, abs(safe[state] - rough[state])
             )
             for state in _JUDGED
         },
@@ -250,59 +248,37 @@ def _over_radius(scene: Scene, cells: _Cells) -> Series:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Exact:
-    """The sector between plates less a cylinder along x, by quadrature over y; no mesh."""
+def _outside(scene: Scene, radius: float, a: float) -> FloatArray:
+    """Of the sector between plates less a cylinder of a radius along x, outside a surface at a: volume, m^3,
+    moment along x, kg m, and lambda, twice the mean of x over the surface, m.
 
-    scene: Scene
-    radius: float
-    """Of the cylinder, m; 0 for the bare sector."""
+    By quadrature over y = radius sin(angle), which takes the root at the cylinder's sides away; no mesh.
+    """
+    disc, alpha = scene.disc, float(half_angle(disc=scene.disc, radius=a))
 
-    def _over_tube(self, inside: Callable[[float], float]) -> float:
-        if self.radius == 0:
-            return 0.0
-        width = 2 * self.radius
+    def tube(angle: float) -> FloatArray:
+        surface = math.sqrt(a * a - (radius * math.sin(angle)) ** 2)
+        parts = [_TIP - surface, (_TIP**2 - surface**2) / 2, a / surface, a]
+        return 2 * (radius * math.cos(angle)) ** 2 * np.array(parts) * (surface < _TIP)
 
-        def chord(angle: float) -> float:
-            # y = radius sin(angle) takes the root at the cylinder's sides away.
-            y = self.radius * math.sin(angle)
-            return width * math.cos(angle) * inside(y) * self.radius * math.cos(angle)
+    arc = 2 * a * np.array([alpha, a * math.sin(alpha)])
+    areas = [liquid_area(disc=disc, surface_radius=a), liquid_first_moment(disc=disc, surface_radius=a)]
+    sector = disc.axial_width * np.array([*areas, *arc])
+    volume, first, area, along = sector - quad_vec(tube, -math.pi / 2, math.pi / 2, epsrel=1e-12)[0]
+    return np.array([volume, scene.liquid.density * first, 2 * along / area])
 
-        return float(quad(chord, -math.pi / 2, math.pi / 2, epsrel=1e-12, epsabs=0, limit=400)[0])
 
-    def volume(self, a: float) -> float:
-        """Outside a surface, m^3."""
-        disc = self.scene.disc
-        tube = self._over_tube(lambda y: max(_TIP - math.sqrt(a * a - y * y), 0.0))
-        return disc.axial_width * float(liquid_area(disc=disc, surface_radius=a)) - tube
+def _exact(scene: Scene, radius: float, fills: FloatArray) -> dict[str, float]:
+    """Volume, lambda at equal fills, moment at the largest fill and at a deep one."""
+    inner, outer = scene.disc.inner_radius, scene.disc.outer_radius
+    volume = _outside(scene, radius, inner)[0]
 
-    def moment(self, a: float) -> float:
-        """Along x, kg m."""
-        disc = self.scene.disc
-        tube = self._over_tube(lambda y: max(_TIP**2 - (a * a - y * y), 0.0) / 2)
-        sector = disc.axial_width * float(liquid_first_moment(disc=disc, surface_radius=a))
-        return self.scene.liquid.density * (sector - tube)
+    def at(fill: float) -> FloatArray:
+        surface = brentq(lambda a: _outside(scene, radius, a)[0] - fill * volume, inner, outer, xtol=1e-14)
+        return _outside(scene, radius, surface)
 
-    def lever(self, a: float) -> float:
-        """lambda, twice the mean of x over the free surface, m."""
-        disc, alpha = self.scene.disc, float(half_angle(disc=self.scene.disc, radius=a))
-
-        def there(y: float) -> float:
-            return 1.0 if math.sqrt(a * a - y * y) < _TIP else 0.0
-
-        area = 2 * a * alpha * disc.axial_width
-        along = 2 * a * a * math.sin(alpha) * disc.axial_width
-        area -= self._over_tube(lambda y: there(y) * a / math.sqrt(a * a - y * y))
-        along -= self._over_tube(lambda y: there(y) * a)
-        return 2 * along / area
-
-    def surface(self, fill: float) -> float:
-        """Radius of the free surface at a fill ratio, m."""
-        disc = self.scene.disc
-        wanted = fill * self.volume(disc.inner_radius)
-        return float(
-            brentq(lambda a: self.volume(a) - wanted, disc.inner_radius, disc.outer_radius, xtol=1e-14)
-        )
+    half, full, deep = map(at, fills)
+    return {"volume": volume, "moment": full[1], "moment_deep": deep[1], "lever": half[2]}
 
 
 def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
@@ -324,13 +300,11 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         "moment_deep": (moment[2], shares.moment[2]),
         "lever": (ratio[0], shares.moment[0]),
     }
-    bare, exact = (_totals(_Exact(scene=scene, radius=radius), fills) for radius in (0.0, _RADIUS))
+    bare, exact = (_exact(scene, radius, fills) for radius in (0.0, _RADIUS))
     hole = gas_hole(with_tube, level).numbers
     return Evidence(
         found={
-            name: Found(
-                value=float(value), numerical=from_half_width((float(share) + 1e-8) * abs(float(value)))
-            ).against(exact[name])
+            name: Found.within(value, (share + 1e-8) * abs(value)).against(exact[name])
             for name, (value, share) in values.items()
         },
         numbers={
@@ -342,17 +316,6 @@ def gas_tube(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
             "safe_running": hole["safe_running"],
         },
     )
-
-
-def _totals(exact: _Exact, fills: FloatArray) -> dict[str, float]:
-    """At equal fills, the largest, and a deep one."""
-    half, full, deep = (exact.surface(float(fill)) for fill in fills)
-    return {
-        "volume": exact.volume(exact.scene.disc.inner_radius),
-        "moment": exact.moment(full),
-        "moment_deep": exact.moment(deep),
-        "lever": exact.lever(half),
-    }
 
 
 @lru_cache(maxsize=1)

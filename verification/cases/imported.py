@@ -32,7 +32,6 @@ from ringbalance.verification.evidence import (
     Found,
     Level,
     as_found,
-    from_half_width,
     order_figure,
     orders_found,
 )
@@ -74,10 +73,8 @@ def totals(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
     exact = exact_totals(scene)
     exact["lever"] = exact.pop("lambda")
     found = {name: _converged(row) for name, row in zip(("volume", "moment", "lever"), rows, strict=True)}
-    found["wall_pressure"] = Found(
-        value=float(ring.wall_pressure.value),
-        numerical=from_half_width(float(ring.wall_pressure.uncertainty)),
-        conclusive=ring.status.ok,
+    found["wall_pressure"] = Found.within(
+        ring.wall_pressure.value, ring.wall_pressure.uncertainty, conclusive=ring.status.ok
     )
     return Evidence(
         found={name: each.against(exact[name]) for name, each in found.items()},
@@ -96,8 +93,7 @@ def _by_walls(scene: Scene, record: ChamberGeometry) -> tuple[float, float, floa
 def _converged(values: FloatArray) -> Found:
     study = gci(values=values.tolist(), sizes=_SIZES, formal_order=_ORDER)
     # What a table of integrals is good to, besides.
-    width = study.uncertainty + 1e-8 * abs(float(values[0]))
-    return Found(value=float(values[0]), numerical=from_half_width(width))
+    return Found.within(values[0], study.uncertainty + 1e-8 * abs(values[0]))
 
 
 def pressure(scene: Scene, level: Level, defect: str | None = None) -> Evidence:

@@ -21,8 +21,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import quad
 
-from ringbalance.reduced_model.injection.dynamics import Column, Dynamics, Event
-from ringbalance.reduced_model.injection.pair import Motion, PairState, opened, pass_time
+from ringbalance.reduced_model.injection.dynamics import EVENTS, Dynamics, Event
+from ringbalance.reduced_model.injection.events import command
+from ringbalance.reduced_model.injection.pair import at_rest, fills_at
 from ringbalance.reduced_model.law.flow_law import Flow, FlowLaw
 from ringbalance.reduced_model.law.paper_law import PaperLaw, paper_law
 from ringbalance.reduced_model.paper import stall_pressure
@@ -38,7 +39,6 @@ from ringbalance.verification.evidence import (
     Series,
     as_found,
     figure,
-    from_half_width,
 )
 
 _SHARE: Final = 0.9
@@ -130,7 +130,8 @@ class _Operation:
     def marched(self, tube: Tube, time: FloatArray) -> tuple[FloatArray, float | None]:
         """Fills by the march that every run takes, the law alone at work, and when the flow ended, s."""
         dynamics = Dynamics(
-            column=Column.of(law=self.law, tube=tube),
+            law=self.law,
+            tube=tube,
             inertia=False,
             line=None,
             valve_lag=0.0,
@@ -141,12 +142,12 @@ class _Operation:
             chamber_volume=1.0,
             max_fill_ratio=self.law.max_fill_ratio,
         )
-        valve = opened(dynamics, chamber=0, duration=2 * float(time[-1]) + 1)
-        pair = PairState(
-            fill=self.fill, total=self.law.max_fill_ratio, primed=False, motion=Motion(pending=valve)
-        )
-        path = pass_time(dynamics, pair, instants=time)
-        return path.fills, path.ended if path.motion.record.event is not Event.NONE else None
+        plant = dynamics.plant(total=self.law.max_fill_ratio)
+        pair = at_rest(plant, fill=self.fill)
+        command(plant[0], pair[0], 0, 2 * float(time[-1]) + 1)
+        fills = fills_at(plant, pair, time)
+        flows = EVENTS[int(pair["event"][0])] is Event.NONE
+        return fills, None if flows else float(pair["ended"][0])
 
 
 def _moved(operation: _Operation, duration: float, count: int | None = None) -> float:
@@ -186,12 +187,11 @@ def segments(scene: Scene, level: Level, defect: str | None = None) -> Evidence:
         log=True,
     )
     return Evidence(
-        found={
-            "moved_fill": Found(value=limit, numerical=from_half_width(abs(limit - moved[-1]) / 2)).against(
-                exact
-            ),
-            **as_found(order=study.settled_order, finest_error=study.finest_error),
-        },
+        found=as_found(
+            moved_fill=Found.within(limit, abs(limit - moved[-1]) / 2).against(exact),
+            order=study.settled_order,
+            finest_error=study.finest_error,
+        ),
         numbers={
             "duration": duration,
             "moved": exact,

@@ -49,7 +49,7 @@ from ringbalance.verification.evidence import (
     order_figure,
     orders_found,
 )
-from ringbalance.verification.finite_elements import relative_rms
+from ringbalance.verification.finite_elements import relative_rms, slopes
 from ringbalance.verification.navier_stokes.flow import Coefficients, Dirichlet, FlowSystem
 from ringbalance.verification.navier_stokes.newton import Factors, FlowSolution, solve_flow
 from ringbalance.verification.navier_stokes.tube import (
@@ -164,24 +164,6 @@ def velocity(places: FloatArray) -> FloatArray:
     )
 
 
-def _gradient(places: FloatArray) -> FloatArray:
-    """d u_c / d x_d, shape (3, 2, ...)."""
-    y, z = places
-    growth, sine, cosine = np.exp(_B * z) / 5, np.sin(_A * y + 0.3), np.cos(_A * y + 0.3)
-    return np.stack(
-        [
-            np.stack([_A * _B * cosine * growth, _B**2 * sine * growth]),
-            np.stack([_A**2 * sine * growth, -_A * _B * cosine * growth]),
-            np.stack(
-                [
-                    -_C * np.sin(_C * y) * np.sin(_D * z + 0.4) / 2,
-                    _D * np.cos(_C * y) * np.cos(_D * z + 0.4) / 2,
-                ]
-            ),
-        ]
-    )
-
-
 def _laplacian(places: FloatArray) -> FloatArray:
     u, v, w = velocity(places)
     plane = _B**2 - _A**2
@@ -195,17 +177,10 @@ def pressure(places: FloatArray) -> FloatArray:
 
 def body_force(places: FloatArray) -> FloatArray:
     """The body force along (y, z, x) that makes this flow the solution."""
-    y, z = places
     u = velocity(places)
-    carried = np.einsum("d...,cd...->c...", u[:2], _gradient(places))
+    carried = np.einsum("d...,cd...->c...", u[:2], slopes(velocity, places))
     turning = np.einsum("cd,d...->c...", np.array(_TURNING), u)
-    slope = np.stack(
-        [
-            _E * np.cos(_E * y) * np.cos(_F * z + 0.2),
-            -_F * np.sin(_E * y) * np.sin(_F * z + 0.2),
-            np.zeros_like(y),
-        ]
-    )
+    slope = np.concatenate([slopes(pressure, places), np.zeros_like(places[:1])])
     return np.asarray(_TRUE.inertia * carried + turning - _TRUE.viscosity * _laplacian(places) + slope)
 
 

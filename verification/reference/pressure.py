@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +42,7 @@ from ringbalance.verification.evidence import (
     order_figure,
     orders_found,
 )
-from ringbalance.verification.finite_elements import field_error, mutated_force, refined_cells
+from ringbalance.verification.finite_elements import field_error, mutated_force, refined_cells, slopes
 
 _GAUSS_RING: Final = 60
 _TILT: Final = 0.1
@@ -261,27 +261,16 @@ class Manufactured:
     width: float
     """B, m."""
 
-    def _factors(self, places: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def pressure(self, places: Any) -> FloatArray:
+        """The chosen pressure, Pa, at places in m, shape (dimension, ...)."""
         x, y = places[0] / self.length, places[1] / self.length
         z = places[2] / self.width if len(places) == 3 else np.zeros_like(x)
-        return _SLOPES[0] * x + _SHIFTS[0], np.exp(_SLOPES[1] * y), _SLOPES[2] * z + _SHIFTS[1]
-
-    def pressure(self, places: FloatArray) -> FloatArray:
-        """The chosen pressure, Pa, at places in m, shape (dimension, ...)."""
-        wave, growth, axial = self._factors(places)
-        square = (places[0] ** 2 + places[1] ** 2) / (2 * self.length**2)
-        return np.asarray(_SCALE * (np.sin(wave) * growth * np.cos(axial) + square))
+        wave = np.sin(_SLOPES[0] * x + _SHIFTS[0]) * np.exp(_SLOPES[1] * y)
+        return np.asarray(_SCALE * (wave * np.cos(_SLOPES[2] * z + _SHIFTS[1]) + (x**2 + y**2) / 2))
 
     def gradient(self, places: FloatArray) -> FloatArray:
         """Its gradient, Pa/m, the shape of `places`."""
-        wave, growth, axial = self._factors(places)
-        a, b, c = _SLOPES
-        parts = [
-            a * np.cos(wave) * growth * np.cos(axial) + places[0] / self.length,
-            b * np.sin(wave) * growth * np.cos(axial) + places[1] / self.length,
-            -c * np.sin(wave) * growth * np.sin(axial) * (self.length / self.width),
-        ]
-        return np.asarray(np.stack(parts[: len(places)]) * _SCALE / self.length)
+        return slopes(self.pressure, places)
 
     def problem(self, defect: str | None = None) -> PressureProblem:
         """The right-hand sides that make this pressure the solution, with a deliberate error built in."""

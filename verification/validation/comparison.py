@@ -20,15 +20,8 @@ from ringbalance.identification.reading import KINDS, observations_of, read_obse
 from ringbalance.scene.arrays import BoolArray, FloatArray, IntArray, StringArray
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.models import Scene
-from ringbalance.verification.evidence import (
-    Curve,
-    Evidence,
-    Level,
-    Series,
-    Verdict,
-    as_found,
-    figure,
-)
+from ringbalance.verification.evidence import Curve, Evidence, Level, Series, as_found, figure
+from ringbalance.verification.verdicts import Verdict
 
 PROMISED: Final = 0.93
 """Fraction of the points that both 95 % uncertainties must hold: 0.95, less the chance of a small sample."""

@@ -1,4 +1,4 @@
-"""Reports of balancers without liquid: the second one's section in a ring's, and a third's plain one."""
+"""The plain report of a third balancer."""
 
 from __future__ import annotations
 
@@ -11,43 +11,13 @@ from ball_balancer.scene_keys import EXAMPLE
 from check_traces import traces, untrue
 from golden_pages import page_text
 
-from ringbalance.reports import summary
 from ringbalance.reports.cli import report
-from ringbalance.reports.pages import eccentric as driven
 from ringbalance.reports.report import write_report
 from ringbalance.scene.loader import scene_from
 from ringbalance.scene.registry import register
 
 Record = dict[str, Any]
 register("ball", scene="ball_balancer.scene_keys:KIND", balancer="ball_balancer.balancer:BallBalancer")
-
-
-def case(paper: str, verdict: str, number: int) -> Record:
-    return {
-        "id": f"{paper}_{number}",
-        "kind": "claim",
-        "paper": paper,
-        "number": number,
-        "title": "A claim",
-        "claim": "It is so.",
-        "verdict": verdict,
-        "quantities": [],
-    }
-
-
-def test_each_paper_has_its_own_claims_and_counts() -> None:
-    told = (
-        ("liquid_ring", "confirmed", 1),
-        ("eccentric_mass", "refuted", 2),
-        ("eccentric_mass", "confirmed", 1),
-    )
-    evidence = {"verification": [case(*each) for each in told]}
-    assert [c["number"] for c in summary.claims(evidence)] == [1]
-    assert [c["number"] for c in summary.claims(evidence, paper="eccentric_mass")] == [1, 2]
-    view = driven.SECOND_BALANCER.view(evidence)
-    assert view is not None
-    assert view["counts"] == ["1 is confirmed", "1 is refuted"]
-    assert driven.SECOND_BALANCER.view({"verification": []}) is None
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ import numpy as np
 from ringbalance.controller.balancer import Balancer, Draws, Outcomes, Settings
 from ringbalance.controller.judging.judge import FRESH
 from ringbalance.controller.judging.search import searched
-from ringbalance.controller.judging.tuning_rows import plain_settings, setting_text
+from ringbalance.controller.judging.tuning import plain_settings, setting_text
 from ringbalance.controller.rotor import (
     CommonRotor,
     Rotors,
@@ -147,7 +147,14 @@ class Side:
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Comparison(Result):
-    """Two balancers on one rotor."""
+    """Two balancers on one rotor.
+
+    Example:
+        >>> first, second = (rb.load_scene(rb.bundled_scene(n)) for n in ("liquid_ring_paper", "six_chamber"))
+        >>> comparison = rb.compare(first, second, rotor="first")
+        >>> [scene["name"] for scene in comparison.to_dict()["scenes"]]
+        ["Pan's liquid-ring disc", 'Six-chamber disc']
+    """
 
     rotor: CommonRotor
     """That of both scenes, or of the one that was named."""

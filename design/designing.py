@@ -59,7 +59,14 @@ class Effect:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Design(PresentedResult):
-    """A design and what it rests on."""
+    """A design and what it rests on.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("spindle_design"))
+        >>> design = rb.find_design(scene, workers=2)
+        >>> design.recommended_scene.tube.bore < 2e-3
+        True
+    """
 
     given: SceneFile
     space: Space

@@ -21,7 +21,7 @@ from ringbalance.design.store import Store
 from ringbalance.design.work import Done, Progress, answers, tasks_of
 from ringbalance.results.numbers import given
 from ringbalance.results.requirements import MET
-from ringbalance.results.result import Result, Rows, Table, csv_text
+from ringbalance.results.result import Result, Rows, Table, csv_text, extra
 from ringbalance.results.rows import Finding, Quantity, around
 from ringbalance.scene.faults import SceneError
 from ringbalance.scene.origins import SceneFile
@@ -44,12 +44,18 @@ _OF_RUNS: Final = {
     "settling_time_high": ("settling_time high", "s"),
 }
 """Columns of runs: name and SI unit."""
-_EXTRA: Final = "this needs the package {0}: pip install {0}, or ringbalance[sweep-tables] with all of them"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Sweep(Result):
-    """A row for every point."""
+    """A row for every point.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> table = rb.sweep(scene, {"tube.bore": [1e-3, 1.5e-3]})
+        >>> table.point_scene(table.best).tube.bore
+        0.001
+    """
 
     scene: SceneFile
     plan: Plan
@@ -138,7 +144,7 @@ class Sweep(Result):
 
     def to_pandas(self) -> Any:
         """`columns` as a DataFrame. Raises: ModuleNotFoundError: without pandas."""
-        return _extra("pandas", "pandas_frame")(self.columns())
+        return extra("pandas", "pandas_frame")(self.columns())
 
     def to_xarray(self) -> Any:
         """`columns` as a Dataset over the axes of a grid or the rows of a sample, with units as CF has them.
@@ -147,7 +153,7 @@ class Sweep(Result):
         """
         grids = self.grid()
         names, shape = list(grids), tuple(map(len, grids.values()))
-        array, dataset = _extra("xarray", "xarray_array"), _extra("xarray", "xarray_dataset")
+        array, dataset = extra("xarray", "xarray_array"), extra("xarray", "xarray_dataset")
         fields = self.fields()
         units = {name: {"units": unit} if unit else {} for name, unit, _ in fields}
         coords = {name: (name, _array(values), units[name]) for name, values in grids.items()}
@@ -186,7 +192,7 @@ class Sweep(Result):
             return {"row": list(range(len(self.points)))}
         return {axis.paths[0]: [point[axis.paths[0]] for point in axis.grid()] for axis in self.plan.axes}
 
-    def plot(self, folder: str | PathLike[str]) -> tuple[Path, ...]:
+    def plot(self, folder: str | PathLike[str]) -> tuple[Path, ...]:  # type: ignore[override]
         """Draw the map or curves of the sweep into a folder: feasible points, their boundary, the best.
 
         Returns: The files. Raises: OSError: they cannot be written.
@@ -275,13 +281,6 @@ def _array(values: Sequence[Any]) -> Any:
     if all(value is None or isinstance(value, int | float) for value in values):
         return np.array([math.nan if value is None else value for value in values])
     return np.array(values, dtype=object)
-
-
-def _extra(package: str, name: str) -> Any:
-    try:
-        return registered("function", name)
-    except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(_EXTRA.format(package)) from error
 
 
 def run_sweep(

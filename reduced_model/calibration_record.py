@@ -329,7 +329,16 @@ def _quantities(designs: Designs) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Calibration(PresentedResult):
-    """Everything that `calibrate` finds out about a scene's balancer."""
+    """Everything that `calibrate` finds out about a scene's balancer.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> calibration = rb.calibrate(scene)
+        >>> f"{calibration.operating_point.velocity:.1f} m/s"
+        '14.9 m/s'
+        >>> f"{calibration.to_dict()['lambda']['per_transferred_mass_m']:.4f} m"
+        '0.0734 m'
+    """
 
     scene: Scene
     chamber: ChamberCalibration

@@ -13,9 +13,9 @@ from ringbalance.controller.judging.judge import MOST_DRAWS, Judgement, judged_a
 from ringbalance.controller.judging.ranking import ranked
 from ringbalance.controller.judging.remedies import tried_choices, tried_remedies
 from ringbalance.controller.judging.search import searched
-from ringbalance.controller.judging.tuning import Tuning
-from ringbalance.controller.judging.tuning_rows import (
+from ringbalance.controller.judging.tuning import (
     LONGER,
+    Tuning,
     judgement_document,
     plain_settings,
     required_document,
@@ -116,7 +116,7 @@ def judgement_record(judgement: Judgement) -> Record:
             for each, demand in pairs
         ],
         "further_s": FURTHER,
-        "settled": _settled(judgement.outcomes),
+        "settled": settled_record(judgement.outcomes),
     }
 
 
@@ -124,7 +124,7 @@ def _watched(judgement: Judgement, further: float) -> Record:
     return {"further_s": further, "fraction": judgement.fraction.document(), "verdict": judgement.verdict}
 
 
-def _settled(outcomes: Outcomes) -> Record:
+def settled_record(outcomes: Outcomes) -> Record:
     """Fraction of the devices that has settled by a time, with its bounds."""
     times = np.sort(outcomes.settling_time[outcomes.settled])
     counts = np.unique(np.linspace(1, times.size, _POINTS).round()) if times.size else np.zeros(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from html import escape
 from io import StringIO
 from itertools import islice
+from os import PathLike
 from typing import Any, Final, Literal, Protocol
 
 from rich.box import SIMPLE_HEAD
@@ -22,6 +24,7 @@ from ringbalance.results.rows import Finding, Quantity
 from ringbalance.scene.origins import summary_text
 from ringbalance.scene.platform.display import display
 from ringbalance.scene.platform.terminal import results_console
+from ringbalance.scene.registry import registered
 
 Cells = Sequence[str]
 Facts = Sequence[tuple[str, str]]
@@ -34,6 +37,8 @@ _MAIN: Final = 3
 """Quantities in a short text."""
 _MOST: Final = 10
 """In a notebook."""
+_COLUMNS: Final = ("name", "symbol", "value", "lower", "upper", "unit", "origin", "status")
+_EXTRA: Final = "this needs the package {0}: pip install {0}, or ringbalance[sweep-tables] with all of them"
 _NUMBER: Final = re.compile(r"(?:<[^>]*>)*[(+−-]?\d")
 """A text that begins like a number, behind tags."""
 
@@ -229,6 +234,14 @@ def print_rows(rows: Rows, *, headline: bool = True) -> None:
         console.print(rows.view(headline=headline))
 
 
+def extra(package: str, name: str) -> Any:
+    """A registered function of a package that need not be there. Raises: ModuleNotFoundError: it is not."""
+    try:
+        return registered("function", name)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(_EXTRA.format(package)) from error
+
+
 class Result:
     """Base of what the commands, and the functions of the same names, answer with."""
 
@@ -247,6 +260,43 @@ class Result:
     def _repr_html_(self) -> str:
         """For a notebook."""
         return self.rows().html()
+
+    def plot(self, path: str | PathLike[str] | None = None) -> Any:
+        """Draw the result in the report's style.
+
+        Args: `path`: an SVG file to write; None: none.
+        Returns: Figures that a notebook shows; `svg()` has them as text.
+        Raises: TypeError: there is nothing to draw of such a result. OSError: the file cannot be written.
+        """
+        figures = registered("function", "figures_of_result")(self)
+        if path is not None:
+            figures.save(path)
+        return figures
+
+    def to_pandas(self) -> Any:
+        """The quantities as a DataFrame by key, a line each; SI, the unit in its column.
+
+        Raises: ModuleNotFoundError: without pandas.
+        """
+        documents = [each.document() for each in self.rows().quantities]
+        columns = {name: [each[name] for each in documents] for name in _COLUMNS}
+        return extra("pandas", "pandas_frame")(columns, index=[each["key"] for each in documents])
+
+    def to_xarray(self) -> Any:
+        """The quantities as a Dataset, with names, units and ends of the 95 % interval as CF has attributes.
+
+        Raises: ModuleNotFoundError: without xarray.
+        """
+        array, dataset = extra("xarray", "xarray_array"), extra("xarray", "xarray_dataset")
+        names = {"name": "long_name", "unit": "units", "lower": "lower", "upper": "upper"}
+        variables = {
+            each["key"]: array(
+                math.nan if each["value"] is None else each["value"],
+                attrs={names[key]: each[key] for key in names if each[key] is not None},
+            )
+            for each in (quantity.document() for quantity in self.rows().quantities)
+        }
+        return dataset(variables, attrs={"title": self.rows().title})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,9 +14,12 @@ from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib.resources import files
 from string import Formatter
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from ringbalance.results.numbers import MISSING, Width, given, percent, plain, shown
+from ringbalance.scene.uncertain import NORMAL_95
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +75,19 @@ class Quantity:
         if self.width is not None:
             return shown(self.value, self.unit, self.width)
         return given(self.value, self.unit, digits=self.digits)
+
+    def with_unit(self, make: Callable[[float | None, str], Made]) -> Made:
+        """The value with its unit, such as `with_unit(pint.UnitRegistry().Quantity)`."""
+        return make(self.value, self.unit)
+
+    def with_deviation(self, make: Callable[[float | None, float], Made]) -> Made:
+        """The value with its standard deviation, such as `with_deviation(uncertainties.ufloat)`.
+
+        That of a normal distribution with as wide a 95 % interval; zero where not both ends are known.
+        """
+        if self.lower is None or self.upper is None:
+            return make(self.value, 0.0)
+        return make(self.value, (self.upper - self.lower) / 2.0 / NORMAL_95)
 
     def document(self) -> dict[str, Any]:
         """For JSON."""

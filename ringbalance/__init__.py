@@ -1,6 +1,8 @@
 """ringbalance: are the closed formulas of a liquid-ring balancer to be trusted, for your disc?
 
-The names below are loaded when they are first used, so that `import ringbalance` costs nothing.
+Begin with `load_scene`, `calibrate` and `simulate`; then `tune`, `fit`, `compare`, `sweep`, `find_design`,
+`trade`, `extremes`, `plot` and `write_report`. `help(ringbalance.calibrate)` has what it takes and gives, and
+an example. The names are loaded when they are first used, so that `import ringbalance` costs nothing.
 docs/python.md shows them at work.
 """
 
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
     from ringbalance.controller.eccentric_mass.run_record import EccentricRun as EccentricRun
     from ringbalance.controller.eccentric_mass.scene_records import EccentricScene as EccentricScene
     from ringbalance.controller.judging.tuning import Tuning as Tuning
+    from ringbalance.controller.liquid_ring.linear_loop import LinearLoop as LinearLoop
+    from ringbalance.controller.liquid_ring.linear_loop import linear_loop as linear_loop
     from ringbalance.controller.rotor import Sensor as Sensor
     from ringbalance.controller.simulation import Simulation as Simulation
     from ringbalance.design.designing import Design as Design
@@ -32,6 +36,8 @@ if TYPE_CHECKING:
     from ringbalance.face import compare as compare
     from ringbalance.face import simulate as simulate
     from ringbalance.face import tune as tune
+    from ringbalance.identification.influence import InfluenceTable as InfluenceTable
+    from ringbalance.identification.influence import read_influence as read_influence
     from ringbalance.reduced_model.calibration_record import Calibration as Calibration
     from ringbalance.reduced_model.law.files import load_law as load_law
     from ringbalance.reduced_model.law.flow_law import CompleteLaw as CompleteLaw
@@ -71,7 +77,9 @@ register_function("with_values", place="ringbalance.scene.changes:with_values")
 register_function("sobol", place="ringbalance.design.sobol:sobol")
 register_function("run_row", place="ringbalance.design.runs:run_row")
 register_function("left_out", place="ringbalance.design.trade:left_out")
+register_function("figures_of_result", place="ringbalance.reports.result_figures:figures_of_result")
 register_function("sweep_figures", place="ringbalance.reports.sweep_figures:sweep_figures")
+register_function("control_state_space", place="control:StateSpace")
 register_function("pandas_frame", place="pandas:DataFrame")
 register_function("xarray_array", place="xarray:DataArray")
 register_function("xarray_dataset", place="xarray:Dataset")
@@ -91,6 +99,7 @@ _NAMES = {
     "controller.compare": ("Comparison",),
     "controller.eccentric_mass.run_record": ("EccentricRun",),
     "controller.eccentric_mass.scene_records": ("EccentricScene",),
+    "controller.liquid_ring.linear_loop": ("LinearLoop", "linear_loop"),
     "controller.rotor": ("Sensor",),
     "controller.simulation": ("Simulation",),
     "controller.judging.tuning": ("Tuning",),
@@ -102,6 +111,7 @@ _NAMES = {
         "simulate",
         "tune",
     ),
+    "identification.influence": ("InfluenceTable", "read_influence"),
     "reduced_model.calibration_record": ("Calibration",),
     "reduced_model.law.files": ("load_law",),
     "reduced_model.law.flow_law": (

@@ -46,6 +46,12 @@ def sweep(
         are kept, and from which an interrupted sweep goes on. `progress`: called with how far it is.
     Raises: SceneError: a scene or an axis that cannot be used; a point that is refused is a row with its
         finding.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> table = rb.sweep(scene, {"tube.bore": [1e-3, 1.5e-3], "gas.pressure": "0.6MPa:0.8MPa:3"})
+        >>> len(table.points)
+        6
     """
     scene = checked_scene(scene)
     return run_sweep(
@@ -75,6 +81,12 @@ def find_design(
     Returns: The design, judged on drawn devices as `tune` judges; where none meets what is required, that
         which comes nearest, and what stands against it.
     Raises: SceneError: a scene that cannot be used, or that leaves nothing to choose.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("spindle_design"))
+        >>> design = rb.find_design(scene, workers=2)
+        >>> design.judgement.verdict
+        'met'
     """
     return run_design(
         checked_scene(scene),
@@ -95,6 +107,12 @@ def objective(scene: AnyScene, changes: Mapping[str, Any], *, runs: int = 0) -> 
         scene requires, its bounds `low` and `high` (95 %), and `settling_time`. `status` is "ok", "blocked"
         (no flow) or "point_refused", `verdict` with runs "met", "not met" or "undecided", `finding` says why
         there is no answer. A refused change raises nothing, so that a search goes on.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> answer = rb.objective(scene, {"tube.bore": "1.2 mm"})
+        >>> answer["status"], answer["velocity"] > 10
+        ('ok', True)
     """
     scene = checked_scene(scene)
     (row,) = static_rows(scene, [dict(changes)], intervals=False)

@@ -89,6 +89,12 @@ def simulate(
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a law, an algorithm, a sensor or terms for eccentric masses; terms that the scene or
         the law gives no numbers for.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> run = rb.simulate(scene)
+        >>> run.settled
+        True
     """
     balancer = balancer_of(
         checked_scene(scene), flow_law=flow_law, controller=controller, sensor=sensor, modelled=modelled
@@ -104,6 +110,12 @@ def compare(
 
     Args: `rotor`: the scene whose rotor, vibration sensor and limit hold for both; default that of both.
     Raises: SceneError: the scenes describe two rotors and none is named, or a balancer cannot work on it.
+
+    Example:
+        >>> first, second = (rb.load_scene(rb.bundled_scene(n)) for n in ("liquid_ring_paper", "six_chamber"))
+        >>> comparison = rb.compare(first, second, rotor="first")
+        >>> len(comparison.to_dict()["scenes"])
+        2
     """
     one, other = (balancer_of(checked_scene(scene)) for scene in (first, second))
     return run_comparison(one, other, rotor=rotor)
@@ -125,6 +137,12 @@ def tune(
         with what is being done.
     Raises: SceneError: a rotor too slow for the liquid to form a ring.
     Raises: ValueError: a flow law for eccentric masses.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> tuning = rb.tune(scene)
+        >>> sorted(tuning.recommended.settings)
+        ['controller.gas_time_offset', 'controller.integral_time', 'controller.proportional', 'gas.pressure']
     """
     balancer = balancer_of(checked_scene(scene), flow_law=flow_law)
     return tuned(balancer, along=pressure, remedies=remedies, progress=progress)

@@ -35,7 +35,17 @@ Level = Literal["light", "heavy"]
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Fit(Result):
-    """A fit with the tests of its residuals and the measurement that would help most."""
+    """A fit with the tests of its residuals and the measurement that would help most.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> data = rb.bundled_scene("liquid_ring_paper").parent / "measurements" / "trial_weight.csv"
+        >>> print(rb.fit(scene, data))
+        Pan's liquid-ring disc (liquid_ring_paper.toml), fitted to 7 measurements
+          influence_coefficient (0.011226 ± 0.000060) um/(g mm)
+          lag_angle (19.25 ± 0.31)°
+          nothing in the residuals speaks against the fit (4 tests, 5 % level)
+    """
 
     result: FitResult
     data: tuple[Observations, ...]
@@ -75,6 +85,12 @@ def fit(
         that the kinds of data inform. `loss`: "soft_l1" counts outliers less. `next`: the parameter for which
         to find the next measurement; default the one that the data identify least.
     Raises: SceneError: a scene, a file or a parameter that cannot be used.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> data = rb.bundled_scene("liquid_ring_paper").parent / "measurements" / "trial_weight.csv"
+        >>> [parameter.name for parameter in rb.fit(scene, data).parameters]
+        ['influence_coefficient', 'lag_angle']
     """
     scene = checked_scene(scene)
     files = [data] if isinstance(data, str | PathLike) else data
@@ -101,6 +117,12 @@ def trade(
 
     Args: `level`: "light" leaves out the meshes in three dimensions. `progress`: called with each title.
     Raises: SceneError: a scene that cannot be used.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> study = rb.trade(scene, level="light")
+        >>> len(study.to_dict()["models_used"]) > 10
+        True
     """
     return trade_study(liquid_ring_scene(checked_scene(scene)), level=level, progress=progress)
 
@@ -117,6 +139,12 @@ def extremes(
     Args: `level`: "heavy" judges thousands of points. `workers`: processes. `progress`: called with what is
         being done, the points done and their number.
     Raises: SceneError: a scene that cannot be used, or whose chamber is imported.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> study = rb.extremes(scene)
+        >>> study.to_dict()["violations"]
+        []
     """
     given = liquid_ring_scene(checked_scene(scene))
     return find_extremes(given, size=SIZES[level], workers=workers, progress=progress)
@@ -128,6 +156,12 @@ def plot(scene: AnyScene, out: str | PathLike[str]) -> tuple[Path, ...]:
     Without OpenGL the fields alone are written, with a warning.
     Returns: The files.
     Raises: SceneError: a scene that cannot be used. OSError: the folder cannot be written.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> files = rb.plot(scene, "pictures")
+        >>> ".vtu" in {path.suffix for path in files}
+        True
     """
     pictures = draw_pictures(liquid_ring_scene(checked_scene(scene)), Path(out))
     if not pictures["drawn"]:
@@ -150,6 +184,12 @@ def write_report(
         `progress`: called with what is being done.
     Raises: SceneError: a scene that cannot be used; nothing is written.
     Raises: OSError: the folder cannot be written.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> report = rb.write_report(scene, "out")
+        >>> report.page.name
+        'report.html'
     """
     scene = checked_scene(scene)
     return write_scene_report(
@@ -176,6 +216,12 @@ def run_cases(
     Args: `level`: "light" leaves heavy cases `not run`. `mutations`: also with each case's mutations.
         `workers`: processes, this one included. `progress`: called with each result, in order.
     Raises: KeyError: an unknown case. SceneError: a balancer without liquid.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> (case,) = rb.run_cases(["claim_01_volume"], scene=scene)
+        >>> case.verdict.value
+        'confirmed'
     """
     return run_scene_cases(
         case_ids,

@@ -16,6 +16,7 @@ from typing import Any, Final
 
 from ringbalance.scene.chamber_file.record import ChamberGeometry
 from ringbalance.scene.faults import Fault, SceneError
+from ringbalance.scene.foreign import plain_number
 from ringbalance.scene.keys.declaration import Entries, Key
 from ringbalance.scene.keys.fields import Reader
 from ringbalance.scene.keys.schema import ORIGIN, Schema
@@ -24,6 +25,7 @@ from ringbalance.scene.loader import CHANGED, nameless_scene, scene_of
 from ringbalance.scene.narrowing import AnyScene, Kind, scene_as
 from ringbalance.scene.origins import KEY_OF_FIELD, CheckedValues, Origin, SceneFile
 from ringbalance.scene.toml import toml_bytes, toml_text
+from ringbalance.scene.uncertain import NORMAL_95
 from ringbalance.scene.units import DIMENSIONS
 
 _OF_MESH: Final = ("disc", "accuracy.tolerance")
@@ -214,7 +216,11 @@ def _place(document: dict[str, Any], path: str, value: object, *, schema: Schema
         takes = (
             schema.tables[path].keys if path in schema.tables else keys[name].takes if name in keys else None
         )
+        value, deviation = _plain(value, takes)
         content[name] = _written(value, takes)
+        if deviation:
+            width = _written(NORMAL_95 * deviation, takes)
+            _place(document, f"uncertainty.{name}", width, schema=schema, origin=origin)
     if steps and ORIGIN not in (name, *steps[1:]):
         _note_origin(document[steps[0]], (*steps[1:], name)[0], None if value is None else origin)
 
@@ -239,6 +245,19 @@ def _note_origin(table: dict[str, Any], key: str, origin: Origin | None) -> None
         table[ORIGIN] = stated
 
 
+def _plain(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> tuple[Any, float]:
+    """A number in SI with its standard deviation; a quantity that no key takes as text, for its error."""
+    unit = _si_unit(takes.dimension) if isinstance(takes, Reader) and takes.dimension else ""
+    try:
+        return plain_number(value, unit)
+    except ValueError:
+        return str(value), 0.0
+
+
+def _si_unit(dimension: str) -> str:
+    return next(iter(DIMENSIONS[dimension].units))
+
+
 def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> Any:
     """A value as a scene file would have it: a number for a quantity with a unit is one in SI."""
     value = value.tolist() if hasattr(value, "tolist") else value
@@ -250,4 +269,4 @@ def _written(value: Any, takes: Reader | Entries | Mapping[str, Key] | None) -> 
     dimension = takes.dimension if isinstance(takes, Reader) else None
     if dimension is None or isinstance(value, bool) or not isinstance(value, int | float):
         return value
-    return f"{value!r} {next(iter(DIMENSIONS[dimension].units))}"
+    return f"{value!r} {_si_unit(dimension)}"

@@ -50,6 +50,14 @@ class SceneError(Exception):
 
     Args: `faults`: one or more errors; the lines of the first fifty, and the number of the others, are the
         message.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> try:
+        ...     scene.with_values({"tube.bore": "80 mm"})
+        ... except rb.SceneError as error:
+        ...     [(fault.table, fault.key) for fault in error.faults]
+        [('tube', 'bore'), ('tube', 'bore')]
     """
 
     def __init__(self, faults: Iterable[Fault]) -> None:

@@ -368,7 +368,14 @@ class Gas:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Scene(SceneFile):
-    """All that a run needs, in SI units."""
+    """All that a run needs, in SI units.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> wider = scene.with_values({"tube.bore": "1.8 mm"})
+        >>> wider.tube.bore, wider.origin_of("tube.bore")
+        (0.0018, 'given')
+    """
 
     disc: Disc
     liquid: Liquid

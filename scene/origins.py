@@ -180,8 +180,9 @@ class SceneFile:
         """The scene with other values, checked as a file is checked, with hashes of its own.
 
         What follows from a changed value, such as a default, follows again.
-        Args: `values`: by path in a scene file, such as "tube.bore": text with a unit ("2 mm"), or a number
-            in SI; None takes a key away. `origin`: of all of them.
+        Args: `values`: by path in a scene file, such as "tube.bore": text with a unit ("2 mm"), a number in
+            SI, or a quantity of pint's; None takes a key away. A number of the package uncertainties also
+            states its expanded uncertainty (95 %) in [uncertainty]. `origin`: of all of them.
         Raises: SceneError: everything that is wrong with the result; or this record was itself changed in
             another way.
         """

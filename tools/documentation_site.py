@@ -28,6 +28,7 @@ def toctrees(page: str) -> str:
 def add_order(app: Sphinx, docname: str, source: list[str]) -> None:
     """Let Sphinx read the order of the pages where a reader does: in docs/README.md."""
     if docname == app.config.root_doc:
+        app.env.note_dependency(f"{LIST_OF_PAGES}.md")
         pages = Path(app.srcdir, f"{LIST_OF_PAGES}.md").read_text(encoding="utf-8")
         source[0] += f"\n```{{toctree}}\n:hidden:\n\n{LIST_OF_PAGES}\n```\n"
         source[0] += toctrees(pages.replace("](", "](docs/").replace("docs/../", ""))

@@ -18,6 +18,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import scene_reference
+from api_page import name_reference
 from drag_coefficient_doc import document_tables
 from typesetting import typeset
 
@@ -105,12 +106,13 @@ def equations() -> bytes:
 
 PARTS: Final[Mapping[str, Callable[[], Mapping[str, str]]]] = MappingProxyType(
     {
+        "docs/api.md": lambda: {"names": name_reference()},
         "docs/scene-file.md": scene_reference.tables,
         "docs/measurements.md": lambda: {"kinds": kind_table("")},
         "docs/fit.md": lambda: {"fit_kinds": kind_table("liquid_ring", "eccentric_mass")},
         "docs/findings.md": lambda: {"findings": finding_table()},
         "docs/is-k-50-right.md": document_tables,
-        "README.md": lambda: {"standing": standing_table(_documents())},
+        "docs/standing.md": lambda: {"standing": standing_table(_documents())},
     }
 )
 """Generated parts by page."""

@@ -56,7 +56,14 @@ _FLOW_SHARES: Final = (0.2, 0.4, 0.5, 0.6, 0.8)
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class TradeStudy(Result):
-    """Speed against accuracy of one scene."""
+    """Speed against accuracy of one scene.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> study = rb.trade(scene, level="light")
+        >>> sorted(study.to_dict()["quantities"][0])[:3]
+        ['models', 'points', 'quantity']
+    """
 
     scene: Scene
     quantities: tuple[Record, ...]

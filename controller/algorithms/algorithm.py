@@ -10,7 +10,16 @@ StateT = TypeVar("StateT")
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """One sample of the vibration; a sensor may deliver NaN, or no sample at all (None in its place)."""
+    """One sample of the vibration; a sensor may deliver NaN, or no sample at all (None in its place).
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> def exact(time, vibration):
+        ...     return rb.Measurement(time=time, amplitude=abs(vibration), phase=cmath.phase(vibration))
+        >>> sensor: rb.Sensor = exact
+        >>> rb.simulate(scene, sensor=sensor).settled
+        True
+    """
 
     time: float
     """s."""
@@ -24,7 +33,12 @@ class Measurement:
 
 @dataclass(frozen=True, kw_only=True)
 class ValveCommand:
-    """Gas into one chamber for a time; the valves of one command open together."""
+    """Gas into one chamber for a time; the valves of one command open together.
+
+    Example:
+        >>> rb.ValveCommand(chamber=2, duration=0.02).chamber
+        2
+    """
 
     chamber: int
     """Index of the driven chamber, A = 0."""
@@ -34,7 +48,13 @@ class ValveCommand:
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """What the algorithm wants done now."""
+    """What the algorithm wants done now.
+
+    Example:
+        >>> valve = rb.ValveCommand(chamber=0, duration=0.02)
+        >>> rb.Command(valves=(valve,)).valves[0].duration
+        0.02
+    """
 
     valves: tuple[ValveCommand, ...] = ()
     resting: bool = False
@@ -44,7 +64,22 @@ class Command:
 
 
 class Controller(Protocol[StateT]):
-    """A control algorithm: settings are its fields, everything that changes is in the state."""
+    """A control algorithm: settings are its fields, everything that changes is in the state.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> class Nothing:
+        ...     rises_tolerated = 3
+        ...
+        ...     def start(self):
+        ...         return None
+        ...
+        ...     def step(self, state, measurement):
+        ...         return state, rb.Command(resting=True)
+        >>> nothing: rb.Controller = Nothing()
+        >>> len(rb.simulate(scene, controller=nothing).injections)
+        0
+    """
 
     @property
     def rises_tolerated(self) -> int:

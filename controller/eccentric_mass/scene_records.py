@@ -193,7 +193,13 @@ class EccentricRequirement:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class EccentricScene(SceneFile):
-    """All that a run with two eccentric masses needs, in SI units."""
+    """All that a run with two eccentric masses needs, in SI units.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("driven_masses_small"))
+        >>> type(scene).__name__, round(scene.rotor.mass, 3)
+        ('EccentricScene', 5.0)
+    """
 
     rotor: EccentricRotor
     imbalance: Imbalance

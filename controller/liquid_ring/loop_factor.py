@@ -22,9 +22,8 @@ from typing import Any, Final
 import numpy as np
 
 from ringbalance.controller.algorithms.algorithm import Controller
-from ringbalance.controller.algorithms.built_in import TargetVector
-from ringbalance.controller.algorithms.by_name import controller_of
-from ringbalance.controller.algorithms.law_based import LawBased, fill_for_moment, split_change
+from ringbalance.controller.algorithms.built_in import BuiltIn, TargetVector
+from ringbalance.controller.algorithms.law_based import LawBased, controller_of, fill_for_moment, split_change
 from ringbalance.controller.loop_records import RUN, MomentTable
 from ringbalance.controller.rotor import chamber_directions
 from ringbalance.controller.terms import run_models
@@ -62,7 +61,7 @@ class LoopFactor:
         return self.fixed and self.value is not None and self.value >= self.limit
 
 
-def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any]) -> LoopFactor:
+def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any] | BuiltIn) -> LoopFactor:
     """The loop of a scene under a law and a controller.
 
     The law-based algorithm removes kappa/kappa' of a residual, kappa' its assumed influence coefficient, and
@@ -73,13 +72,14 @@ def loop_factor(scene: Scene, model: BalancerModel, controller: Controller[Any])
     error = 0.0
     value: float | None = None
     integral = derivative = 0.0
+    settings = scene.controller
     if isinstance(controller, TargetVector):
-        value = controller.proportional * rate
-        error = controller.lag_angle - scene.rotor.lag_angle
-        integral = scene.controller.period / (controller.integral_time or math.inf)
-        derivative = controller.derivative_time / scene.controller.period
+        value = settings.proportional * rate
+        error = settings.assumed_lag_angle - scene.rotor.lag_angle
+        integral = settings.period / (settings.integral_time or math.inf)
+        derivative = settings.derivative_time / settings.period
     if isinstance(controller, LawBased):
-        value = scene.rotor.influence_coefficient / abs(controller.influence)
+        value = scene.rotor.influence_coefficient / abs(settings.assumed_influence)
     deviation = _stationary_deviation(
         loop_factor=1.0 if value is None or isinstance(controller, LawBased) else value,
         noise=noise,
@@ -198,7 +198,7 @@ def _stationary_deviation(
     return noise * math.sqrt(max(float(variance.real), 0.0))
 
 
-_FREQUENCIES: Final = np.concatenate([np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi, 1600)])
+FREQUENCIES: Final = np.concatenate([np.geomspace(1e-5, 1e-2, 400), np.linspace(1e-2, math.pi, 1600)])
 """Angles of z on the unit circle, rad."""
 
 
@@ -231,7 +231,7 @@ def loop_margins(
     Source: Seiler, Packard and Gahinet, "An Introduction to Disk Margins", IEEE Control Systems Magazine 40
         (2020), with the balanced sensitivity (S - T)/2.
     """
-    z = np.exp(1j * _FREQUENCIES)
+    z = np.exp(1j * FREQUENCIES)
     shape = 1.0 + integral / 2.0 * (z + 1.0) / (z - 1.0) + derivative * (1.0 - 1.0 / z)
     loop = loop_factor * shape / (z - 1.0)
     disk = min(float(np.min(np.abs(2.0 * (1.0 + loop) / (1.0 - loop)))), 2.0)

@@ -160,6 +160,15 @@ def load_law(path: Path | str) -> CompleteLaw:
     Returns: The law, equal to the saved one bit for bit; it carries its moment, volumes and density.
     Raises: SceneError: a file that cannot be read or is no law; every fault names key, value and what is
         allowed.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> law = rb.calibrate(scene).flow_law
+        >>> path = law.save("law.json")
+        >>> again = rb.load_law(path)
+        >>> conditions = {"fill_ratio": 0.25, "gas_pressure": 0.7e6}
+        >>> again.evaluate(**conditions) == law.evaluate(**conditions)
+        True
     """
     file = Path(path)
     reader = _Reader(str(file))

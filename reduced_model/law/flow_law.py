@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ringbalance.scene.arrays import BoolArray, ComplexArray, FloatArray, IntArray, clipped
+from ringbalance.scene.foreign import plain_number
 from ringbalance.scene.origins import summary_text
 from ringbalance.scene.platform.files import write_whole
 
@@ -29,7 +30,14 @@ _FILL_SLACK: Final = 1e-9
 
 
 class Regime(IntEnum):
-    """How the connecting tube flows."""
+    """How the connecting tube flows.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> flow = rb.paper_law(scene).evaluate(fill_ratio=0.25, gas_pressure=0.0)
+        >>> rb.Regime(int(flow.regime)).name
+        'BLOCKED'
+    """
 
     BLOCKED = 0
     SIPHON = 1
@@ -46,7 +54,14 @@ class Regime(IntEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Flow:
-    """State of the tube for arrays of conditions, all of one shape."""
+    """State of the tube for arrays of conditions, all of one shape.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> flow: rb.Flow = rb.calibrate(scene).flow_law.evaluate(fill_ratio=[0.1, 0.4], gas_pressure=0.7e6)
+        >>> flow.velocity.round(1).tolist()
+        [12.3, 17.2]
+    """
 
     velocity: FloatArray
     """Mean velocity, m/s, positive out of the driven chamber; zero where blocked."""
@@ -59,7 +74,14 @@ class Flow:
 
 
 class FlowLaw(Protocol):
-    """Velocity in the connecting tube; arrays in, arrays out, SI."""
+    """Velocity in the connecting tube; arrays in, arrays out, SI.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> law: rb.FlowLaw = rb.paper_law(scene)
+        >>> law.evaluate(fill_ratio=[0.1, 0.4], gas_pressure=0.7e6).velocity.shape
+        (2,)
+    """
 
     @property
     def name(self) -> str:
@@ -87,6 +109,7 @@ class FlowLaw(Protocol):
             gas_pressure: gauge, Pa, in the driven chamber; the opposite one is vented.
             primed: whether the tube holds a continuous column beforehand.
         Returns: Flow, of the broadcast shape of the arguments.
+        Quantities with units of their own, such as pint's, are taken as they are.
         Raises: ValueError: a fill ratio outside the range, a NaN, or a negative absolute pressure.
         """
         ...
@@ -123,7 +146,7 @@ class Conditions:
         x = _within(fill_ratio, max_fill_ratio, "fill_ratio")
         opposite = max_fill_ratio - x if opposite_fill_ratio is None else opposite_fill_ratio
         y = _within(opposite, max_fill_ratio, "opposite_fill_ratio")
-        p = np.asarray(gas_pressure, dtype=np.float64)
+        p = np.asarray(plain_number(gas_pressure, "Pa")[0], dtype=np.float64)
         if not (np.isfinite(p) & (p + ambient_pressure >= 0)).all():
             raise ValueError(
                 f"gas_pressure must be finite and at least minus the ambient {ambient_pressure:g} Pa"
@@ -135,7 +158,7 @@ class Conditions:
 
 
 def _within(fill_ratio: npt.ArrayLike, largest: float, name: str) -> FloatArray:
-    x = np.asarray(fill_ratio, dtype=np.float64)
+    x = np.asarray(plain_number(fill_ratio, "")[0], dtype=np.float64)
     if not ((x >= -_FILL_SLACK) & (x <= largest + _FILL_SLACK)).all():
         raise ValueError(f"{name} must lie within [0, {largest:g}]")
     return clipped(x, 0.0, largest)
@@ -186,7 +209,14 @@ def _plain(value: object) -> Any:
 
 
 class MomentCurve(Protocol):
-    """Balancing moment of a pair of opposite chambers from their fill ratios."""
+    """Balancing moment of a pair of opposite chambers from their fill ratios.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> moment: rb.MomentCurve = rb.calibrate(scene).flow_law.moment
+        >>> f"{moment.pair_moment(fill_ratio=0.4, opposite_fill_ratio=0.1) * 1e6:.0f} g mm"
+        '744 g mm'
+    """
 
     def pair_moment(self, *, fill_ratio: npt.ArrayLike, opposite_fill_ratio: npt.ArrayLike) -> FloatArray:
         """Moment along the pair's axis, positive towards the chamber that has `fill_ratio`.
@@ -230,7 +260,14 @@ class BalancerModel:
 
 
 class CompleteLaw(FlowLaw, Protocol):
-    """A flow law that carries all else that the closed loop needs; what `load_law` returns."""
+    """A flow law that carries all else that the closed loop needs; what `load_law` returns.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> law: rb.CompleteLaw = rb.calibrate(scene).flow_law
+        >>> f"{law.chamber_volume * 1e6:.2f} ml, {law.max_fill_ratio}"
+        '67.69 ml, 0.5'
+    """
 
     @property
     def moment(self) -> MomentCurve:

@@ -32,7 +32,7 @@ from ringbalance.reports.section import Record, Section, Work
 from ringbalance.reports.summary import is_papers
 from ringbalance.results.numbers import shown
 
-_SETTINGS: Final[dict[str, dict[str, Any]]] = {
+SETTINGS: Final[dict[str, dict[str, Any]]] = {
     "own": {**AS_PAPER, "label": "the scene’s settings"},
     "recommended": {"color": FOUND, "label": "the recommended settings"},
 }
@@ -177,31 +177,29 @@ def _ring(panel: Axes, fills: dict[str, float], disc: Record) -> None:
 
 
 def _settling(found: Record) -> Drawing | None:
-    """Fraction of drawn devices that has settled by a time, with its bounds; None where none settles."""
-    judged = {name: found[name]["settled"] for name in _SETTINGS if found.get(name)}
-    if not any(each["time_s"] for each in judged.values()):
+    curves = [(look, found[name]["settled"]) for name, look in SETTINGS.items() if found.get(name)]
+    return settling(curves, (found["recommended"] or found["own"])["asked"]) if curves else None
+
+
+def settling(curves: Sequence[tuple[dict[str, Any], Record]], asked: float) -> Drawing | None:
+    """Fraction of drawn devices that has settled by a time, with its bounds; None where none settles.
+
+    Args: `curves`: looks, and times, fractions and bounds as in the evidence. `asked`: share of the
+        devices that a scene asks to settle.
+    """
+    if not any(each["time_s"] for _, each in curves):
         return None
 
     def paint(axes: Axes) -> None:
-        for name, each in judged.items():
-            look = _SETTINGS[name]
+        for look, each in curves:
             time, value, low, high = (np.array(each[key]) for key in ("time_s", "value", "low", "high"))
             axes.step(time, value, where="post", **look)
             axes.fill_between(time, low, high, step="post", color=look["color"], alpha=0.2, linewidth=0)
-        asked = (found["recommended"] or found["own"])["asked"]
         axes.axhline(asked, color=MUTED, linewidth=1, linestyle=":", label="asked")
         axes.yaxis.set_major_formatter(PercentFormatter(1, symbol=""))
 
-    return draw(
-        "settling",
-        paint,
-        x=TIME,
-        y=("settled devices in %", "1"),
-        xlim=(0, None),
-        ylim=(0, 1.05),
-        columns=3,
-        wide=True,
-    )
+    look: Record = {"x": TIME, "y": ("settled devices in %", "1"), "xlim": (0, None), "ylim": (0, 1.05)}
+    return draw("settling", paint, columns=3, wide=True, **look)
 
 
 LOOP: Final = Section(

@@ -28,8 +28,10 @@ _LINES: Final = _FLOW_THROUGH * np.linspace(0, 1, 7)[1:-1] ** 2
 _REACH: Final = 1.5
 """Of the picture of an end about the axis of the tube, over d."""
 _WINDOWS: Final[dict[End, tuple[float, float]]] = {"entrance": (-1.5, 3.5), "exit": (-1.5, 5.0)}
-_BESIDE: Final = 0.94
-"""in, of a figure's height, for its axis and its colour bar."""
+_TITLE: Final = 0.4
+"""in, of a figure's height, for what stands above its colour bar."""
+_BESIDE: Final = 0.94 + _TITLE
+"""in, for its axis, its colour bar and that."""
 _ALONG: Final = 2.9
 """in, of the longer side of what is drawn."""
 
@@ -143,6 +145,8 @@ def _drawing(
     height = _BESIDE + _ALONG * tall / wide
 
     def scaled(axes: Axes) -> None:
+        box = axes.get_position()
+        axes.set_position((box.x0, box.y0, box.width, box.height - _TITLE / height))
         paint(axes)
         axes.set(aspect="equal")
         axes.grid(visible=False)

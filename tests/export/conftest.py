@@ -33,13 +33,23 @@ def six() -> Both:
     return both_laws("six_chamber")
 
 
-@pytest.fixture(scope="session")
-def blocks(six: Both) -> dict[str, Block]:
-    """All blocks of that scene."""
-    scene = cast(Scene, rb.load_scene(rb.bundled_scene("six_chamber")))
-    law, compact = six
+def all_blocks(name: str, both: Both) -> dict[str, Block]:
+    """Of a bundled scene, by kind."""
+    scene = cast(Scene, rb.load_scene(rb.bundled_scene(name)))
+    law, compact = both
     return {
         "law": law_block(compact),
         "disc": disc_block(scene, law, compact),
         "controller": controller_block(scene),
     }
+
+
+@pytest.fixture(scope="session")
+def blocks(six: Both) -> dict[str, Block]:
+    return all_blocks("six_chamber", six)
+
+
+@pytest.fixture(scope="session")
+def paper_blocks() -> dict[str, Block]:
+    """Of a disc with four chambers."""
+    return all_blocks("liquid_ring_paper", both_laws("liquid_ring_paper"))

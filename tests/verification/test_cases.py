@@ -368,10 +368,10 @@ def test_light_cases_hold_at_level_heavy(paper_scene: Scene) -> None:
         assert result.definition.kind == "claim" or result.verdict in known, result.definition.id
 
 
-def test_the_readme_has_the_table_of_what_stands_behind_each_quantity(
+def test_a_page_has_the_table_of_what_stands_behind_each_quantity(
     results: Mapping[str, CaseResult],
 ) -> None:
-    page = text_of("README.md")
+    page = text_of("docs/standing.md")
     table = standing_table([results[case.id].to_dict() for case in load_cases()])
     assert fresh(page, {"standing": table}) == page
     assert "| Residual liquid over the port | no data |" in page

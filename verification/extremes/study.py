@@ -149,7 +149,14 @@ def _outcome(judgement: Judgement) -> tuple[Ending, str]:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Extremes(Result):
-    """Judgements of the designed set, in the order of its points, and of every axis."""
+    """Judgements of the designed set, in the order of its points, and of every axis.
+
+    Example:
+        >>> scene = rb.load_scene(rb.bundled_scene("liquid_ring_paper"))
+        >>> study = rb.extremes(scene)
+        >>> len(study.to_dict()["findings"]) > 0
+        True
+    """
 
     points: tuple[Point, ...]
     judgements: tuple[Judgement, ...]

@@ -1,0 +1,203 @@
+"""The loop about the balanced state as matrices with named signals, for tools of control engineering.
+
+From sample to sample, in the frame of the disc (x towards chamber A), with vibration v and valve-open time t
+as complex numbers: the plant v' = v - b exp(-j lag) t removes b per second in the direction of the gas, the
+controller t = Kc exp(j lag') (v + w' + q (v - v_before)), w' = w + i (v + v_before)/2 asks for it, i = dt/Ti
+and q = Td/dt.  With g = Kc b exp(j (lag' - lag)) the loop is L(z) = g C(z)/(z - 1),
+C = 1 + (i/2)(z + 1)/(z - 1) + q (1 - 1/z).  A complex number c is the matrix ((Re c, -Im c), (Im c, Re c)):
+the loop of two inputs and two outputs has the margins and the sensitivity of the complex one over the whole
+unit circle.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ringbalance.controller.liquid_ring.loop_factor import FREQUENCIES, vibration_rates
+from ringbalance.reduced_model.law.flow_law import BalancerModel, CompleteLaw
+from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+from ringbalance.scene.registry import registered
+
+AIR_TIME: Final = ("air_time_x", "air_time_y")
+VIBRATION: Final = ("vibration_x", "vibration_y")
+_ZONES: Final = ((3.0, "A"), (4.0, "B"), (5.0, "C"))
+"""Peaks of the sensitivity up to which a zone of ISO 14839-3 reaches: 9.5 and 12 dB as the documentation of
+ROSS (its tutorial on magnetic bearings) reports them, 14 dB recalled; the standard itself was not read."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StateSpace:
+    """x' = A x + B u, y = C x + D u from one sample to the next."""
+
+    a: FloatArray
+    b: FloatArray
+    c: FloatArray
+    d: FloatArray
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    states: tuple[str, ...]
+    dt: float
+    """Period of the samples with gas closed, s; valve-open times come on top."""
+
+    def to_control(self) -> Any:
+        """A `control.StateSpace` with these names. Raises: ImportError: python-control is not installed."""
+        make = registered("function", "control_state_space")
+        names = {"inputs": list(self.inputs), "outputs": list(self.outputs), "states": list(self.states)}
+        return make(self.a, self.b, self.c, self.d, self.dt, **names)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearLoop:
+    """Plant and controller about the balanced state."""
+
+    plant: StateSpace
+    """air_time_x, air_time_y (s) to vibration_x, vibration_y (m)."""
+    controller: StateSpace
+    """The other way."""
+    gain: complex
+    """g of the pair whose mean of both chambers is the largest."""
+    integral: float
+    """i = dt/Ti."""
+    derivative: float
+    """q = Td/dt."""
+
+    @property
+    def stable(self) -> bool:
+        """Whether a small residual decays."""
+        return bool(np.max(np.abs(np.linalg.eigvals(self.closed))) < 1.0)
+
+    @property
+    def closed(self) -> FloatArray:
+        """Matrix of the closed loop over the states of plant and controller."""
+        p, k = self.plant, self.controller
+        return np.block([[p.a + p.b @ k.d @ p.c, p.b @ k.c], [k.b @ p.c, k.a]])
+
+    @property
+    def sensitivity_peak(self) -> float:
+        """Largest gain from a disturbance of the vibration to the vibration, max |1/(1 + L)|.
+
+        With P alone 1/(1 + L) = (z - 1)/(z - 1 + g) maps the unit circle to a circle: 2/(2 - h) for real g.
+        Infinite for an unstable loop.
+        """
+        if not self.stable:
+            return math.inf
+        if self.proportional_alone:
+            centre, radius = _image(1.0, 1.0 - self.gain)
+            return abs(centre) + radius
+        return float(np.max(np.abs(1.0 / (1.0 + self._open(_circle())))))
+
+    @property
+    def zone(self) -> str:
+        """A to D of ISO 14839-3 by the peak of the sensitivity, as far as a standard for magnetic bearings
+        says anything of a loop that is closed once in a period."""
+        return next((name for most, name in _ZONES if self.sensitivity_peak < most), "D")
+
+    @property
+    def disk_margin(self) -> float:
+        """0 to 2: gain and phase of both axes may change together, at every frequency by other amounts.
+
+        With P alone min |2 (1 + L)/(1 - L)| = 2 |z - 1 + g|/|z - 1 - g|, the nearest point of a circle:
+        2 (2 - h)/(2 + h) for real g.
+        Source: as `loop_factor.loop_margins`.
+        """
+        if not self.stable:
+            return 0.0
+        if self.proportional_alone:
+            centre, radius = _image(1.0 - self.gain, 1.0 + self.gain)
+            return min(2.0 * abs(abs(centre) - radius), 2.0)
+        loop = self._open(_circle())
+        return min(float(np.min(np.abs(2.0 * (1.0 + loop) / (1.0 - loop)))), 2.0)
+
+    @property
+    def proportional_alone(self) -> bool:
+        """Whether margins have a closed form."""
+        return self.integral == 0.0 and self.derivative == 0.0
+
+    def _open(self, z: ComplexArray) -> ComplexArray:
+        shape = 1.0 + self.integral / 2.0 * (z + 1.0) / (z - 1.0) + self.derivative * (1.0 - 1.0 / z)
+        return np.asarray(self.gain * shape / (z - 1.0))
+
+
+def linear_loop(scene: Scene, *, flow_law: CompleteLaw) -> LinearLoop:
+    """The loop of a scene with the target-vector controller about the balanced state.
+
+    Args: `flow_law`: such as `calibrate(scene).flow_law`; what one second of gas removes is the mean of a
+        pair's two chambers, of all pairs the largest.
+    Raises: SceneError: another controller, which has no linear loop.
+    """
+    if scene.controller.kind != "target_vector":
+        problem = f"the controller {scene.controller.kind!r} has no linear loop"
+        raise SceneError.of_file(scene.file, problem, 'controller.kind = "target_vector"')
+    settings, dt = scene.controller, scene.controller.period
+    rate = float(np.max(np.mean(vibration_rates(scene, BalancerModel.of(flow_law)), axis=1)))
+    integral = 0.0 if settings.integral_time is None else dt / settings.integral_time
+    derivative = settings.derivative_time / dt
+    return LinearLoop(
+        plant=_plant(rate, scene.rotor.lag_angle, dt),
+        controller=_controller(settings.proportional, settings.assumed_lag_angle, integral, derivative, dt),
+        gain=cmath.rect(settings.proportional * rate, settings.assumed_lag_angle - scene.rotor.lag_angle),
+        integral=integral,
+        derivative=derivative,
+    )
+
+
+def _plant(rate: float, lag: float, dt: float) -> StateSpace:
+    whole = np.eye(2)
+    return StateSpace(
+        a=whole,
+        b=_matrix([[-cmath.rect(rate, -lag)]]),
+        c=whole,
+        d=np.zeros((2, 2)),
+        inputs=AIR_TIME,
+        outputs=VIBRATION,
+        states=VIBRATION,
+        dt=dt,
+    )
+
+
+def _controller(gain: float, lag: float, integral: float, derivative: float, dt: float) -> StateSpace:
+    """States: w, where there is an integral part, and the vibration of the sample before."""
+    asks, half = cmath.rect(gain, lag), integral / 2.0
+    moves, takes = [[1.0, half], [0.0, 0.0]], [[half], [1.0]]
+    gives = [asks, asks * (half - derivative)]
+    states: tuple[str, ...] = ("integral_x", "integral_y", "before_x", "before_y")
+    if integral == 0.0:
+        moves, takes, gives, states = [[0.0]], [[1.0]], gives[1:], states[2:]
+    return StateSpace(
+        a=_matrix(moves),
+        b=_matrix(takes),
+        c=_matrix([gives]),
+        d=_matrix([[asks * (1.0 + derivative + half)]]),
+        inputs=VIBRATION,
+        outputs=AIR_TIME,
+        states=states,
+        dt=dt,
+    )
+
+
+def _matrix(rows: Sequence[Sequence[complex]]) -> FloatArray:
+    """Each complex number as a matrix of two rows and columns."""
+    values: npt.NDArray[np.complex128] = np.array(rows, dtype=np.complex128)
+    return np.asarray(
+        np.kron(values.real, np.eye(2)) + np.kron(values.imag, np.array([[0.0, -1.0], [1.0, 0.0]]))
+    )
+
+
+def _image(a: complex, b: complex) -> tuple[complex, float]:
+    """Centre and radius of the circle to which (z - a)/(z - b) maps the unit circle, |b| not 1."""
+    inside = 1.0 - abs(b) ** 2
+    return 1.0 + (b - a) * complex(b).conjugate() / inside, abs(b - a) / abs(inside)
+
+
+def _circle() -> ComplexArray:
+    """Points of the unit circle on both sides of z = 1."""
+    return np.exp(1j * np.concatenate([FREQUENCIES, -FREQUENCIES]))

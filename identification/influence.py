@@ -1,0 +1,150 @@
+"""Influence coefficients over speed from a file, such as a rotordynamics program or a run-up gives them.
+
+The file says what its numbers mean, for programs differ in sign and in what an amplitude is; nothing is
+guessed.  Between its speeds W the dynamic stiffness W^2/H is interpolated, which is a parabola for a Jeffcott
+rotor, through its critical speed too, where H itself turns over within a few percent of the speed.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from ringbalance.identification.tables import (
+    Table,
+    data_fault,
+    decoded,
+    file_name,
+    parse_table,
+    read_content,
+    split_head,
+)
+from ringbalance.scene.arrays import ComplexArray, FloatArray
+from ringbalance.scene.faults import Fault, SceneError
+
+_AMPLITUDES: Final = {"zero-to-peak": 1.0, "peak-to-peak": 0.5, "rms": math.sqrt(2.0)}
+"""Factor to zero-to-peak."""
+_SIGNS: Final = {"lag": -1.0, "lead": 1.0, "exp(+jwt)": 1.0, "exp(-jwt)": -1.0}
+"""Of an angle or an imaginary part, to one that grows with the rotation ahead of the unbalance."""
+_POLAR: Final = ("amplitude", "angle")
+_CARTESIAN: Final = ("real", "imaginary")
+_DIMENSIONS: Final = {
+    "speed": "speed",
+    "amplitude": "influence_coefficient",
+    "angle": "angle",
+    "real": "influence_coefficient",
+    "imaginary": "influence_coefficient",
+}
+_NEAREST: Final = 4
+"""Points of a polynomial."""
+_EXAMPLE: Final = '# vibration = "zero-to-peak"'
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InfluenceTable:
+    """Vibration per unbalance over speed, in one plane."""
+
+    source: str
+    speed: FloatArray
+    """rad/s, ascending, shape (n,), n at least 2."""
+    coefficient: ComplexArray
+    """H, m/(kg m), zero-to-peak; its argument is positive where the vibration leads the unbalance."""
+
+    def at(self, speed: float) -> complex:
+        """H at a speed, rad/s.
+
+        By the polynomial of W^2/H through the four nearest speeds; its error shows where a speed is left out.
+        Raises: ValueError: a speed outside the table.
+        """
+        if not self.speed[0] <= speed <= self.speed[-1]:
+            ends = f"{self.speed[0]:g} to {self.speed[-1]:g} rad/s"
+            raise ValueError(f"{self.source} has influence coefficients for {ends}, not for {speed:g} rad/s")
+        first = int(np.searchsorted(self.speed, speed)) - _NEAREST // 2
+        first = max(min(first, self.speed.size - _NEAREST), 0)
+        x = self.speed[first : first + _NEAREST]
+        stiffness = x**2 / self.coefficient[first : first + _NEAREST]
+        others = [np.delete(x, place) for place in range(x.size)]
+        weights = [np.prod((speed - rest) / (own - rest)) for own, rest in zip(x, others, strict=True)]
+        return complex(speed**2 / np.dot(weights, stiffness))
+
+    def rotor(self, speed: float) -> dict[str, object]:
+        """For `scene.with_values`: influence coefficient, m/(kg m), and lag angle, rad, at a speed, rad/s.
+
+        Raises: ValueError: as `at`.
+        """
+        value = self.at(speed)
+        return {"rotor.influence_coefficient": abs(value), "rotor.lag_angle": -cmath.phase(value)}
+
+
+def read_influence(path: Path | str) -> InfluenceTable:
+    """Read influence coefficients over speed.
+
+    First lines, each behind #: `vibration` = "zero-to-peak", "peak-to-peak" or "rms"; with the columns
+    `amplitude` and `angle` also `angle` = "lag" (it grows as the vibration falls behind) or "lead",
+    with `real` and `imaginary` also `convention` = "exp(+jwt)" (a lagging vibration has a negative imaginary
+    part) or "exp(-jwt)". Columns carry their units: `speed [rpm]`, `amplitude [um/(g*mm)]`, `angle [deg]`.
+
+    Raises: SceneError: every error of the file.
+    """
+    file = file_name(Path(path))
+    content, faults = read_content(Path(path))
+    text, more = decoded(content, file=file) if not faults else ("", ())
+    table, further = parse_table(text, file=file) if not (faults or more) else (None, ())
+    if table is None or faults or more or further:
+        raise SceneError([*faults, *more, *further])
+    return _influence(table)
+
+
+def _influence(table: Table) -> InfluenceTable:
+    heads = {split[0]: (head, split[1]) for head in table.heads if (split := split_head(head))}
+    columns = ("speed", *(_CARTESIAN if "real" in heads else _POLAR))
+    sign_key = "convention" if "real" in heads else "angle"
+    faults = [*_head_faults(table, heads, columns), *_header_faults(table, sign_key)]
+    values: dict[str, FloatArray] = {}
+    for name in columns if not faults else ():
+        head, unit = heads[name]
+        values[name], wrong = table.values(head, unit, _DIMENSIONS[name])
+        faults += wrong
+    if faults:
+        raise SceneError(faults)
+    sign = _SIGNS[str(table.header[sign_key])]
+    if "real" in heads:
+        along, across = values["real"], sign * values["imaginary"]
+    else:
+        angle = sign * values["angle"]
+        along, across = values["amplitude"] * np.cos(angle), values["amplitude"] * np.sin(angle)
+    factor, order = _AMPLITUDES[str(table.header["vibration"])], np.argsort(values["speed"])
+    speed, coefficient = (
+        values["speed"][order],
+        np.asarray(factor * (along + 1j * across), dtype=np.complex128)[order],
+    )
+    if speed.size < 2 or np.any(np.diff(speed) <= 0.0) or speed[0] <= 0.0 or np.any(coefficient == 0.0):
+        problem = "no table of vibrations over speeds"
+        allowed = "two speeds or more, each once, none of them zero"
+        raise SceneError([data_fault(table.file, "", problem, allowed=allowed)])
+    return InfluenceTable(source=table.file, speed=speed, coefficient=coefficient)
+
+
+def _head_faults(
+    table: Table, heads: Mapping[str, tuple[str, str]], columns: tuple[str, ...]
+) -> Iterator[Fault]:
+    for name in columns:
+        if name not in heads:
+            problem = f'there is no column "{name}"'
+            allowed = "speed with amplitude and angle, or speed with real and imaginary, each with its unit"
+            yield data_fault(table.file, f"line {table.head_line}", problem, allowed=allowed)
+
+
+def _header_faults(table: Table, sign_key: str) -> Iterator[Fault]:
+    signs = ("exp(+jwt)", "exp(-jwt)") if sign_key == "convention" else ("lag", "lead")
+    for key, allowed in (("vibration", tuple(_AMPLITUDES)), (sign_key, signs)):
+        if table.header.get(key) not in allowed:
+            value = "" if key not in table.header else repr(table.header[key])
+            problem = f"the file does not say what its numbers mean, such as {_EXAMPLE}"
+            yield data_fault(table.file, key, problem, value=value, allowed=" or ".join(allowed))

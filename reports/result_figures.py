@@ -1,0 +1,126 @@
+"""What `plot()` draws of a result, in the report's style."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from ringbalance.identification.documents import against_fit
+from ringbalance.reduced_model import paper
+from ringbalance.reports.figure import AS_PAPER, FOUND, PAPER, Drawing, curve, draw, level, logarithmic, sheet
+from ringbalance.reports.judged import judgement_record, settled_record
+from ringbalance.reports.pages.chamber import MOMENT
+from ringbalance.reports.pages.loop import SETTINGS, settling
+from ringbalance.reports.pages.measured import fit_figures
+from ringbalance.reports.pages.standing import CONDITIONS
+from ringbalance.reports.pages.tube import TUBE
+from ringbalance.reports.run_figures import figures_of
+from ringbalance.reports.sections import drawings_in
+from ringbalance.results.result import Result
+from ringbalance.scene.platform.files import write_whole
+from ringbalance.verification import papers
+
+_LEAST: Final = 1e-12
+"""Error at which a model that equals the finest is drawn."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResultFigures:
+    """Figures of a result, which a notebook shows below each other."""
+
+    drawings: tuple[Drawing, ...]
+
+    def svg(self) -> str:
+        """All of them on one sheet, an SVG file."""
+        return sheet(self.drawings)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the sheet. Raises: OSError: the file cannot be written."""
+        return write_whole(Path(path), self.svg())
+
+    def _repr_svg_(self) -> str:
+        return self.svg()
+
+
+def figures_of_result(result: Result) -> ResultFigures:
+    """Of a calibration, a run, a tuning, a fit, a comparison or a trade study.
+
+    Raises: TypeError: there is nothing to draw of such a result.
+    """
+    kind = type(result).__name__
+    if kind not in _DRAWN:
+        raise TypeError(f"of a result of the type {kind} there is no figure")
+    return ResultFigures(drawings=tuple(_DRAWN[kind](result)))
+
+
+def _calibration(result: Any) -> list[Drawing]:
+    document = result.to_dict()
+    printed = {
+        "drag_coefficient": paper.PAPER_DRAG_COEFFICIENT,
+        "lambda_m": paper.PAPER_LAMBDA,
+        "lambda_spread": papers.LAMBDA_TOLERANCE,
+    }
+    point = document["operating_point"]
+    evidence = {"calibration": document, "operating_point": point, "paper": printed, "verification": []}
+    return drawings_in([section.view(evidence) for section in (CONDITIONS, MOMENT, TUBE)])
+
+
+def _tuning(result: Any) -> list[Drawing]:
+    judged = {"own": result.own, "recommended": result.recommended}
+    records = {name: judgement_record(each) for name, each in judged.items() if each is not None}
+    curves = [(SETTINGS[name], each["settled"]) for name, each in records.items()]
+    return drawings_in([settling(curves, result.recommended.asked)])
+
+
+def _comparison(result: Any) -> list[Drawing]:
+    looks = ({"color": FOUND}, AS_PAPER)
+    curves = [
+        ({**look, "label": side.scene.name}, settled_record(side.outcomes))
+        for look, side in zip(looks, result.sides, strict=True)
+    ]
+    return drawings_in([settling(curves, result.asked)])
+
+
+def _trade(result: Any) -> list[Drawing]:
+    """Error against designs a second of every model that was timed."""
+    drawings = []
+    for quantity in result.to_dict()["quantities"]:
+        name = quantity["quantity"]
+        speed = {each["model"]: each["designs_per_second"] for each in result.times.get(name, ())}
+        models = [model for model in quantity["models"] if model["model"] in speed]
+        rates = [speed[model["model"]] for model in models]
+        errors = [max(model["error"], _LEAST) for model in models]
+        known = max(quantity["uncertainty"], _LEAST)
+        drawing = draw(
+            f"trade-{name.replace('_', '-')}",
+            curve(rates, errors, quantity["title"], color=FOUND, linestyle="", marker="o", markersize=5),
+            level(known, "known to", color=PAPER, linewidth=1, linestyle=":"),
+            logarithmic("x"),
+            logarithmic("y"),
+            x=("designs a second", "1"),
+            y=("error against the finest", "1"),
+        )
+        drawings += [drawing] if models else []
+    return drawings
+
+
+def _run(result: Any) -> list[Drawing]:
+    return figures_of(result.scene, result)
+
+
+_DRAWN: Final[Mapping[str, Callable[[Any], list[Drawing]]]] = MappingProxyType(
+    {
+        "Calibration": _calibration,
+        "Simulation": _run,
+        "EccentricRun": _run,
+        "Tuning": _tuning,
+        "Comparison": _comparison,
+        "Fit": lambda fit: fit_figures(against_fit(fit.result)),
+        "TradeStudy": _trade,
+    }
+)
+"""By the name of the result's type."""

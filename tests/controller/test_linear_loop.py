@@ -1,0 +1,135 @@
+"""The linear loop in matrices: its signs against the disc, its margins against scans of the unit circle."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+import pytest
+
+import ringbalance as rb
+from ringbalance.controller.liquid_ring.linear_loop import LinearLoop
+from ringbalance.controller.liquid_ring.loop_factor import loop_margins
+from ringbalance.controller.loop import simulate
+from ringbalance.reduced_model.law.flow_law import CompleteLaw
+from ringbalance.scene.faults import SceneError
+from ringbalance.scene.models import Scene
+
+CIRCLE = np.exp(1j * np.linspace(1e-6, 2 * np.pi - 1e-6, 200_001))
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    """Nearly balanced, with an exact sensor and P alone."""
+    values = {
+        "sensor.amplitude_noise": "0 m",
+        "sensor.phase_noise": "0 deg",
+        "rotor.initial_vibration.amplitude": "0.3 um",
+        "controller.integral_time": None,
+        "controller.derivative_time": None,
+        "controller.limit": "0.01 um",
+    }
+    return cast(Scene, rb.load_scene(rb.bundled_scene("six_chamber")).with_values(values))
+
+
+@pytest.fixture(scope="module")
+def law(scene: Scene) -> CompleteLaw:
+    return rb.calibrate(scene).flow_law
+
+
+def vibration_of(seen: rb.Measurement | None) -> complex:
+    assert seen is not None
+    return complex(seen.amplitude * np.exp(1j * seen.phase))
+
+
+def complex_of(matrix: np.ndarray) -> complex:
+    assert matrix[0, 0] == matrix[1, 1]
+    assert matrix[0, 1] == -matrix[1, 0]
+    return complex(matrix[0, 0], matrix[1, 0])
+
+
+def test_the_plant_has_frame_sign_and_size_of_a_run(scene: Scene, law: CompleteLaw) -> None:
+    loop = rb.linear_loop(scene, flow_law=law)
+    run = simulate(scene, flow_law=law, modelled=[])
+    first = run.samples[0]
+    before, after = (vibration_of(each.measurement) for each in run.samples[:2])
+    axes = np.exp(2j * np.pi * np.arange(6) / 6)
+    gas = sum(axes[valve.chamber] * valve.duration for valve in first.command.valves)
+    change = complex_of(loop.plant.b) * gas
+    assert abs(after - before - change) < 0.1 * abs(change)
+    asked = complex_of(loop.controller.d) * before
+    assert asked == pytest.approx(gas, rel=0.02)
+
+
+@pytest.mark.parametrize(("gain", "lag"), [(0.3, 0.0), (1.1, 0.2), (1.7, -0.3)])
+def test_margins_in_closed_form_are_those_of_the_unit_circle(
+    scene: Scene, law: CompleteLaw, gain: float, lag: float
+) -> None:
+    own = rb.linear_loop(scene, flow_law=law)
+    settings = scene.controller
+    wanted = {
+        "controller.proportional": settings.proportional * gain / abs(own.gain),
+        "controller.assumed_lag_angle": scene.rotor.lag_angle + lag,
+    }
+    loop = rb.linear_loop(scene.with_values(wanted), flow_law=law)
+    assert loop.gain == pytest.approx(gain * np.exp(1j * lag), rel=1e-9)
+    assert loop.stable
+    assert loop.proportional_alone
+    transfer = loop.gain / (CIRCLE - 1.0)
+    assert loop.sensitivity_peak == pytest.approx(np.max(np.abs(1 / (1 + transfer))), rel=1e-6)
+    disk = np.min(np.abs(2 * (1 + transfer) / (1 - transfer)))
+    assert loop.disk_margin == pytest.approx(min(disk, 2.0), rel=1e-6)
+    if lag == 0.0:
+        assert loop.sensitivity_peak == pytest.approx(2 / (2 - gain))
+        assert loop.disk_margin == pytest.approx(2 * (2 - gain) / (2 + gain))
+
+
+def test_with_integral_and_derivative_matrices_and_transfer_function_agree(
+    scene: Scene, law: CompleteLaw
+) -> None:
+    settings = {"controller.integral_time": "5 s", "controller.derivative_time": "0.05 s"}
+    loop = rb.linear_loop(scene.with_values(settings), flow_law=law)
+    p, k = loop.plant, loop.controller
+    for z in CIRCLE[1000::40_000]:
+        plant = p.c @ np.linalg.solve(z * np.eye(2) - p.a, p.b)
+        asks = k.c @ np.linalg.solve(z * np.eye(4) - k.a, k.b) + k.d
+        opened = plant @ asks
+        # The matrix of a complex number c has the eigenvector (1, -j) with the value c.
+        turned = opened @ np.array([1.0, -1j])
+        transfer = -turned[0]
+        shape = 1 + loop.integral / 2 * (z + 1) / (z - 1) + loop.derivative * (1 - 1 / z)
+        assert transfer == pytest.approx(loop.gain * shape / (z - 1), rel=1e-9)
+    margins = loop_margins(loop_factor=abs(loop.gain), integral=loop.integral, derivative=loop.derivative)
+    assert loop.disk_margin == pytest.approx(margins.disk, rel=1e-9)
+    assert loop.zone == "A"
+
+
+def zone_of(scene: Scene, law: CompleteLaw, gain: float) -> LinearLoop:
+    now = abs(rb.linear_loop(scene, flow_law=law).gain)
+    wanted = {"controller.proportional": scene.controller.proportional * gain / now}
+    return rb.linear_loop(scene.with_values(wanted), flow_law=law)
+
+
+def test_zones_follow_the_peak(scene: Scene, law: CompleteLaw) -> None:
+    """2/(2 - h): 2.5, 3.3, 4.5, 6.7, and no peak of a loop that is unstable."""
+    loops = [zone_of(scene, law, gain) for gain in (1.2, 1.4, 1.55, 1.7, 2.1)]
+    assert [loop.zone for loop in loops] == ["A", "B", "C", "D", "D"]
+    assert [loop.stable for loop in loops] == [True] * 4 + [False]
+    assert loops[-1].disk_margin == 0.0
+
+
+def test_python_control_takes_it(scene: Scene, law: CompleteLaw) -> None:
+    control = pytest.importorskip("control")
+    loop = rb.linear_loop(scene, flow_law=law)
+    plant, controller = loop.plant.to_control(), loop.controller.to_control()
+    assert plant.input_labels == ["air_time_x", "air_time_y"]
+    assert plant.output_labels == ["vibration_x", "vibration_y"]
+    closed = control.feedback(plant * controller, np.eye(2), sign=1)
+    poles = np.sort(np.abs(closed.poles()))
+    right = np.sort(np.abs(np.linalg.eigvals(loop.closed)))
+    assert poles[-1] == pytest.approx(right[-1], rel=1e-6)
+
+
+def test_another_controller_has_no_linear_loop(scene: Scene, law: CompleteLaw) -> None:
+    with pytest.raises(SceneError, match="law_based"):
+        rb.linear_loop(scene.with_values({"controller.kind": "law_based"}), flow_law=law)
